@@ -1,0 +1,100 @@
+"""fba: the MPEG-4 Face and Body Animation codec, converters and player.
+
+Everything public is imported on first use, so that `import fba` costs next to nothing::
+
+    import fba
+
+    animation = fba.read("walk.bvh")
+    data = fba.encode(animation)
+    assert fba.decode(data).rate == animation.rate
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from fba import body, capture, face
+    from fba.animation import Animation, BodyTrack, FaceTrack, Frame
+    from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode, encode
+    from fba.errors import (
+        BitstreamError,
+        DisplayError,
+        FbaError,
+        FbaWarning,
+        FormatError,
+        ModelError,
+        RangeError,
+        UnsupportedError,
+    )
+    from fba.formats import probe, read, write
+
+_PLACES = {
+    "Animation": "fba.animation",
+    "BodyTrack": "fba.animation",
+    "FaceTrack": "fba.animation",
+    "Frame": "fba.animation",
+    "BitstreamError": "fba.errors",
+    "DisplayError": "fba.errors",
+    "FbaError": "fba.errors",
+    "FbaWarning": "fba.errors",
+    "FormatError": "fba.errors",
+    "ModelError": "fba.errors",
+    "RangeError": "fba.errors",
+    "UnsupportedError": "fba.errors",
+    "Decoder": "fba.codec",
+    "Encoder": "fba.codec",
+    "EncoderOptions": "fba.codec",
+    "StreamInfo": "fba.codec",
+    "decode": "fba.codec",
+    "encode": "fba.codec",
+    "probe": "fba.formats",
+    "read": "fba.formats",
+    "write": "fba.formats",
+}
+_MODULES = ("body", "capture", "codec", "face", "formats", "parameters")
+
+__all__ = [
+    "Animation",
+    "BitstreamError",
+    "BodyTrack",
+    "Decoder",
+    "DisplayError",
+    "Encoder",
+    "EncoderOptions",
+    "FaceTrack",
+    "FbaError",
+    "FbaWarning",
+    "FormatError",
+    "Frame",
+    "ModelError",
+    "RangeError",
+    "StreamInfo",
+    "UnsupportedError",
+    "body",
+    "capture",
+    "decode",
+    "encode",
+    "face",
+    "probe",
+    "read",
+    "write",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PLACES:
+        value = getattr(import_module(_PLACES[name]), name)
+    elif name in _MODULES:
+        value = import_module(f"fba.{name}")
+    else:
+        raise AttributeError(f"module 'fba' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

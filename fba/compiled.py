@@ -1,0 +1,39 @@
+"""The one door to numba: `compiled` turns a plain function over NumPy arrays into machine code.
+
+Where numba is missing, or `NUMBA_DISABLE_JIT=1` is set, the same source runs as Python: slower, with
+the same results. Functions behind this door therefore keep to integers and floats that behave alike
+in both worlds: they cast NumPy scalars with `int()` before doing arithmetic on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+try:
+    import numba
+except ImportError:  # the codec runs anywhere Python and NumPy run
+    numba = None
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def compiled(function: Function) -> Function:
+    """Compile on first call, cache the machine code on disk, release the GIL while running."""
+    if numba is None:
+        return function
+    result: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return result
+
+
+def inlined(function: Function) -> Function:
+    """Like `compiled`, for small helpers that only compiled functions call."""
+    if numba is None:
+        return function
+    result: Function = numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")(function)
+    return result
+
+
+def is_compiled() -> bool:
+    """Whether the hot loops run as machine code in this process."""
+    return numba is not None and not numba.config.DISABLE_JIT

@@ -1,0 +1,115 @@
+"""What can go wrong, as exceptions that say where, what was found, what was expected and what to do.
+
+::
+
+    FbaError
+    ├── BitstreamError(plane, bit)          also ValueError   the bits of an FBA stream are damaged
+    ├── FormatError(path, line, token)      also ValueError   a file is not what its format says
+    ├── RangeError(parameter, value, limits) also ValueError  a value that the syntax cannot carry
+    ├── UnsupportedError(what)              also NotImplementedError  correct, but not handled here
+    ├── ModelError                          also ValueError   a face or body model is unusable
+    └── DisplayError                        also OSError      no window, no OpenGL, no video encoder
+
+Something read with doubts, but read, is an `FbaWarning`.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+
+class FbaError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class FbaWarning(UserWarning):
+    """The input was read, but something in it was odd; the text says what and what was assumed."""
+
+
+class BitstreamError(FbaError, ValueError):
+    """Damage in an FBA stream.
+
+    plane: number of the plane (0-based, in stream order) in which it was found.
+    bit: position of the offending bit, counted from the start of the stream.
+    """
+
+    def __init__(self, message: str, *, plane: int | None = None, bit: int | None = None) -> None:
+        self.plane = plane
+        self.bit = bit
+        where = []
+        if plane is not None:
+            where.append(f"plane {plane}")
+        if bit is not None:
+            where.append(f"bit {bit} (byte {bit // 8})")
+        super().__init__(f"{', '.join(where)}: {message}" if where else message)
+
+
+class FormatError(FbaError, ValueError):
+    """A file whose content breaks its format.
+
+    path: the file. line: 1-based line number, where lines exist. token: the offending text.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: str | os.PathLike[str] | None = None,
+        line: int | None = None,
+        token: str | None = None,
+    ) -> None:
+        self.path = os.fspath(path) if path is not None else None
+        self.line = line
+        self.token = token if token is None or len(token) <= 40 else token[:37] + "..."
+        where = self.path or ""
+        if line is not None:
+            where += f":{line}" if where else f"line {line}"
+        text = f"{where}: {message}" if where else message
+        if self.token is not None:
+            text += f" (found {self.token!r})"
+        super().__init__(text)
+
+
+class RangeError(FbaError, ValueError):
+    """A value beyond what the syntax can carry.
+
+    parameter: its name, e.g. "FAP 3 open_jaw". value: the offending value.
+    limits: (smallest, largest) value that would fit. frame: position in the animation, 0-based.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        parameter: str | None = None,
+        value: int | None = None,
+        limits: tuple[int, int] | None = None,
+        frame: int | None = None,
+    ) -> None:
+        self.parameter = parameter
+        self.value = value
+        self.limits = limits
+        self.frame = frame
+        where = [f"frame {frame}"] if frame is not None else []
+        if parameter is not None:
+            where.append(parameter)
+        super().__init__(f"{', '.join(where)}: {message}" if where else message)
+
+
+class UnsupportedError(FbaError, NotImplementedError):
+    """Correct input that this implementation does not handle; `what` names the feature."""
+
+    def __init__(self, message: str, *, what: str | None = None, **details: Any) -> None:
+        self.what = what if what is not None else message
+        self.plane: int | None = details.get("plane")
+        self.bit: int | None = details.get("bit")
+        super().__init__(message)
+
+
+class ModelError(FbaError, ValueError):
+    """A face or body model that cannot be used; the text names the place in it."""
+
+
+class DisplayError(FbaError, OSError):
+    """No window, no OpenGL context or no video encoder; the text says what to install or set."""
