@@ -186,7 +186,9 @@ class Animation:
             raise ValueError(f"Animation: index must have shape (T,), not {index.shape}")
         if len(index) > 1 and not (np.diff(index) > 0).all():
             at = int(np.argmax(np.diff(index) <= 0)) + 1
-            raise ValueError(f"Animation: index must increase, but frame {at} has {index[at]} after {index[at - 1]}")
+            raise ValueError(
+                f"Animation: index must increase, but frame {at} has {index[at]} after {index[at - 1]}"
+            )
         if self.face is None and self.body is None:
             raise ValueError("Animation: needs a face track, a body track, or both")
         for kind, track in (("face", self.face), ("body", self.body)):
@@ -202,7 +204,9 @@ class Animation:
             raise ValueError("Animation.from_frames: no frames")
         rates = {frame.rate for frame in frames}
         if len(rates) > 1:
-            raise ValueError(f"Animation.from_frames: frames of several rates: {', '.join(map(str, sorted(rates)))}")
+            raise ValueError(
+                f"Animation.from_frames: frames of several rates: {', '.join(map(str, sorted(rates)))}"
+            )
         face = _joined_face([(f.face, 1) for f in frames])
         body = _joined_body([(f.body, 1) for f in frames])
         return cls(rates.pop(), np.array([f.index for f in frames], dtype=np.int64), face, body, name)
@@ -231,7 +235,9 @@ class Animation:
             following = int(part.index[-1]) + offset + 1
         face = _joined_face([(part.face, len(part)) for part in parts])
         body = _joined_body([(part.body, len(part)) for part in parts])
-        index = np.concatenate(indices) if indices else np.empty(0, dtype=np.int64)  # zero frames, nothing to fill
+        index = (
+            np.concatenate(indices) if indices else np.empty(0, dtype=np.int64)
+        )  # zero frames, nothing to fill
         return Animation(parts[0].rate, index, face, body, parts[0].name)
 
     def __len__(self) -> int:
@@ -282,7 +288,9 @@ class Animation:
     @property
     def duration(self) -> Fraction:
         """Seconds from the first frame to one frame period after the last."""
-        return Fraction(int(self.index[-1]) - int(self.index[0]) + 1) / self.rate if len(self) else Fraction(0)
+        return (
+            Fraction(int(self.index[-1]) - int(self.index[0]) + 1) / self.rate if len(self) else Fraction(0)
+        )
 
     def resample(self, rate: Fraction | int | str) -> Animation:
         """The same performance at another frame rate, evenly spaced frames without gaps.
@@ -297,7 +305,9 @@ class Animation:
         if not len(self):
             return Animation(rate, self.index, self.face, self.body, self.name)
         ratio = rate / self.rate
-        first = -(-int(self.index[0]) * ratio.numerator // ratio.denominator)  # first new frame not before ours
+        first = -(
+            -int(self.index[0]) * ratio.numerator // ratio.denominator
+        )  # first new frame not before ours
         last = int(self.index[-1]) * ratio.numerator // ratio.denominator
         count = max(last - first + 1, 1)
         if count > MAX_FRAMES:
