@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -76,6 +76,25 @@ class FaceTrack:
                     )
         _freeze(self, values=values, mask=mask, viseme=viseme, expression=expression)
 
+    @classmethod
+    def empty(cls, count: int) -> FaceTrack:
+        """A track of that many frames that send nothing."""
+        return cls(np.zeros((count, FAP_COUNT), dtype=np.int32), np.zeros((count, FAP_COUNT), dtype=bool))
+
+    @classmethod
+    def join(cls, parts: Iterable[tuple[FaceTrack | None, int]]) -> FaceTrack | None:
+        """Tracks one after another; each with its count of frames, None where it sends nothing."""
+        parts = list(parts)
+        if all(track is None for track, _ in parts):
+            return None
+        tracks = [track if track is not None else cls.empty(count) for track, count in parts]
+        return cls(
+            _stacked([t.values for t in tracks]),
+            _stacked([t.mask for t in tracks]),
+            _stacked([t.viseme for t in tracks]),
+            _stacked([t.expression for t in tracks]),
+        )
+
     def __len__(self) -> int:
         return len(self.values)
 
@@ -111,6 +130,20 @@ class BodyTrack:
     def __post_init__(self) -> None:
         values, mask = _checked_values(self.values, self.mask, BAP_COUNT, "BodyTrack")
         _freeze(self, values=values, mask=mask)
+
+    @classmethod
+    def empty(cls, count: int) -> BodyTrack:
+        """A track of that many frames that send nothing."""
+        return cls(np.zeros((count, BAP_COUNT), dtype=np.int32), np.zeros((count, BAP_COUNT), dtype=bool))
+
+    @classmethod
+    def join(cls, parts: Iterable[tuple[BodyTrack | None, int]]) -> BodyTrack | None:
+        """Tracks one after another; each with its count of frames, None where it sends nothing."""
+        parts = list(parts)
+        if all(track is None for track, _ in parts):
+            return None
+        tracks = [track if track is not None else cls.empty(count) for track, count in parts]
+        return cls(_stacked([t.values for t in tracks]), _stacked([t.mask for t in tracks]))
 
     def __len__(self) -> int:
         return len(self.values)
@@ -207,8 +240,8 @@ class Animation:
             raise ValueError(
                 f"Animation.from_frames: frames of several rates: {', '.join(map(str, sorted(rates)))}"
             )
-        face = _joined_face([(f.face, 1) for f in frames])
-        body = _joined_body([(f.body, 1) for f in frames])
+        face = FaceTrack.join([(f.face, 1) for f in frames])
+        body = BodyTrack.join([(f.body, 1) for f in frames])
         return cls(rates.pop(), np.array([f.index for f in frames], dtype=np.int64), face, body, name)
 
     @staticmethod
@@ -233,8 +266,8 @@ class Animation:
             offset = 0 if following is None else following - int(part.index[0])
             indices.append(part.index + offset)
             following = int(part.index[-1]) + offset + 1
-        face = _joined_face([(part.face, len(part)) for part in parts])
-        body = _joined_body([(part.body, len(part)) for part in parts])
+        face = FaceTrack.join([(part.face, len(part)) for part in parts])
+        body = BodyTrack.join([(part.body, len(part)) for part in parts])
         index = (
             np.concatenate(indices) if indices else np.empty(0, dtype=np.int64)
         )  # zero frames, nothing to fill
@@ -382,31 +415,11 @@ def _freeze(instance: object, **fields: object) -> None:
         object.__setattr__(instance, name, value)
 
 
-def _joined_face(parts: list[tuple[FaceTrack | None, int]]) -> FaceTrack | None:
-    if all(track is None for track, _ in parts):
-        return None
-    tracks = [track if track is not None else _empty_face(count) for track, count in parts]
-    return FaceTrack(
-        np.concatenate([t.values for t in tracks]),
-        np.concatenate([t.mask for t in tracks]),
-        np.concatenate([t.viseme for t in tracks]),
-        np.concatenate([t.expression for t in tracks]),
-    )
-
-
-def _joined_body(parts: list[tuple[BodyTrack | None, int]]) -> BodyTrack | None:
-    if all(track is None for track, _ in parts):
-        return None
-    tracks = [track if track is not None else _empty_body(count) for track, count in parts]
-    return BodyTrack(np.concatenate([t.values for t in tracks]), np.concatenate([t.mask for t in tracks]))
-
-
-def _empty_face(count: int) -> FaceTrack:
-    return FaceTrack(np.zeros((count, FAP_COUNT), dtype=np.int32), np.zeros((count, FAP_COUNT), dtype=bool))
-
-
-def _empty_body(count: int) -> BodyTrack:
-    return BodyTrack(np.zeros((count, BAP_COUNT), dtype=np.int32), np.zeros((count, BAP_COUNT), dtype=bool))
+def _stacked(arrays: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """One array of all, read-only, so that a track takes it over without a copy."""
+    stacked = np.concatenate(arrays)
+    stacked.flags.writeable = False
+    return stacked
 
 
 def _between(

@@ -1,0 +1,307 @@
+"""The adaptive arithmetic coder of the FBA object plane, compiled (ISO/IEC 14496-2, FBA object).
+
+A 16-bit integer coder in the style of H.263 Annex E. A symbol s of a model with counts c[0], c[1], ...
+owns the part of the interval [low, high] between the cumulative counts C[s+1] and C[s], where C[s] is
+the sum of c[s], c[s+1], ...: symbol 0 sits at the top. What bits the interval has in common go out;
+two more bits at the end of a segment pick a quarter that lies inside it. Inside a segment, a 1 is
+slipped in after every 22 zero bits in a row, so that no start code can appear.
+
+All counts start at 1 and grow by 1 each time their symbol is coded; at a total of 16383 they are
+halved. A model therefore keeps only what was *added* to the initial ones: `added[s]`, and a Fenwick
+tree of partial sums over them, in which a symbol is found and a count raised in log2(size) steps:
+alphabets reach 3721 symbols. One symbol of each model stands outside its tree and costs no search at
+all, `usual`: that of no change, which is most of what a predictive codec sends.
+
+The models of all slots stand side by side in arrays (slots, STRIDE). Coding a plane only reads them;
+`learn` updates them afterwards: a model is used at most once in a plane, so a plane that proves
+incomplete or damaged leaves no trace.
+
+All functions work on NumPy arrays and plain integers, check every bound, and run uncompiled too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled
+
+QUARTER = 16384
+HALF = 32768
+THREE_QUARTERS = 49152
+TOP = 65535
+TOTAL_MAX = 16383
+GUARD = 22
+"""Zero bits in a row after which a 1 is inserted."""
+
+ALPHABET_MAX = 3721
+"""-1860..1860, the widest range that a range list can express."""
+STRIDE = ALPHABET_MAX + 1
+TREE_TOP = 2048
+"""Largest power of two within ALPHABET_MAX."""
+
+OK = 0
+OUT_OF_DATA = 1
+BAD_GUARD = 2
+"""A 0 where the 1 after 22 zeros must stand."""
+BAD_FLUSH = 3
+"""The two closing bits lie outside the final interval: no encoder writes that."""
+
+UInt8 = npt.NDArray[np.uint8]
+UInt16 = npt.NDArray[np.uint16]
+Int64 = npt.NDArray[np.int64]
+
+
+@compiled
+def decode_segment(
+    data: UInt8,
+    bit: int,
+    end: int,
+    slots: Int64,
+    size: Int64,
+    usual: Int64,
+    total: Int64,
+    below_usual: Int64,
+    added: UInt16,
+    tree: UInt16,
+    adaptive: bool,
+    symbols: Int64,
+) -> tuple[int, int]:
+    """Decode one segment that starts at `bit`: symbols[k] becomes the symbol of slot slots[k].
+
+    data: the stream; `end` bits of it are there, zeros are assumed beyond.
+    size, total: per slot; added, tree: (slots, STRIDE). Not adaptive: all counts are 1 (I planes).
+    Returns (status, bit): OK and the bit after the segment; OUT_OF_DATA where it needs bits beyond
+    `end`; or the kind and place of the damage.
+    """
+    low = high = code = 0  # renormalising from here reads the first 16 bits
+    zeros = 0  # in a row, up to `bit`
+    taken = 0  # logical bits: those read, without the inserted ones
+    guard_at = -1  # value of `taken` at the last inserted one
+    bad_guard = -1
+    bad_guard_at = 0
+    count = len(slots)
+    for position in range(count + 1):
+        while True:
+            if high >= HALF:
+                if low >= HALF:
+                    low -= HALF
+                    high -= HALF
+                    code -= HALF
+                elif low >= QUARTER and high < THREE_QUARTERS:
+                    low -= QUARTER
+                    high -= QUARTER
+                    code -= QUARTER
+                else:
+                    break
+            low = 2 * low
+            high = 2 * high + 1
+            if zeros == GUARD:
+                if bit < end and not (int(data[bit >> 3]) >> (7 - (bit & 7))) & 1 and bad_guard < 0:
+                    bad_guard = bit
+                    bad_guard_at = taken
+                guard_at = taken
+                bit += 1
+                zeros = 0
+            value = (int(data[bit >> 3]) >> (7 - (bit & 7))) & 1 if bit < end else 0
+            bit += 1
+            zeros = 0 if value else zeros + 1
+            code = 2 * code + value
+            taken += 1
+        if position == count:
+            break
+
+        slot = int(slots[position])
+        span = high - low + 1
+        whole = int(total[slot]) if adaptive else int(size[slot])
+        target = whole - 1 - ((code - low + 1) * whole - 1) // span  # counted from symbol 0 upwards
+        if adaptive:
+            symbol = int(usual[slot])
+            below = int(below_usual[slot])
+            share = 1 + int(added[slot, symbol])
+            if target < below:
+                symbol, below = _find(tree, slot, int(size[slot]), target)
+                share = 1 + int(added[slot, symbol])
+            elif target >= below + share:
+                symbol, below = _find(tree, slot, int(size[slot]), target - share + 1)
+                below += share - 1
+                share = 1 + int(added[slot, symbol])
+        else:
+            symbol, below, share = target, target, 1
+        symbols[position] = symbol
+        above = whole - below  # C[symbol]; C[symbol + 1] is less by the symbol's own count
+        high = low - 1 + span * above // whole
+        low = low + span * (above - share) // whole
+    # Of the 16 bits in the register, the first two close the segment; the other 14 are not ours, nor is
+    # a 1 that was taken for an inserted one among them.
+    used = taken - 14
+    if bad_guard >= 0 and bad_guard_at < used:
+        return BAD_GUARD, bad_guard
+    after = bit - 14 - (1 if guard_at >= used else 0)
+    if after > end:
+        return OUT_OF_DATA, end
+    quarter = (code >> 14) * QUARTER
+    if quarter < low or quarter + QUARTER - 1 > high:
+        # With bits missing, this is no damage yet: they may still change what was decoded.
+        return (OUT_OF_DATA, end) if bit > end else (BAD_FLUSH, after - 2)
+    return OK, after
+
+
+@compiled
+def encode_segment(
+    data: UInt8,
+    bit: int,
+    slots: Int64,
+    size: Int64,
+    usual: Int64,
+    total: Int64,
+    below_usual: Int64,
+    added: UInt16,
+    tree: UInt16,
+    adaptive: bool,
+    symbols: Int64,
+) -> int:
+    """Encode symbols[k] for slot slots[k] into one segment that starts at `bit`; the bit after it.
+
+    data: zeroed from `bit` on, with room for 16 bits for each symbol and 16 more.
+    """
+    low = 0
+    high = TOP
+    pending = 0  # bits that wait for the one that decides them all
+    zeros = 0
+    count = len(slots)
+    for position in range(count + 1):
+        if position < count:
+            slot = int(slots[position])
+            symbol = int(symbols[position])
+            span = high - low + 1
+            if adaptive:
+                whole = int(total[slot])
+                if symbol == usual[slot]:
+                    above = whole - int(below_usual[slot])
+                else:
+                    above = whole - _sum_below(tree, slot, symbol)
+                    if symbol > usual[slot]:
+                        above -= int(added[slot, usual[slot]])
+                share = 1 + int(added[slot, symbol])
+            else:
+                whole = int(size[slot])
+                above = whole - symbol
+                share = 1
+            high = low - 1 + span * above // whole
+            low = low + span * (above - share) // whole
+        else:  # the end: two bits (and those pending) name a quarter inside the interval
+            pending += 1
+            low, high = (QUARTER, HALF - 1) if low < QUARTER else (HALF, THREE_QUARTERS - 1)
+        while True:
+            if high < HALF:
+                value = 0
+            elif low >= HALF:
+                value = 1
+                low -= HALF
+                high -= HALF
+            elif low >= QUARTER and high < THREE_QUARTERS and position < count:
+                pending += 1
+                low = 2 * (low - QUARTER)
+                high = 2 * (high - QUARTER) + 1
+                continue
+            else:
+                break
+            low = 2 * low
+            high = 2 * high + 1
+            for repeat in range(pending + 1):
+                out = value if repeat == 0 else 1 - value
+                if zeros == GUARD:
+                    data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+                    bit += 1
+                    zeros = 0
+                if out:
+                    data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+                    zeros = 0
+                else:
+                    zeros += 1
+                bit += 1
+            pending = 0
+            if position == count:
+                break
+    return bit
+
+
+@compiled
+def learn(
+    slots: Int64,
+    symbols: Int64,
+    size: Int64,
+    usual: Int64,
+    total: Int64,
+    below_usual: Int64,
+    added: UInt16,
+    tree: UInt16,
+) -> None:
+    """Raise the count of symbols[k] in the model of slots[k], halving the model's counts where it is full."""
+    for position in range(len(slots)):
+        slot = int(slots[position])
+        if total[slot] == TOTAL_MAX:
+            total[slot], below_usual[slot] = _halve(added, tree, slot, int(size[slot]), int(usual[slot]))
+        symbol = int(symbols[position])
+        added[slot, symbol] += np.uint16(1)
+        total[slot] += 1
+        if symbol != usual[slot]:
+            if symbol < usual[slot]:
+                below_usual[slot] += 1
+            _raise(tree, slot, int(size[slot]), symbol, 1)
+
+
+@compiled
+def _find(tree: UInt16, slot: int, size: int, target: int) -> tuple[int, int]:
+    """The symbol whose share of the counts, added up from symbol 0, holds `target`; the sum below it."""
+    symbol = 0
+    remaining = target
+    step = TREE_TOP
+    while step > 0:
+        node = symbol + step
+        if node <= size:
+            weight = step + int(tree[slot, node])
+            if weight <= remaining:
+                symbol = node
+                remaining -= weight
+        step >>= 1
+    return symbol, target - remaining
+
+
+@compiled
+def _sum_below(tree: UInt16, slot: int, symbol: int) -> int:
+    """Sum of the counts of the symbols below this one."""
+    below = symbol
+    node = symbol
+    while node > 0:
+        below += int(tree[slot, node])
+        node &= node - 1
+    return below
+
+
+@compiled
+def _raise(tree: UInt16, slot: int, size: int, symbol: int, amount: int) -> None:
+    """Raise the count of a symbol."""
+    node = symbol + 1
+    while node <= size:
+        tree[slot, node] += np.uint16(amount)
+        node += node & -node
+
+
+@compiled
+def _halve(added: UInt16, tree: UInt16, slot: int, size: int, usual: int) -> tuple[int, int]:
+    """Every count becomes (count + 1) / 2, which halves what was added to 1; new total and below_usual."""
+    for node in range(1, size + 1):
+        tree[slot, node] = 0
+    total = size
+    below_usual = usual
+    for symbol in range(size):
+        half = int(added[slot, symbol]) >> 1
+        added[slot, symbol] = half
+        total += half
+        if half > 0 and symbol != usual:
+            if symbol < usual:
+                below_usual += half
+            _raise(tree, slot, size, symbol, half)
+    return total, below_usual

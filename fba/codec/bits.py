@@ -1,0 +1,74 @@
+"""Reading and writing header bits, most significant bit first."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+UInt8 = npt.NDArray[np.uint8]
+
+
+class OutOfDataError(Exception):
+    """The next element lies, wholly or in part, beyond the data. Never leaves the codec."""
+
+
+class BitReader:
+    """A position in `data`, of which `end` bits are there."""
+
+    def __init__(self, data: UInt8, bit: int, end: int) -> None:
+        self.data = data
+        self.bit = bit
+        self.end = end
+
+    def read(self, count: int) -> int:
+        """The next `count` bits as an unsigned number. Raises `OutOfDataError`."""
+        start, stop = self.bit, self.bit + count
+        if stop > self.end:
+            raise OutOfDataError
+        self.bit = stop
+        first, last = start >> 3, (stop + 7) >> 3
+        number = int.from_bytes(self.data[first:last].tobytes(), "big")
+        return (number >> (8 * last - stop)) & ((1 << count) - 1)
+
+
+class BitWriter:
+    """Grows a zeroed buffer; `bit` is the position after what was written."""
+
+    def __init__(self) -> None:
+        self.data = np.zeros(4096, dtype=np.uint8)
+        self.bit = 0
+
+    def reserve(self, bits: int) -> None:
+        """Make room for that many more bits, zeroed."""
+        need = (self.bit + bits + 7) // 8 + 8
+        if need > len(self.data):
+            grown = np.zeros(max(need, 2 * len(self.data)), dtype=np.uint8)
+            grown[: len(self.data)] = self.data
+            self.data = grown
+
+    def write(self, value: int, count: int) -> None:
+        """Append the low `count` bits of `value`."""
+        if not 0 <= value < 1 << count:
+            raise ValueError(f"{value} does not fit {count} bits")
+        self.reserve(count)
+        first, last = self.bit >> 3, (self.bit + count + 7) >> 3
+        shifted = value << (8 * last - self.bit - count)
+        self.data[first:last] |= np.frombuffer(shifted.to_bytes(last - first, "big"), dtype=np.uint8)
+        self.bit += count
+
+    def align(self) -> None:
+        """Stuff up to a byte border: a 0, then 1s; a whole byte where already there."""
+        count = 8 - (self.bit & 7)
+        self.write((1 << (count - 1)) - 1, count)
+
+    def take_bytes(self) -> bytes:
+        """Hand over the whole bytes written so far; up to 7 bits stay."""
+        whole = self.bit >> 3
+        done = self.data[:whole].tobytes()
+        rest = self.data[whole]
+        used = (self.bit + 7) >> 3
+        self.data[:used] = 0
+        self.bit &= 7
+        if self.bit:
+            self.data[0] = rest
+        return done

@@ -1,0 +1,584 @@
+"""From bits to an animation: the incremental `Decoder`, and `decode`, which is one pushed to its end."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation, BodyTrack, FaceTrack, Frame
+from fba.codec import plane, slots, syntax
+from fba.codec.arithmetic import OK, OUT_OF_DATA
+from fba.codec.bits import BitReader, OutOfDataError
+from fba.codec.buffer import Buffer
+from fba.codec.models import Models
+from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, TimeCode
+from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
+from fba.parameters import BAP_STEP_TABLES
+
+DEFAULT_RATE = Fraction(25)
+_RUN = 512
+"""Planes that one call of the compiled loop decodes at most."""
+_LARGE_PLANE = 4096
+"""Bytes beyond which a plane that is still incomplete is not tried again for every byte that comes."""
+_COMMON_RATE_MAX = 1_000_000
+
+_PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Something that a salvaging decoder stepped over.
+
+    error: what was wrong. start, stop: bytes of the stream that were lost, from the first byte of the
+    damaged plane to where decoding went on (or the end).
+    """
+
+    error: FbaError
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive planes that share their settings.
+
+    index: int64 (T,), frame t is shown at start + (index[t] - index[0]) / rate. borders: int64 (T + 1,),
+    absolute bit positions. skips: int64 (T,).
+    """
+
+    index: npt.NDArray[np.int64]
+    start: Fraction
+    rate: Fraction
+    face: FaceTrack | None
+    body: BodyTrack | None
+    number: int
+    borders: npt.NDArray[np.int64]
+    skips: npt.NDArray[np.int64]
+    settings: PlaneSettings
+
+    def frames(self) -> Iterator[Frame]:
+        for position, index in enumerate(self.index.tolist()):
+            one = slice(position, position + 1)
+            bit, after = int(self.borders[position]), int(self.borders[position + 1])
+            settings = self.settings
+            if not settings.intra:
+                settings = PlaneSettings(
+                    intra=False,
+                    face_frame=None if settings.face is None else self.number + position,
+                    body_frame=None if settings.body is None else self.number + position,
+                    face=settings.face,
+                    body=settings.body,
+                    skip=int(self.skips[position]),
+                    start_code=settings.start_code and position == 0,
+                )
+            yield Frame(
+                index,
+                self.rate,
+                self.face[one] if self.face is not None else None,
+                self.body[one] if self.body is not None else None,
+                PlaneInfo(self.number + position, bit, after - bit, settings),
+            )
+
+
+class Decoder:
+    """Decodes an FBA stream that arrives in chunks of any size, down to a byte.
+
+    bap_steps: "iso" or "visage", the table of BAP quantiser steps that the stream was made with; no bit
+    of it tells. on_error: "raise", or "salvage" to go on after damage at the next start code that an
+    I plane follows; what was lost is then listed in `damage`.
+
+    `push` and `finish` return the frames whose planes are complete, as soon as they are. Frames decoded
+    before the damage are always returned first: the error is raised by the call after that.
+
+    Raises BitstreamError on damage, UnsupportedError for DCT segments (object_coding_type 1, whose
+    tables are in no public source); ValueError on wrong arguments. ISO/IEC 14496-2, FBA object.
+    """
+
+    def __init__(self, *, bap_steps: str = "iso", on_error: Literal["raise", "salvage"] = "raise") -> None:
+        if bap_steps not in BAP_STEP_TABLES:
+            raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
+        if on_error not in ("raise", "salvage"):
+            raise ValueError(f'on_error must be "raise" or "salvage", not {on_error!r}')
+        self.damage: list[Damage] = []
+        self.planes = 0
+        """Planes decoded so far."""
+        self._salvage = on_error == "salvage"
+        self._bap_steps = bap_steps
+        self._buffer = Buffer()
+        self._bit = 0  # next bit to decode, in the buffer
+        self._scanned = 0  # byte up to which no start code was found, while looking for one
+        self._retry_at = 0  # bytes that must be there before an incomplete plane is tried again
+        self._step: Callable[[bool], Iterator[Block] | None] = self._find_object
+        self._error: FbaError | None = None
+        self._finished = False
+        self._objects = 0
+        self._rate: Fraction | None = None
+        self._anchor = Fraction(0)  # time of the plane that had index `_anchor_index`
+        self._anchor_index = 0
+        self._index = 0  # of the next plane
+        self._lost_from = 0
+        self._begin_object()
+
+    # ---- what users call
+
+    def push(self, chunk: bytes | bytearray | memoryview) -> list[Frame]:
+        """Take in bytes; the frames that they complete."""
+        return [frame for block in self.push_blocks(chunk) for frame in block.frames()]
+
+    def finish(self) -> list[Frame]:
+        """Say that no more bytes come; the last frames. Raises where the stream ends inside a plane."""
+        return [frame for block in self.finish_blocks() for frame in block.frames()]
+
+    def push_blocks(self, chunk: bytes | bytearray | memoryview) -> list[Block]:
+        """Like `push`, in blocks of planes: what to use for speed."""
+        if self._finished:
+            raise ValueError("this decoder is finished; make a new one for another stream")
+        self._raise_pending()
+        self._buffer.append(chunk)
+        blocks = self._advance(final=False)
+        dropped = self._buffer.drop(min(self._bit >> 3, self._scanned or self._bit >> 3))
+        self._bit -= 8 * dropped
+        self._scanned = max(self._scanned - dropped, 0)
+        self._retry_at = max(self._retry_at - dropped, 0)
+        return blocks
+
+    def finish_blocks(self) -> list[Block]:
+        """Like `finish`, in blocks."""
+        self._raise_pending()
+        if self._finished:
+            return []
+        blocks = self._advance(final=True)
+        if not (self._error and blocks):
+            self._finished = True
+        if self._error and not blocks:
+            self._raise_pending()
+        return blocks
+
+    # ---- the states: each decodes what it can, or returns None where it needs more bytes
+
+    def _advance(self, *, final: bool) -> list[Block]:
+        blocks: list[Block] = []
+        while self._error is None:
+            self._lost_from = self._bit
+            try:
+                step = self._step(final)
+                if step is None:
+                    break
+                blocks.extend(step)
+            except FbaError as error:
+                if not self._salvage:
+                    self._error = error
+                else:
+                    self._lose(error)
+        if self._error and not blocks:
+            self._raise_pending()
+        return blocks
+
+    def _find_object(self, final: bool) -> Iterator[Block] | None:
+        """Look for the object start code; headers of the systems around it may stand before it."""
+        buffer = self._buffer
+        if self._objects == 0 and self._scanned == 0 and not self._salvage:
+            head = buffer.data[: min(buffer.length, 3)].tobytes()
+            if head != syntax.START_CODE_PREFIX[: len(head)] or (final and buffer.length < 4):
+                found = (
+                    f"it begins with {buffer.data[: min(buffer.length, 4)].tobytes().hex(' ')}"
+                    if head
+                    else "it is empty"
+                )
+                raise BitstreamError(
+                    f"no FBA stream: expected the object start code 00 00 01 ba, but {found}", plane=0, bit=0
+                )
+        while (found_code := buffer.find_start_code(self._scanned)) is not None:
+            position, code = found_code
+            self._scanned = position + 4
+            if code in syntax.OBJECT_CODES:
+                self._bit = 8 * self._scanned
+                self._scanned = 0
+                self._begin_object()
+                self._objects += 1
+                self._step = self._decode_planes
+                return iter(())
+        self._scanned = max(self._scanned, buffer.length - 3)
+        if final:
+            if self._objects == 0:
+                raise BitstreamError("no FBA object start code (00 00 01 ba) in the stream", plane=0, bit=0)
+            rest = buffer.length - (self._bit >> 3)
+            if rest > 0:
+                self._warn(f"{rest} bytes follow the end of the FBA object; they were not read")
+        else:
+            self._bit = max(self._bit, 8 * self._scanned) if self._objects == 0 else self._bit
+        return None
+
+    def _decode_planes(self, final: bool) -> Iterator[Block] | None:
+        buffer = self._buffer
+        end = 8 * buffer.length
+        if buffer.length < self._retry_at and not final:
+            return None
+        code, after = plane.find_start_code(buffer.data, self._bit, end)
+        if code == plane.UNDECIDED:
+            if final and end - self._bit >= 32:
+                self._warn("the stream ends inside a start code; no plane is lost")
+            if final:
+                self._bit = end
+                self._step = self._find_object
+            return None
+        if code != plane.NO_START_CODE:
+            self._bit = after
+            self._start_code_seen = code in syntax.PLANE_CODES
+            if code in syntax.OBJECT_CODES:
+                self._begin_object()
+                self._objects += 1
+            elif code not in syntax.PLANE_CODES:
+                self._end_object(code)
+            return iter(())
+        try:
+            reader = BitReader(buffer.data, self._bit, end)
+            blocks = self._intra(reader) if reader.read(1) else self._predicted(end)
+        except OutOfDataError:
+            if final:
+                raise BitstreamError(
+                    "the stream ends inside this plane: it is cut off, or its last bytes are missing",
+                    plane=self.planes,
+                    bit=8 * buffer.offset + end,
+                ) from None
+            waiting = buffer.length - (self._bit >> 3)
+            self._retry_at = buffer.length + (waiting // 4 if waiting > _LARGE_PLANE else 0)
+            return None
+        return iter(blocks)
+
+    def _resynchronise(self, final: bool) -> Iterator[Block] | None:
+        """After damage: go to the next start code of a plane or object that an I plane follows."""
+        buffer = self._buffer
+        while (found := buffer.find_start_code(self._scanned)) is not None:
+            position, code = found
+            wanted = code in syntax.PLANE_CODES or code in syntax.OBJECT_CODES
+            if wanted and position + 4 >= buffer.length and not final:
+                return None  # the first bit of the plane is not here yet
+            self._scanned = position + 4
+            if not wanted or position + 4 >= buffer.length:
+                continue
+            if code in syntax.PLANE_CODES and not buffer.data[position + 4] & 0x80:
+                continue  # a P plane: what it builds upon is lost
+            self._close_damage(position)
+            self._bit = 8 * position
+            self._scanned = 0
+            self._step = self._decode_planes
+            return iter(())
+        self._scanned = max(self._scanned, buffer.length - 3)
+        self._bit = 8 * self._scanned
+        if final:
+            self._close_damage(buffer.length)
+        return None
+
+    # ---- planes
+
+    def _intra(self, reader: BitReader) -> list[Block]:
+        number, start = self.planes, reader.bit - 1
+        mask = self._read_object_mask(reader)
+        frame_rate = self._read_frame_rate(reader)
+        time_code = syntax.read_time_code(reader) if reader.read(1) else None
+        skip = syntax.read_skip(reader, number)
+        row = np.zeros((1, slots.ROW), dtype=np.int32)
+        settings: dict[int, PartSettings] = {}
+        values: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
+        models = self._models
+        for part, name in _PARTS:
+            if not mask & part:
+                continue
+            header = reader.bit
+            try:
+                one = syntax.read_part(reader, part, number)
+            except BitstreamError as error:
+                raise self._located(error) from None
+            if one.coding_type == syntax.DCT:
+                raise UnsupportedError(
+                    f"plane {number}, bit {self._absolute(header)}: {name} are coded as DCT segments "
+                    "(object_coding_type 1), whose code tables are in no public source",
+                    what="DCT segments (object_coding_type 1)",
+                    plane=number,
+                    bit=self._absolute(header),
+                )
+            models.begin_intra(part, one)
+            undefined = models.undefined(one, part)
+            if undefined is not None:
+                raise BitstreamError(
+                    f"{slots.label(undefined)} is sent, but no range for it: extension BAPs have no default",
+                    plane=number,
+                    bit=self._absolute(reader.bit),
+                )
+            settings[part] = one
+            order, segments = slots.coding_order(
+                one.mask if part == slots.FACE_BIT else None, one.mask if part == slots.BODY_BIT else None
+            )
+            symbols, decoded = np.zeros_like(order), np.zeros_like(order)
+            flags = np.zeros(3, dtype=np.int64)
+            status, place = plane.decode_values(
+                reader.data, reader.bit, reader.end, order, segments, False, models.i_minimum, models.i_size,
+                models.usual, models.total, models.below_usual, models.added, models.tree, models.step,
+                models.lowest, models.highest, models.last, symbols, decoded, flags,
+            )  # fmt: skip
+            self._check(status, place)
+            reader.bit = place
+            row[0, order] = decoded
+            if part == slots.FACE_BIT:
+                row[0, slots.VISEME_DEF :] = flags
+            values.append((order, decoded))
+        for order, decoded in values:
+            models.last[order] = decoded
+        self._settings.update(settings)
+        self._layouts.clear()
+        self._set_clock(frame_rate, time_code, start)
+        face, body = settings.get(slots.FACE_BIT), settings.get(slots.BODY_BIT)
+        plane_settings = PlaneSettings(
+            intra=True,
+            face_frame=None if face is None else number,
+            body_frame=None if body is None else number,
+            face=face,
+            body=body,
+            frame_rate=frame_rate,
+            time_code=time_code,
+            skip=skip,
+            start_code=self._start_code_seen,
+        )
+        borders = np.array([start, reader.bit], dtype=np.int64)
+        return [self._block(row, borders, np.array([skip], dtype=np.int64), plane_settings)]
+
+    def _predicted(self, end: int) -> list[Block]:
+        """A run of P planes with one fba_object_mask."""
+        mask = self._read_object_mask(BitReader(self._buffer.data, self._bit + 1, end))
+        for part, name in _PARTS:
+            if mask & part and part not in self._settings:
+                raise BitstreamError(
+                    f"a P plane carries {name}, but no I plane with {name} came before it in this object",
+                    plane=self.planes,
+                    bit=self._absolute(self._bit),
+                )
+        face = self._settings[slots.FACE_BIT] if mask & slots.FACE_BIT else None
+        body = self._settings[slots.BODY_BIT] if mask & slots.BODY_BIT else None
+        if mask not in self._layouts:
+            self._layouts[mask] = slots.coding_order(face and face.mask, body and body.mask)
+            self._rows[:] = 0
+        elif mask != self._rows_mask:
+            self._rows[:] = 0
+        self._rows_mask = mask
+        order, segments = self._layouts[mask]
+        models = self._models
+        count, status, bit, place = plane.decode_run(
+            self._buffer.data, self._bit, end, mask, order, segments, models.minimum, models.size,
+            models.usual, models.total, models.below_usual, models.added, models.tree, models.step,
+            models.lowest, models.highest, models.last, self._rows, self._skips, self._borders,
+        )  # fmt: skip
+        if count == 0:
+            self._check(status, place)
+        if count == 0:
+            return []
+        settings = PlaneSettings(intra=False, face=face, body=body, start_code=self._start_code_seen)
+        block = self._block(self._rows[:count], self._borders[: count + 1], self._skips[:count], settings)
+        self._bit = bit
+        return [block]
+
+    def _block(
+        self,
+        rows: slots.Int32,
+        borders: npt.NDArray[np.int64],
+        skips: npt.NDArray[np.int64],
+        settings: PlaneSettings,
+    ) -> Block:
+        count = len(rows)
+        assert self._rate is not None
+        steps = np.cumsum(skips) + np.arange(1, count + 1)
+        index = self._index + np.concatenate([[0], steps[:-1]])
+        block = Block(
+            index=index,
+            start=self._anchor + Fraction(self._index - self._anchor_index) / self._rate,
+            rate=self._rate,
+            face=slots.face_track(rows, settings.face.mask) if settings.face is not None else None,
+            body=slots.body_track(rows, settings.body.mask) if settings.body is not None else None,
+            number=self.planes,
+            borders=borders + 8 * self._buffer.offset,
+            skips=skips.copy(),
+            settings=settings,
+        )
+        self.planes += count
+        self._index += int(steps[-1])
+        self._bit = int(borders[-1])
+        self._start_code_seen = False
+        return block
+
+    def _read_object_mask(self, reader: BitReader) -> int:
+        mask = reader.read(2)
+        if mask == 0:
+            raise BitstreamError(
+                plane.STATUS_TEXT[plane.BAD_MASK], plane=self.planes, bit=self._absolute(reader.bit - 2)
+            )
+        return mask
+
+    def _read_frame_rate(self, reader: BitReader) -> FrameRate | None:
+        if not reader.read(1):
+            return None
+        rate = syntax.read_frame_rate(reader)
+        if rate.fraction == 0:
+            raise BitstreamError(
+                "the frame rate is 0", plane=self.planes, bit=self._absolute(reader.bit - 13)
+            )
+        return rate
+
+    def _set_clock(self, frame_rate: FrameRate | None, time_code: TimeCode | None, bit: int) -> None:
+        rate = frame_rate.fraction if frame_rate is not None else self._rate
+        if rate is None:
+            self._warn(f"the first I plane says no frame rate; {DEFAULT_RATE} frames/s assumed")
+            rate = DEFAULT_RATE
+        now = self._anchor
+        if self._rate is not None:
+            now += Fraction(self._index - self._anchor_index) / self._rate
+        if self._rate is not None and rate != self._rate:
+            self._warn(f"plane {self.planes}: the frame rate changes from {self._rate} to {rate}")
+        if self._rate is None or rate != self._rate:
+            self._rate = rate
+            self._anchor, self._index = now, max(math.ceil(now * rate), self._index and 1)
+            self._anchor_index = self._index
+        if time_code is None:
+            return
+        where = f"plane {self.planes}, bit {self._absolute(bit)}"
+        said = f"{time_code.hours}:{time_code.minutes:02}:{time_code.seconds:02}"
+        if not time_code.marker:
+            self._warn(f"{where}: the marker bit of time code {said} is 0; that time code was not used")
+        elif self.planes and time_code.total_seconds < now:
+            self._warn(f"{where}: time code {said} lies before the previous plane; it was not used")
+        else:
+            self._anchor = Fraction(time_code.total_seconds)
+            nearest = math.floor(self._anchor * rate + Fraction(1, 2))
+            self._index = self._anchor_index = max(nearest, self._index)
+
+    def _begin_object(self) -> None:
+        self._models = Models(self._bap_steps)
+        self._settings: dict[int, PartSettings] = {}
+        self._layouts: dict[int, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = {}
+        self._rows = np.zeros((_RUN, slots.ROW), dtype=np.int32)
+        self._rows_mask = 0
+        self._skips = np.zeros(_RUN, dtype=np.int64)
+        self._borders = np.zeros(_RUN + 1, dtype=np.int64)
+        self._start_code_seen = False
+
+    def _end_object(self, code: int) -> None:
+        if self._salvage and code != syntax.END_CODE:
+            raise BitstreamError(
+                f"start code 00 00 01 {code:02x} where a plane, the end code 00 00 01 b1 or a new object "
+                "was expected",
+                plane=self.planes,
+                bit=self._absolute(self._bit - 32),
+            )
+        self._scanned = self._bit >> 3
+        self._step = self._find_object
+
+    # ---- damage
+
+    def _check(self, status: int, place: int) -> None:
+        if status == OK:
+            return
+        if status == OUT_OF_DATA:
+            raise OutOfDataError
+        if status == plane.OUT_OF_RANGE:
+            raise BitstreamError(
+                f"{slots.label(place)} gets a value outside {self._models.lowest[place]}.."
+                f"{self._models.highest[place]}; the stream is damaged here or before",
+                plane=self.planes,
+                bit=self._absolute(self._bit),
+            )
+        if status in plane.STATUS_TEXT:
+            raise BitstreamError(plane.STATUS_TEXT[status], plane=self.planes, bit=self._absolute(place))
+
+    def _absolute(self, bit: int) -> int:
+        return bit + 8 * self._buffer.offset
+
+    def _located(self, error: BitstreamError) -> BitstreamError:
+        """An error whose bit counts from the start of the buffer, as one that counts from the stream's."""
+        assert error.bit is not None
+        text = str(error).split(": ", 1)[1]
+        return BitstreamError(text, plane=error.plane, bit=self._absolute(error.bit))
+
+    def _lose(self, error: FbaError) -> None:
+        """Note damage in the plane at `_bit`, and go looking for the next place to start from."""
+        start = self._lost_from >> 3
+        self.damage.append(Damage(error, self._buffer.offset + start, self._buffer.offset + start))
+        self._settings.clear()
+        self._scanned = start if self._objects == 0 else (self._bit >> 3) + 1
+        self._step = self._resynchronise
+
+    def _close_damage(self, position: int) -> None:
+        last = self.damage[-1]
+        self.damage[-1] = Damage(last.error, last.start, self._buffer.offset + position)
+
+    def _raise_pending(self) -> None:
+        if self._error is not None:
+            error, self._finished = self._error, True
+            raise error
+
+    @staticmethod
+    def _warn(text: str) -> None:
+        warnings.warn(text, FbaWarning, stacklevel=2)
+
+
+def decode(
+    data: bytes | bytearray | memoryview,
+    *,
+    bap_steps: str = "iso",
+    on_error: Literal["raise", "salvage"] = "raise",
+) -> Animation:
+    """Decode a whole FBA stream.
+
+    bap_steps, on_error: see `Decoder`; with "salvage", what was lost is told in an FbaWarning.
+    Returns the values that were sent and the masks that say which; times from frame rate, skips and
+    time codes. A stream that changes its rate comes back at the smallest rate that holds all its times.
+    Raises BitstreamError, UnsupportedError.
+    """
+    decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
+    blocks = decoder.push_blocks(data)
+    blocks += decoder.finish_blocks()
+    decoder.finish_blocks()  # raises what stopped the decoding, where it was not salvaged
+    for damage in decoder.damage:
+        warnings.warn(
+            f"bytes {damage.start}..{damage.stop} were lost: {damage.error}", FbaWarning, stacklevel=2
+        )
+    if not blocks:
+        error = decoder.damage[0].error if decoder.damage else None
+        raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error
+    return animation_of(blocks)
+
+
+def animation_of(blocks: list[Block]) -> Animation:
+    """The animation that consecutive blocks make."""
+    rates = {block.rate for block in blocks}
+    rate = blocks[0].rate
+    if len(rates) == 1:
+        index = np.concatenate([block.index for block in blocks])
+    else:
+        parts = rates | {1 / block.start for block in blocks if block.start}
+        rate = Fraction(
+            math.lcm(*(part.numerator for part in parts)), math.gcd(*(part.denominator for part in parts))
+        )
+        if rate > _COMMON_RATE_MAX:
+            rate = max(rates)
+        pieces = []
+        following = 0
+        for block in blocks:
+            step = rate / block.rate
+            offset = block.index - block.index[0]
+            first = max(math.floor(block.start * rate + Fraction(1, 2)), following)
+            piece = first + offset * step.numerator // step.denominator
+            following = int(piece[-1]) + 1
+            pieces.append(piece)
+        index = np.concatenate(pieces)
+    return Animation(
+        rate,
+        index,
+        FaceTrack.join([(block.face, len(block.index)) for block in blocks]),
+        BodyTrack.join([(block.body, len(block.index)) for block in blocks]),
+    )
