@@ -1,0 +1,88 @@
+"""What the 14 visemes and the 6 expressions look like: their FAPs at full intensity.
+
+`definitions.csv` lists them for the left half and the midline; the right half and the outer lips
+follow from their mates. Profiles of the expressions after the measured vocabularies of the six
+universal emotions (means of the FAPs that each one moves, signs as the standard counts them), with
+what those measurements leave open set by eye.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.interpolation import fill
+from fba.parameters import EXPRESSION_SELECT_MAX, FAP_COUNT, VISEME_SELECT_MAX, fap_numbers
+
+Float32 = npt.NDArray[np.float32]
+
+VISEME_NAMES = (
+    "none",
+    "p b m",
+    "f v",
+    "T D",
+    "t d",
+    "k g",
+    "tS dZ S",
+    "s z",
+    "n l",
+    "r",
+    "A:",
+    "e",
+    "I",
+    "Q",
+    "U",
+)
+"""What viseme_select stands for: example phonemes."""
+EXPRESSION_NAMES = ("none", "joy", "sadness", "anger", "fear", "disgust", "surprise")
+"""What expression_select stands for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Definitions:
+    """FAPs of every viseme and expression at full intensity.
+
+    visemes: float32 (15, 68); expressions: float32 (7, 68). Row = select, row 0 (none) all zero;
+    columns 0 and 1 are zero. Raises ValueError on other shapes.
+    """
+
+    visemes: Float32
+    expressions: Float32
+
+    def __post_init__(self) -> None:
+        for name, count in (("visemes", VISEME_SELECT_MAX + 1), ("expressions", EXPRESSION_SELECT_MAX + 1)):
+            table = np.array(getattr(self, name), dtype=np.float32)
+            if table.shape != (count, FAP_COUNT):
+                raise ValueError(f"{name} must have shape ({count}, {FAP_COUNT}), not {table.shape}")
+            if not np.isfinite(table).all():
+                raise ValueError(f"{name} must be finite")
+            table[0] = 0
+            table[:, :2] = 0
+            table.flags.writeable = False
+            object.__setattr__(self, name, table)
+
+    @staticmethod
+    def default() -> Definitions:
+        """The built-in definitions."""
+        return _default()
+
+
+@cache
+def _default() -> Definitions:
+    tables = {
+        "viseme": np.zeros((VISEME_SELECT_MAX + 1, FAP_COUNT), dtype=np.float32),
+        "expression": np.zeros((EXPRESSION_SELECT_MAX + 1, FAP_COUNT), dtype=np.float32),
+    }
+    given = {kind: np.zeros(table.shape, dtype=bool) for kind, table in tables.items()}
+    with (files(__package__) / "definitions.csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            place = (int(row["select"]), fap_numbers()[row["fap"]] - 1)
+            tables[row["kind"]][place] = float(row["value"])
+            given[row["kind"]][place] = True
+    filled = {kind: fill(table, given[kind])[0] for kind, table in tables.items()}
+    return Definitions(filled["viseme"].astype(np.float32), filled["expression"].astype(np.float32))

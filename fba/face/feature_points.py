@@ -1,0 +1,57 @@
+"""The neutral face: the 84 feature points of an adult head, in metres.
+
+`neutral.csv` lists the left half and the midline in millimetres; the right half is its exact mirror.
+The distances follow published norms of adult heads (nasion to chin 119 mm, between the outer eye
+corners 91 mm, mouth 52 mm, nose 34 mm wide, head 193 mm long), and the standard's rules for a neutral
+face hold: lids tangent to the iris, pupil a third of it, lips and teeth touching, tongue flat with its
+tip at the teeth. Axes: +x the subject's left, +y up, +z forward; the origin lies between the pupils.
+"""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.parameters import feature_points
+
+Points = npt.NDArray[np.float64]
+
+MIRRORED = {
+    "2.4": "2.5", "2.6": "2.7", "2.8": "2.9", "2.11": "2.12", "2.13": "2.14",
+    "3.1": "3.2", "3.3": "3.4", "3.5": "3.6", "3.7": "3.12", "3.9": "3.10", "3.11": "3.8", "3.13": "3.14",
+    "4.1": "4.2", "4.3": "4.4", "4.5": "4.6", "5.1": "5.2", "5.3": "5.4", "6.3": "6.4",
+    "8.3": "8.4", "8.5": "8.6", "8.7": "8.8", "8.10": "8.9",
+    "9.1": "9.2", "9.5": "9.4", "9.7": "9.6", "9.13": "9.14",
+    "10.1": "10.2", "10.3": "10.4", "10.5": "10.6", "10.7": "10.8", "10.9": "10.10", "11.3": "11.2",
+}  # fmt: skip
+"""Left feature point to its mirror image on the right."""
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """The 84 names, in the order of every array of feature points."""
+    return tuple(point.name for point in feature_points())
+
+
+@cache
+def row_of() -> dict[str, int]:
+    """Row in an array of feature points, by name."""
+    return {name: row for row, name in enumerate(names())}
+
+
+@cache
+def neutral_points() -> Points:
+    """(84, 3) float64, metres; read-only."""
+    points = np.full((len(names()), 3), np.nan)
+    with (files(__package__) / "neutral.csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            place = np.array([float(row["x"]), float(row["y"]), float(row["z"])]) / 1000.0
+            points[row_of()[row["point"]]] = place
+            if row["point"] in MIRRORED:
+                points[row_of()[MIRRORED[row["point"]]]] = place * (-1.0, 1.0, 1.0)
+    points.flags.writeable = False
+    return points

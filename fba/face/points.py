@@ -1,0 +1,221 @@
+"""FAPs -> moved feature points: what each FAP does to a face that is nothing but its feature points.
+
+Every low-level FAP moves its own points by value x FAPU in the standard's direction. The jaw turns on a
+hinge below the ears, eyeballs and head turn about their centres, and points without a FAP of their own
+follow their neighbours (`followers.csv`), so that curves drawn through the points stay smooth.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.fapu import Fapu
+from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
+from fba.parameters import FAP_COUNT, faps
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+DIRECTIONS = {
+    "left": (1.0, 0.0, 0.0),
+    "right": (-1.0, 0.0, 0.0),
+    "up": (0.0, 1.0, 0.0),
+    "down": (0.0, -1.0, 0.0),
+    "forward": (0.0, 0.0, 1.0),
+}
+"""The standard's words for a positive motion, as vectors."""
+
+OPEN_JAW, THRUST_JAW, SHIFT_JAW = 3, 14, 15
+YAW_EYE, PITCH_EYE, DILATE_PUPIL = (23, 24), (25, 26), (29, 30)
+TONGUE_ROLL = 47
+HEAD_PITCH, HEAD_YAW, HEAD_ROLL = 48, 49, 50
+ROTATING = {OPEN_JAW, *YAW_EYE, *PITCH_EYE, *DILATE_PUPIL, TONGUE_ROLL, HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
+"""FAPs that turn or scale something, and so are not in the table of plain shifts."""
+
+MANDIBLE = ("2.1", "2.10", "2.11", "2.12", "2.13", "2.14", "9.9", "9.11", "6.1", "6.2", "6.3", "6.4")
+"""Points carried by the lower jaw. The lips have FAPs of their own and stay."""
+EYEBALL_PER_IRIS = 1.03
+"""Radius of an eyeball by diameter of its iris: 12 mm by 11.7 mm in adults."""
+
+
+@cache
+def _followers() -> tuple[tuple[int, int, Float64], ...]:
+    with (files(__package__) / "followers.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = []
+    for row in rows:
+        weight = np.array([float(row[axis]) for axis in "xyz"])
+        pair = (row["point"], row["source"])
+        found.append((*(row_of()[name] for name in pair), weight))
+        mirror = tuple(MIRRORED.get(name, name) for name in pair)
+        if pair[0] in MIRRORED:
+            found.append((*(row_of()[name] for name in mirror), weight))
+    return tuple(found)  # type: ignore[arg-type]
+
+
+def shift_table(fapu: Fapu) -> Float64:
+    """(68, 84, 3): how far one step of each FAP shifts each feature point; FAPs that rotate excluded."""
+    table = np.zeros((FAP_COUNT, len(names()), 3))
+    for fap in faps():
+        if fap.positive not in DIRECTIONS or fap.number in ROTATING:
+            continue
+        step = np.array(DIRECTIONS[fap.positive]) * fapu[fap.unit]
+        points = MANDIBLE if fap.number in (THRUST_JAW, SHIFT_JAW) else fap.feature_points
+        for name in points or _eye_point(fap.number):
+            table[fap.number - 1, row_of()[name]] += step
+    own = table.copy()
+    for point, source, weight in _followers():
+        table[:, point] += own[:, source] * weight
+    return table
+
+
+def _eye_point(number: int) -> tuple[str, ...]:
+    return {27: ("3.5",), 28: ("3.6",)}.get(number, ())
+
+
+@dataclass(frozen=True, eq=False)
+class Eyeballs:
+    """Where the eyes are and look, left first, in the frame of the head.
+
+    centres: (T, 2, 3). gaze: (T, 2, 3), unit vectors. pupils: (T, 2), diameters.
+    """
+
+    centres: Float64
+    gaze: Float64
+    pupils: Float64
+
+
+class FeaturePointFace:
+    """A face of 84 feature points; call it with FAPs to see them move.
+
+    points: (84, 3) neutral feature points, +x the subject's left, +y up, +z forward, any unit of
+    length; by default those of an adult head in metres. Raises ModelError where they are not finite or
+    give no FAPU.
+    """
+
+    def __init__(self, points: npt.ArrayLike | None = None) -> None:
+        self.points: Float64 = np.array(neutral_points() if points is None else points, dtype=np.float64)
+        self.fapu = Fapu.measure(self.points)
+        if not np.isfinite(self.points).all():
+            lost = [n for n, p in zip(names(), self.points, strict=True) if not np.isfinite(p).all()]
+            raise ModelError(f"feature points without a finite position: {', '.join(lost)}")
+        row = row_of()
+        self._shift = shift_table(self.fapu).reshape(FAP_COUNT, -1)
+        self.eyeball_radius = EYEBALL_PER_IRIS * self.fapu.IRISD * 1024
+        eyes = self.points[[row["3.5"], row["3.6"]]]
+        self.eyeball_centres: Float64 = eyes - (0.0, 0.0, self.eyeball_radius)
+        self.head_centre: Float64 = self.points[row["7.1"]]
+        ear = (self.points[row["10.7"]] + self.points[row["10.8"]] + self.points[row["10.9"]] * 2) / 4
+        self.jaw_hinge: Float64 = np.array([0.0, ear[1], ear[2]])
+        self._mandible = [row[name] for name in MANDIBLE]
+
+    def __call__(self, faps: npt.ArrayLike) -> Float32:
+        """Feature points moved by FAPs: (68,) -> (84, 3), or (T, 68) -> (T, 84, 3), float32.
+
+        Values as `resolve` gives them, in the units of the standard; columns 0 and 1 do nothing.
+        Raises ValueError on another shape.
+        """
+        values, single = _as_frames(faps)
+        moved = self._local(values)
+        turned = (moved - self.head_centre) @ _head_matrices(values).swapaxes(1, 2) + self.head_centre
+        return (turned[0] if single else turned).astype(np.float32)
+
+    def local(self, faps: npt.ArrayLike) -> Float32:
+        """Like calling, but in the frame of the head: head pitch, yaw and roll left out."""
+        values, single = _as_frames(faps)
+        moved = self._local(values)
+        return (moved[0] if single else moved).astype(np.float32)
+
+    def head_rotation(self, faps: npt.ArrayLike) -> Float64:
+        """Rotation of the head about its centre (point 7.1): (3, 3), or (T, 3, 3), float64."""
+        values, single = _as_frames(faps)
+        matrices = _head_matrices(values)
+        return matrices[0] if single else matrices
+
+    def jaw_angle(self, faps: npt.ArrayLike) -> Float64:
+        """(T,) radians by which the jaw hangs open."""
+        return self._jaw_angle(_as_frames(faps)[0])
+
+    def eyeballs(self, faps: npt.ArrayLike) -> Eyeballs:
+        """Centres, gaze and pupils of the two eyes, (T, 2, ...)."""
+        values, _ = _as_frames(faps)
+        yaw, pitch, dilation = (
+            values[:, [n - 1 for n in pair]] for pair in (YAW_EYE, PITCH_EYE, DILATE_PUPIL)
+        )
+        yaw, pitch = yaw * self.fapu.AU, pitch * self.fapu.AU
+        gaze = np.stack([np.sin(yaw) * np.cos(pitch), -np.sin(pitch), np.cos(yaw) * np.cos(pitch)], axis=-1)
+        centres = np.repeat(self.eyeball_centres[None], len(values), axis=0)
+        centres[..., 2] += values[:, 26:28] * self.fapu.ES
+        pupils = self.fapu.IRISD * (1024 / 3 + dilation)
+        return Eyeballs(centres, gaze, np.maximum(pupils, 0.0))
+
+    def _local(self, values: Float64) -> Float64:
+        shift = (values @ self._shift).reshape(len(values), -1, 3)
+        moved = self.points + shift
+        row = row_of()
+        angle = self._jaw_angle(values)
+        moved[:, self._mandible] = _turned_x(self.points[self._mandible], self.jaw_hinge, angle)
+        moved[:, self._mandible] += shift[:, self._mandible]
+        eyes = self.eyeballs(values)
+        pupils = [row["3.5"], row["3.6"]]
+        moved[:, pupils] = eyes.centres + eyes.gaze * self.eyeball_radius
+        roll = values[:, TONGUE_ROLL - 1] * self.fapu.AU
+        for name, side in (("6.3", 1.0), ("6.4", -1.0)):
+            arm = moved[:, row[name]] - moved[:, row["6.2"]]
+            x, y = arm[:, 0].copy(), arm[:, 1].copy()
+            cos, sin = np.cos(roll), side * np.sin(roll)
+            moved[:, row[name], 0] += x * cos - y * sin - x
+            moved[:, row[name], 1] += x * sin + y * cos - y
+        return moved
+
+    def _jaw_angle(self, values: Float64) -> Float64:
+        """The angle that lowers the chin (2.1) by exactly value x MNS, as far as the hinge allows."""
+        chin = self.points[row_of()["2.1"]] - self.jaw_hinge
+        radius, rest = np.hypot(chin[1], chin[2]), np.arctan2(chin[1], chin[2])
+        height = chin[1] - values[:, OPEN_JAW - 1] * self.fapu.MNS
+        angle: Float64 = rest - np.arcsin(np.clip(height / radius, -1.0, 1.0))
+        return angle
+
+
+def _as_frames(faps: npt.ArrayLike) -> tuple[Float64, bool]:
+    values = np.asarray(faps, dtype=np.float64)
+    single = values.ndim == 1
+    if single:
+        values = values[None]
+    if values.ndim != 2 or values.shape[1] != FAP_COUNT:
+        raise ValueError(f"FAPs must have shape ({FAP_COUNT},) or (T, {FAP_COUNT}), not {np.shape(faps)}")
+    return values, single
+
+
+def _turned_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
+    """Points (N, 3) turned about an axis along x by each angle (T,): (T, N, 3); positive lowers +z."""
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    y, z = points[:, 1] - centre[1], points[:, 2] - centre[2]
+    x = np.broadcast_to(points[:, 0], (len(angle), len(points)))
+    return np.stack([x, centre[1] + y * cos - z * sin, centre[2] + y * sin + z * cos], axis=-1)
+
+
+def _head_matrices(values: Float64) -> Float64:
+    """(T, 3, 3): yaw . roll . pitch, the order of the spine's joints; each angle FAP x 1e-5 rad."""
+    pitch, yaw, roll = (values[:, n - 1] * 1e-5 for n in (HEAD_PITCH, HEAD_YAW, HEAD_ROLL))
+    zero, one = np.zeros(len(values)), np.ones(len(values))
+    cp, sp, cy, sy, cr, sr = (
+        np.cos(pitch),
+        np.sin(pitch),
+        np.cos(yaw),
+        np.sin(yaw),
+        np.cos(roll),
+        np.sin(roll),
+    )
+    about_x = np.stack([one, zero, zero, zero, cp, -sp, zero, sp, cp], axis=-1).reshape(-1, 3, 3)
+    about_y = np.stack([cy, zero, sy, zero, one, zero, -sy, zero, cy], axis=-1).reshape(-1, 3, 3)
+    about_z = np.stack([cr, -sr, zero, sr, cr, zero, zero, zero, one], axis=-1).reshape(-1, 3, 3)
+    matrices: Float64 = about_y @ about_z @ about_x
+    return matrices

@@ -1,0 +1,178 @@
+"""What a face shows: unsent FAPs filled in, visemes and expressions turned into low-level FAPs.
+
+ISO/IEC 14496-2, FBA object decoding: a FAP keeps the last value that was sent; one that never was is
+estimated from its mate or lip contour, else from the viseme and expression in force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import FaceTrack
+from fba.face.expressions import Definitions
+from fba.face.interpolation import fill
+from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
+
+Float32 = npt.NDArray[np.float32]
+
+BLOCK = 4096
+"""Frames resolved at once: keeps the working arrays in the processor's cache."""
+MOUTH_GROUPS = (2, 6, 8)
+"""A redefined viseme stores the FAPs of these groups: jaw and inner lip, tongue, outer lip."""
+
+
+class Resolver:
+    """`resolve` for a track that comes in pieces; remembers what earlier pieces sent.
+
+    model: a face that brings `definitions` of its own, or None.
+    """
+
+    def __init__(self, model: Any = None) -> None:
+        definitions: Definitions = getattr(model, "definitions", None) or Definitions.default()
+        self._held = _Held()
+        self._visemes = definitions.visemes.copy()
+        self._expressions = definitions.expressions.copy()
+
+    def copy(self) -> Resolver:
+        """An independent resolver in the same state."""
+        other = Resolver.__new__(Resolver)
+        other._held = self._held.copy()
+        other._visemes = self._visemes.copy()
+        other._expressions = self._expressions.copy()
+        return other
+
+    def push(self, track: FaceTrack) -> Float32:
+        """FAPs shown over the next frames: float32 (T, 68), columns 0 and 1 zero."""
+        result = np.empty((len(track), FAP_COUNT), dtype=np.float32)
+        for start in range(0, len(track), BLOCK):
+            result[start : start + BLOCK] = self._push_block(track[start : start + BLOCK])
+        return result
+
+    def _push_block(self, track: FaceTrack) -> Float32:
+        low, sent = self._held.low_level(track)
+        viseme, expression = self._held.high_level(track)
+        filled, known = fill(low, sent)
+        shown: Float32 = filled.astype(np.float32)
+        base = self._visemes_shown(track, viseme) + self._expressions_shown(track, expression)
+        beneath = known & (expression[:, 4:5] == 0)  # init_face: the expression is the new neutral face
+        shown += np.where(beneath, np.float32(0), base)
+        shown[:, :2] = 0
+        return shown
+
+    def _visemes_shown(self, track: FaceTrack, fields: npt.NDArray[np.int16]) -> Float32:
+        blend = np.clip(fields[:, 2], 0, INTENSITY_MAX).astype(np.float32)[:, None] / INTENSITY_MAX
+        defined = track.mask[:, 0] & (track.viseme[:, 3] == 1)
+        table = _Redefined(self._visemes, defined, fields[:, 0], track, mouth_only=True)
+        if not fields[:, :2].any():
+            return np.zeros((len(track), FAP_COUNT), dtype=np.float32)
+        return table.look_up(fields[:, 0]) * blend + table.look_up(fields[:, 1]) * (1 - blend)
+
+    def _expressions_shown(self, track: FaceTrack, fields: npt.NDArray[np.int16]) -> Float32:
+        first, second = (
+            np.clip(fields[:, column], 0, INTENSITY_MAX).astype(np.float32)[:, None] / INTENSITY_MAX
+            for column in (1, 3)
+        )
+        # The same expression in both places is still one expression: never more than all of it.
+        same = (fields[:, 0] == fields[:, 2])[:, None]
+        second = np.where(same, np.minimum(second, 1 - first), second)
+        defined = track.mask[:, 1] & (track.expression[:, 5] == 1)
+        table = _Redefined(self._expressions, defined, fields[:, 0], track, mouth_only=False)
+        if not fields[:, [0, 2]].any():
+            return np.zeros((len(track), FAP_COUNT), dtype=np.float32)
+        return table.look_up(fields[:, 0]) * first + table.look_up(fields[:, 2]) * second
+
+
+def resolve(track: FaceTrack, model: Any = None) -> Float32:
+    """What the face shows at every frame: float32 (T, 68) in FAPU, columns 0 and 1 zero.
+
+    - A FAP keeps its last value after it was sent. One never sent copies its left/right mate; an outer
+      lip FAP its inner one and the other way round.
+    - viseme = definition(select1) x blend/63 + definition(select2) x (1 - blend/63);
+      expression = definition(select1) x intensity1/63 + definition(select2) x intensity2/63, one
+      expression in both places never above its full intensity. Their sum shows where nothing was sent;
+      with init_face it becomes the neutral face, to which the sent FAPs are added.
+    - viseme_def and expression_def make the low-level FAPs sent in the same frame (of a viseme: the
+      mouth's) the definition of select1 from that frame on; without such FAPs nothing changes.
+
+    model: a face with `definitions` of its own (`Definitions`), or None for the built-in ones.
+    """
+    return Resolver(model).push(track)
+
+
+@dataclass
+class _Held:
+    """The last values sent, and which ever were."""
+
+    values: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=np.int32))
+    sent: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
+    viseme: npt.NDArray[np.int16] = field(default_factory=lambda: np.zeros(4, dtype=np.int16))
+    expression: npt.NDArray[np.int16] = field(default_factory=lambda: np.zeros(6, dtype=np.int16))
+
+    def copy(self) -> _Held:
+        return _Held(self.values.copy(), self.sent.copy(), self.viseme.copy(), self.expression.copy())
+
+    def low_level(self, track: FaceTrack) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]:
+        mask = track.mask.copy()
+        mask[:, :2] = False
+        if mask.all(axis=0)[2:].all():
+            values, sent = track.values, mask
+        else:
+            values = hold(track.values, mask, self.values)
+            sent = np.logical_or.accumulate(mask, axis=0) | self.sent
+        self.values, self.sent = values[-1].copy(), sent[-1].copy()
+        return values, sent
+
+    def high_level(self, track: FaceTrack) -> tuple[npt.NDArray[np.int16], npt.NDArray[np.int16]]:
+        viseme = hold(track.viseme, track.mask[:, :1], self.viseme)
+        expression = hold(track.expression, track.mask[:, 1:2], self.expression)
+        self.viseme, self.expression = viseme[-1].copy(), expression[-1].copy()
+        return viseme, expression
+
+
+def hold(values: npt.NDArray[Any], mask: npt.NDArray[np.bool_], before: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Each column keeps its last masked-in value; (T, N), or mask (T, 1) for all columns together.
+
+    before: (N,) values in force before the first frame.
+    """
+    last = np.where(mask, np.arange(1, len(mask) + 1, dtype=np.int32)[:, None], np.int32(0))
+    np.maximum.accumulate(last, axis=0, out=last)
+    known = np.concatenate([before[None].astype(values.dtype), values])
+    held: npt.NDArray[Any] = np.take_along_axis(known, np.broadcast_to(last, values.shape), axis=0)
+    return held
+
+
+class _Redefined:
+    """Definitions in force at each frame, where frames may redefine them. Updates `table` in place."""
+
+    def __init__(
+        self,
+        table: Float32,
+        defined: npt.NDArray[np.bool_],
+        select: npt.NDArray[np.int16],
+        track: FaceTrack,
+        *,
+        mouth_only: bool,
+    ) -> None:
+        stored = np.array([f.group in MOUTH_GROUPS if mouth_only else f.group > 1 for f in faps()])
+        events = np.flatnonzero(defined & (select > 0) & track.mask[:, stored].any(axis=1))
+        mask = track.mask[events] & stored
+        rows = fill(np.where(mask, track.values[events], 0), mask)[0].astype(np.float32)
+        self._rows = np.concatenate([table, rows])
+        self._events = events
+        self._in_force: npt.NDArray[np.intp] | None = None
+        if len(events):
+            count = len(table)
+            row = np.broadcast_to(np.arange(count), (len(track), count)).copy()
+            row[events, select[events]] = count + np.arange(len(events))
+            self._in_force = np.maximum.accumulate(row, axis=0)
+            table[:] = self._rows[self._in_force[-1]]
+
+    def look_up(self, select: npt.NDArray[np.int16]) -> Float32:
+        """(T, 68) definition of the selected item at each frame."""
+        if self._in_force is None:
+            return self._rows[select]
+        return self._rows[self._in_force[np.arange(len(select)), select]]
