@@ -1,0 +1,250 @@
+"""What a stranger trips over before the first frame is coded: the scripts, the packaging, the imports."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+from packaging.requirements import Requirement
+
+import fba
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("fba", "player", "conformance")
+LARGEST_FILE = 5_000_000
+HEAVY = {"numpy", "numba", "scipy", "moderngl", "glfw", "PIL", "av", "bitstring", "click", "rich"}
+TOOLS = ("cat", "cksum", "cut", "dirname", "grep", "ls", "mkdir", "mv", "readlink", "rm", "sed", "tail", "tr")
+
+
+def pyproject() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def tracked() -> list[str]:
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False)
+    if listing.returncode:
+        pytest.skip(f"git does not list the checkout: {listing.stderr.decode().strip()}")
+    return [name for name in listing.stdout.decode().split("\0") if name]
+
+
+# --- the repository -----------------------------------------------------------------------------------
+
+
+def test_no_large_file_is_tracked() -> None:
+    sizes = {name: (ROOT / name).stat().st_size for name in tracked() if (ROOT / name).is_file()}
+    assert "pyproject.toml" in sizes
+    assert {name: size for name, size in sizes.items() if size > LARGEST_FILE} == {}
+
+
+@pytest.mark.parametrize(("script", "shell"), [("dev", "sh"), (".ci/run", "bash")])
+def test_script_runs_as_it_is(script: str, shell: str) -> None:
+    path = ROOT / script
+    assert os.access(path, os.X_OK)
+    assert path.read_text(encoding="utf-8").splitlines()[0].endswith(shell)
+    if shutil.which(shell) is None:
+        pytest.skip(f"no {shell} here")
+    assert subprocess.run([shell, "-n", path], capture_output=True, text=True, check=False).stderr == ""
+
+
+@pytest.mark.parametrize("script", ["dev", ".ci/run"])
+def test_shellcheck_is_content(script: str) -> None:
+    if shutil.which("shellcheck") is None:
+        pytest.skip("no shellcheck here")
+    done = subprocess.run(["shellcheck", ROOT / script], capture_output=True, text=True, check=False)
+    assert done.stdout == ""
+
+
+# --- the package --------------------------------------------------------------------------------------
+
+
+def test_version_is_the_same_everywhere() -> None:
+    assert pyproject()["project"]["version"] == fba.__version__
+
+
+@pytest.mark.parametrize("name", sorted(fba.__all__))
+def test_public_name_can_be_imported(name: str) -> None:
+    assert getattr(fba, name).__name__.rpartition(".")[2] == name
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    code = "import fba, sys; print(*{name.partition('.')[0] for name in sys.modules})"
+    command = [sys.executable, "-c", code]
+    loaded = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    names = set(loaded.stdout.split())
+    assert "fba" in names
+    assert names & HEAVY == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"), [("fap.csv", 68), ("bap.csv", 296), ("feature_points.csv", 84), ("joints.csv", 87)]
+)
+def test_tables_come_with_the_package(name: str, rows: int) -> None:
+    text = (files("fba.parameters") / name).read_text(encoding="utf-8")
+    assert len(text.strip().splitlines()) == 1 + rows
+
+
+def test_wheel_holds_every_file_of_the_packages_and_no_other(tmp_path: Path) -> None:
+    expected = {name for name in tracked() if name.startswith(tuple(f"{p}/" for p in PACKAGES))}
+    pytest.importorskip("hatchling", reason="hatchling comes with the extra `dev`")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if ".dist-info/" not in name}
+    assert {name for name in expected if (ROOT / name).exists()} <= held
+    assert {name for name in held if not name.startswith(tuple(f"{p}/" for p in PACKAGES))} == set()
+    assert {name for name in held if "__pycache__" in name} == set()
+
+
+PC = {"sys_platform": "linux", "platform_machine": "x86_64", "platform_python_implementation": "CPython"}
+MAC = PC | {"sys_platform": "darwin", "platform_machine": "arm64"}
+
+
+@pytest.mark.parametrize(
+    ("platform", "python", "missing"),
+    [
+        (PC, "3.11", set()),
+        (PC, "3.14", set()),
+        (MAC, "3.13", set()),
+        (MAC | {"platform_machine": "x86_64"}, "3.13", set()),
+        (MAC | {"platform_machine": "x86_64"}, "3.14", {"numba", "moderngl"}),
+        (PC | {"platform_machine": "aarch64"}, "3.11", {"moderngl"}),
+        (PC | {"platform_machine": "riscv64"}, "3.13", {"numba", "moderngl"}),
+        (PC | {"platform_python_implementation": "PyPy"}, "3.11", {"numba"}),
+    ],
+    ids=lambda value: value if isinstance(value, str) else None,
+)
+def test_only_what_has_wheels_is_required(platform: dict[str, str], python: str, missing: set[str]) -> None:
+    requirements = [Requirement(text) for text in pyproject()["project"]["dependencies"]]
+    environment = platform | {"python_version": python, "python_full_version": f"{python}.0"}
+    left_out = {r.name for r in requirements if r.marker and not r.marker.evaluate(environment)}
+    assert left_out == missing
+
+
+# --- the script `dev` ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A copy of what `dev` needs, in a folder with a space in its name."""
+    path = tmp_path / "a checkout"
+    path.mkdir()
+    for name in ("dev", "pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, path / name)
+    return path
+
+
+def tools(folder: Path, **scripts: str) -> Path:
+    """A PATH with the everyday tools and the given shell scripts, but no Python and no apt."""
+    folder.mkdir()
+    for name in ("sh", *TOOLS):
+        found = shutil.which(name)
+        if found:
+            (folder / name).symlink_to(found)
+    for name, text in scripts.items():
+        (folder / name).write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+        (folder / name).chmod(0o755)
+    return folder
+
+
+def dev(checkout: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    clean = {k: v for k, v in os.environ.items() if k not in {"FBA_VENV", "PYTHON"}}
+    return subprocess.run(
+        [checkout / "dev", *arguments],
+        cwd=checkout.parent,
+        env=clean | environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_dev_lists_its_commands(checkout: Path) -> None:
+    done = dev(checkout)
+    assert done.returncode == 0
+    for command in ("demo", "test", "lint", "types", "bench", "fuzz", "setup", "clean"):
+        assert f"  {command} " in done.stdout
+
+
+def test_dev_refuses_an_unknown_command(checkout: Path) -> None:
+    done = dev(checkout, "tset")
+    assert done.returncode == 1
+    assert "there is no command 'tset'" in done.stderr
+    assert not (checkout / ".venv").exists()
+
+
+def test_dev_without_python_says_how_to_get_one(checkout: Path, tmp_path: Path) -> None:
+    done = dev(checkout, "test", PATH=str(tools(tmp_path / "bin", python3="exit 1")))
+    assert done.returncode == 1
+    assert "no Python 3.11 or later here" in done.stderr
+    assert "apt-get install python3" in done.stderr
+    assert not (checkout / ".venv").exists()
+
+
+def test_dev_refuses_a_python_that_is_none(checkout: Path) -> None:
+    done = dev(checkout, "test", PYTHON="/nowhere/python3")
+    assert done.returncode == 1
+    assert "PYTHON=/nowhere/python3 is no Python 3.11 or later" in done.stderr
+
+
+def test_dev_names_the_package_where_python_cannot_make_environments(checkout: Path, tmp_path: Path) -> None:
+    # A Python 3.13 that owns up to its path, and lacks what Debian keeps in a package of its own.
+    debian = """case $* in
+        *_base_executable*) echo "13 $0" ;;
+        *"import ensurepip"*|*"import pip"*) exit 1 ;;
+    esac"""
+    path = tools(tmp_path / "bin", debian=debian)
+    done = dev(checkout, "test", PATH=str(path), PYTHON=str(path / "debian"), FBA_NO_APT="1")
+    assert done.returncode == 1
+    assert "sudo apt-get install python3.13-venv" in done.stderr
+    assert not (checkout / ".venv").exists()
+
+
+def test_dev_leaves_a_folder_alone_that_is_no_environment(checkout: Path, tmp_path: Path) -> None:
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    (precious / "thesis.txt").write_text("years of work", encoding="utf-8")
+    for command in ("setup", "clean"):
+        done = dev(checkout, command, FBA_VENV=str(precious), PYTHON=sys.executable)
+        assert done.returncode == 1
+        assert "is no virtual environment" in done.stderr
+    assert [p.name for p in precious.iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.slow
+def test_dev_explains_a_failed_installation_and_starts_again(checkout: Path, tmp_path: Path) -> None:
+    offline = {"PIP_NO_INDEX": "1", "PIP_CONFIG_FILE": os.devnull, "PIP_FIND_LINKS": "", "FBA_NO_APT": "1"}
+    for _ in range(2):
+        done = dev(checkout, "setup", PYTHON=sys.executable, **offline)
+        assert done.returncode == 1
+        assert "dev: making " in done.stderr
+        assert "dev: the installation failed:" in done.stderr
+        assert "hatchling" in done.stderr
+        assert (checkout / ".venv" / ".dev-begun").exists()
+    assert dev(checkout, "clean").returncode == 0
+    assert not (checkout / ".venv").exists()
+
+
+def test_dev_works_through_a_link(checkout: Path, tmp_path: Path) -> None:
+    (tmp_path / "links").mkdir()
+    (tmp_path / "links" / "dev").symlink_to("../a checkout/dev")
+    done = dev(tmp_path / "links", "setup", PYTHON="/nowhere/python3", FBA_VENV="")
+    assert "PYTHON=/nowhere/python3" in done.stderr
+    done = dev(tmp_path / "links", "clean")
+    assert done.returncode == 0
+    (checkout / "__pycache__").mkdir()
+    assert dev(tmp_path / "links", "clean").returncode == 0
+    assert not (checkout / "__pycache__").exists()
