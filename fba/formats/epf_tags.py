@@ -1,0 +1,47 @@
+"""The tags of EPF files: what stands for the face, and its twin for the body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, bap_groups, fap_groups
+
+FACE, BODY = 1, 2
+
+
+@dataclass(frozen=True)
+class Part:
+    """The tags of one half. lists: in coding order (I max, I min, P max, P min)."""
+
+    bit: int
+    word: str
+    frame: str
+    rate: str
+    time: str
+    skip: str
+    mask: str
+    quant: str
+    lists: tuple[str, str, str, str]
+    groups: Callable[[], tuple[tuple[int, ...], ...]]
+    count: int
+    first: int
+    """Number of the first parameter that has limits."""
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        return (self.frame, self.rate, self.time, self.skip, self.mask, self.quant, *self.lists)
+
+
+PARTS = (
+    Part(
+        FACE, "face", "FFR", "FRR", "TC", "SKN", "FMT", "FQU", ("FIX", "FIN", "FPX", "FPN"),
+        fap_groups, FAP_COUNT, FIRST_LOW_LEVEL_FAP,
+    ),
+    Part(
+        BODY, "body", "BFR", "BRR", "BTC", "BSK", "BMT", "BQU", ("BIX", "BIN", "BPX", "BPN"),
+        bap_groups, BAP_COUNT, 1,
+    ),
+)  # fmt: skip
+SHARED_TAGS = ("FBM", "ISI", "GDR", "CDM")
+TAGS = frozenset(SHARED_TAGS).union(*(part.own for part in PARTS))

@@ -1,0 +1,74 @@
+"""Open a file for reading, with a clear error for everything that is not a plain, filled, readable file."""
+
+from __future__ import annotations
+
+import os
+import stat
+from typing import BinaryIO
+
+from fba.errors import FormatError
+
+Path = str | os.PathLike[str]
+
+HEAD_BYTES = 65536
+"""How much of a file is looked at to find its format."""
+MAX_WHOLE_FILE = 1 << 31
+"""Largest file that is read in one piece; at FBA bit rates, months of performance."""
+
+
+def open_source(path: Path) -> tuple[BinaryIO, int]:
+    """The file, opened for binary reading, and its size in bytes when it was opened.
+
+    Readers stop at that size, so a file that grows meanwhile ends too. Raises FormatError for a missing
+    file, a folder, a pipe or device, an empty or unreadable file.
+    """
+    name = os.fspath(path)
+    try:
+        # a pipe that nobody writes to must not block the opening
+        mode = os.stat(name).st_mode
+        if stat.S_ISDIR(mode):
+            raise FormatError("is a folder; give the name of a file in it", path=name)
+        if not stat.S_ISREG(mode):
+            raise FormatError(
+                "is a pipe or a device, not a regular file; save its content to a file first", path=name
+            )
+        file = open(name, "rb")  # noqa: SIM115 - handed to the caller, who closes it
+        size = os.fstat(file.fileno()).st_size
+    except FileNotFoundError as error:
+        raise FormatError("there is no such file; check the name and the folder", path=name) from error
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"cannot be read: {reason}", path=name) from error
+    if not size:
+        file.close()
+        raise FormatError("is empty (0 bytes); was it fully copied or written?", path=name)
+    return file, size
+
+
+def read_head(path: Path) -> bytes:
+    """Up to `HEAD_BYTES` from the beginning; FormatError as `open_source`."""
+    file, _ = open_source(path)
+    with file:
+        return _read(file, HEAD_BYTES, path)
+
+
+def read_whole(path: Path) -> bytes:
+    """All bytes of a file of at most `MAX_WHOLE_FILE`; FormatError as `open_source`, or beyond that."""
+    file, size = open_source(path)
+    with file:
+        if size > MAX_WHOLE_FILE:
+            raise FormatError(
+                f"is {size} bytes long, more than the {MAX_WHOLE_FILE} that are read in one piece; "
+                "feed it to fba.Decoder chunk by chunk",
+                path=path,
+            )
+        return _read(file, size, path)
+
+
+def _read(file: BinaryIO, count: int, path: Path) -> bytes:
+    try:
+        return file.read(count)
+    except OSError as error:
+        raise FormatError(f"cannot be read: {error.strerror or error}", path=path) from error
