@@ -1,0 +1,216 @@
+"""The adaptive arithmetic coder of FBA planes as a textbook has it: a linear search, plain integers.
+
+ISO/IEC 14496-2, FBA object plane, predictive mode. Written to be read and to check a faster coder
+against, so it shares nothing with `fba.codec`.
+
+A segment is a run of symbols between a start (low 0, high 65535) and a flush. The decoder holds 16
+bits, of which the flush has written only 2: it has always read 14 bits of what follows. So the length
+of a segment is counted in bits shifted out, plus 2, and what it saw beyond is not judged.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fba.errors import BitstreamError
+
+HALF, QUARTER, TOP = 32768, 16384, 65535
+COUNT_LIMIT = 16383
+"""Sum of a table's counts at which they are halved."""
+ZERO_RUN = 22
+"""After so many zero bits a 1 is inserted, so that no start code (23 zeros) can appear."""
+REGISTER_BITS = 16
+FLUSH_BITS = 2
+
+
+class FrequencyTable:
+    """How often each symbol of an alphabet was seen; every count starts at 1.
+
+    Only counts above 1 are stored, as what they have more than 1, in the order of the symbols: of the
+    thousands of symbols of a wide range a stream uses a few dozen.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.total = size
+        self.symbols: list[int] = []
+        self.extra: list[int] = []
+
+    def find(self, target: int) -> tuple[int, int, int]:
+        """The symbol whose share holds target (0 <= target < total), and the cumulated counts around it.
+
+        Returns symbol, sum of the counts from it on, sum of the counts after it: symbol 0 has the top.
+        """
+        symbol, above = 0, self.total
+        for seen, extra in zip(self.symbols, self.extra, strict=True):
+            if above - (seen - symbol) <= target:
+                break  # among the symbols of count 1 before this one
+            above -= seen - symbol
+            if above - 1 - extra <= target:
+                return seen, above, above - 1 - extra
+            symbol, above = seen + 1, above - 1 - extra
+        before = above - target - 1
+        return symbol + before, above - before, above - before - 1
+
+    def share(self, symbol: int) -> tuple[int, int]:
+        """Sum of the counts from symbol on, and of those after it."""
+        at = bisect_left(self.symbols, symbol)
+        own = self.extra[at] if at < len(self.symbols) and self.symbols[at] == symbol else 0
+        above = self.size - symbol + sum(self.extra[at:])
+        return above, above - 1 - own
+
+    def learn(self, symbol: int) -> None:
+        """Count a symbol; at the limit, halve every count first (rounding up, so that 1 stays 1)."""
+        if self.total >= COUNT_LIMIT:
+            halved = [(s, e // 2) for s, e in zip(self.symbols, self.extra, strict=True) if e > 1]
+            self.symbols = [s for s, _ in halved]
+            self.extra = [e for _, e in halved]
+            self.total = self.size + sum(self.extra)
+        at = bisect_left(self.symbols, symbol)
+        if at < len(self.symbols) and self.symbols[at] == symbol:
+            self.extra[at] += 1
+        else:
+            self.symbols.insert(at, symbol)
+            self.extra.insert(at, 1)
+        self.total += 1
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """symbols: one per table. bits: length in the stream, flush and inserted bits included.
+    inserted: how many of them are inserted 1 bits."""
+
+    symbols: tuple[int, ...]
+    bits: int
+    inserted: int
+
+
+class _GuardedBits:
+    """Bits of a segment with the inserted ones dropped; zeros for ever behind the end of the data."""
+
+    def __init__(self, data: bytes, start: int) -> None:
+        self.data = data
+        self.at = start
+        self.zeros = 0
+        self.ends: list[int] = []  # where each bit handed out ends in the stream
+        self.insertions: list[int] = []  # how many bits had been handed out before each inserted one
+        self.violation: tuple[int, int] | None = None  # the same for an inserted 0, and its position
+
+    def _raw(self) -> int:
+        byte, shift = self.at >> 3, 7 - (self.at & 7)
+        self.at += 1
+        return self.data[byte] >> shift & 1 if byte < len(self.data) else 0
+
+    def next(self) -> int:
+        if self.zeros == ZERO_RUN:
+            self.insertions.append(len(self.ends))
+            if not self._raw() and self.violation is None:
+                self.violation = len(self.ends), self.at - 1
+            self.zeros = 0
+        bit = self._raw()
+        self.zeros = 0 if bit else self.zeros + 1
+        self.ends.append(self.at)
+        return bit
+
+
+def decode_segment(
+    data: bytes,
+    start: int,
+    tables: Sequence[FrequencyTable],
+    *,
+    learn: bool,
+    name: str = "arithmetic segment",
+    plane: int | None = None,
+) -> Segment:
+    """Read one symbol per table from bit `start` of data; with `learn`, the tables count them.
+
+    Raises BitstreamError, with `name` and `plane` in it, where the data ends inside the segment or a
+    run of 22 zeros is not followed by a 1.
+    """
+    source = _GuardedBits(data, start)
+    low, high, code = 0, TOP, 0
+    for _ in range(REGISTER_BITS):
+        code = code * 2 + source.next()
+    symbols = []
+    for table in tables:
+        span = high - low + 1
+        symbol, upper, lower = table.find(((code - low + 1) * table.total - 1) // span)
+        high = low - 1 + span * upper // table.total
+        low += span * lower // table.total
+        while True:
+            if high < HALF:
+                offset = 0
+            elif low >= HALF:
+                offset = HALF
+            elif low >= QUARTER and high < HALF + QUARTER:
+                offset = QUARTER
+            else:
+                break
+            low = (low - offset) * 2
+            high = (high - offset) * 2 + 1
+            code = (code - offset) * 2 + source.next()
+        if learn:
+            table.learn(symbol)
+        symbols.append(symbol)
+    used = len(source.ends) - REGISTER_BITS + FLUSH_BITS
+    end = source.ends[used - 1]
+    if source.violation is not None and source.violation[0] < used and source.violation[1] < len(data) * 8:
+        raise BitstreamError(
+            f"{name}: {ZERO_RUN} zero bits are followed by another 0, where an inserted 1 was expected; "
+            "the stream is damaged here or before",
+            plane=plane,
+            bit=source.violation[1],
+        )
+    if end > len(data) * 8:
+        raise BitstreamError(
+            f"{name}: starts at bit {start} and needs {end - start} bits, but the data ends after "
+            f"{len(data) * 8 - start}; the stream is cut or damaged",
+            plane=plane,
+            bit=len(data) * 8,
+        )
+    inserted = sum(1 for before in source.insertions if before < used)
+    return Segment(tuple(symbols), end - start, inserted)
+
+
+def encode_segment(symbols: Sequence[int], tables: Sequence[FrequencyTable], *, learn: bool) -> str:
+    """The bits of a segment, as a string of 0 and 1: the inverse of `decode_segment`."""
+    bits: list[str] = []
+    zeros = pending = 0
+
+    def put(bit: int) -> None:
+        nonlocal zeros, pending
+        for value in (bit, *[1 - bit] * pending):
+            if zeros == ZERO_RUN:
+                bits.append("1")
+                zeros = 0
+            bits.append(str(value))
+            zeros = 0 if value else zeros + 1
+        pending = 0
+
+    low, high = 0, TOP
+    for symbol, table in zip(symbols, tables, strict=True):
+        upper, lower = table.share(symbol)
+        span = high - low + 1
+        high = low - 1 + span * upper // table.total
+        low += span * lower // table.total
+        while True:
+            if high < HALF:
+                offset = 0
+                put(0)
+            elif low >= HALF:
+                offset = HALF
+                put(1)
+            elif low >= QUARTER and high < HALF + QUARTER:
+                offset = QUARTER
+                pending += 1
+            else:
+                break
+            low = (low - offset) * 2
+            high = (high - offset) * 2 + 1
+        if learn:
+            table.learn(symbol)
+    pending += 1
+    put(0 if low < QUARTER else 1)
+    return "".join(bits)
