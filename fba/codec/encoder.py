@@ -1,0 +1,284 @@
+"""From an animation to bits: the incremental `Encoder`, and `encode`, which drives one to its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation, BodyTrack, FaceTrack, Frame
+from fba.codec import planner, slots
+from fba.codec.plane import SKIP_MAX
+from fba.codec.plane_writer import DoesNotFitError, PlaneWriter
+from fba.codec.planner import EncoderOptions, Ranges
+from fba.codec.settings import PartSettings, PlaneSettings, RangeLists
+from fba.errors import RangeError
+
+_CHUNK = 1024
+"""Frames that `encode` hands over at a time: what bounds its memory."""
+_PARTS = (slots.FACE_BIT, slots.BODY_BIT)
+
+
+@dataclass
+class EncoderStatistics:
+    """planes, intra_planes: written so far. clamped: values that were brought into range."""
+
+    planes: int = 0
+    intra_planes: int = 0
+    clamped: int = 0
+
+
+class Encoder:
+    """Encodes frames as they come; `push` and `finish` return the bytes that are complete.
+
+    A frame leaves when the next one is there, since its plane says how many frames are skipped after it.
+    Ranges start from the standard's tables (or from `ranges`, as `encode` fits them) and grow: a frame
+    that does not fit them becomes an I plane with wider ones. Masks may change from frame to frame; every
+    change makes an I plane too, except that a part may be left out of a plane for nothing.
+
+    Raises RangeError for a value that no range can carry (unless options.clamp), for a frame rate that
+    cannot be coded, and ValueError for frames of another rate or that go back in time.
+    """
+
+    def __init__(
+        self, options: EncoderOptions | None = None, *, ranges: dict[int, Ranges] | None = None
+    ) -> None:
+        self.options = options or EncoderOptions()
+        self.statistics = EncoderStatistics()
+        self._writer = PlaneWriter(self.options.bap_steps)
+        self._ranges = dict(ranges or {})
+        self._stale = {part: True for part in _PARTS}  # ranges that the reader does not know yet
+        self._held: Animation | None = None
+        self._rate: Fraction | None = None
+        self._last_intra = 0  # index of the last I plane
+        self._position = 0  # frames pushed before the one being coded
+        self._finished = False
+
+    def push(self, frame: Frame) -> bytes:
+        """Take in a frame; the bytes that are complete."""
+        return self.push_animation(Animation.from_frames([frame]))
+
+    def push_animation(self, animation: Animation) -> bytes:
+        """Take in consecutive frames: what to use for speed."""
+        if self._finished:
+            raise ValueError("this encoder is finished; make a new one for another stream")
+        if not len(animation):
+            return b""
+        if self._rate is not None and animation.rate != self._rate:
+            raise ValueError(
+                f"the stream has {self._rate} frames/s, this frame {animation.rate}; resample it first"
+            )
+        frames = animation
+        if self._held is not None:
+            if animation.index[0] <= self._held.index[0]:
+                raise ValueError(
+                    f"frame index {animation.index[0]} comes after {self._held.index[0]}; indices must increase"
+                )
+            frames = _followed(self._held, animation)
+        self._check_skips(frames)
+        if self._rate is None:
+            planner.frame_rate(animation.rate)  # refuses what cannot be coded before anything is written
+            self._rate = animation.rate
+        self._held = frames[len(frames) - 1 :]
+        self._encode(frames, len(frames) - 1)
+        return self._writer.take_bytes()
+
+    def finish(self) -> bytes:
+        """Say that no more frames come; the last bytes, with alignment and end code. ValueError where
+        there was no frame at all."""
+        if self._finished:
+            return b""
+        if self._held is None:
+            raise ValueError("there is no frame to encode")
+        self._encode(self._held, 1)
+        self._finished = True
+        self._writer.end_object()
+        return self._writer.take_bytes()
+
+    def _check_skips(self, frames: Animation) -> None:
+        gaps = np.diff(frames.index)
+        if len(gaps) and int(gaps.max()) - 1 > SKIP_MAX:
+            at = int(np.argmax(gaps))
+            raise RangeError(
+                f"{int(gaps[at]) - 1} frames are skipped before the next; a plane can skip {SKIP_MAX}",
+                frame=self._position + at,
+            )
+
+    def _encode(self, frames: Animation, count: int) -> None:
+        """Encode the first `count` frames; one after them, where there is one, says the last skip."""
+        if not count:
+            return
+        rows = np.zeros((count, slots.ROW), dtype=np.int32)
+        if frames.face is not None:
+            slots.face_rows(frames.face[:count], rows)
+            planner.clip_amounts(rows)
+        if frames.body is not None:
+            slots.body_rows(frames.body[:count], rows)
+        skips = np.zeros(count, dtype=np.int64)
+        gaps = np.diff(frames.index[: count + 1]) - 1
+        skips[: len(gaps)] = gaps
+        for start, stop in _runs(frames, count):
+            self._encode_run(frames, start, stop, rows, skips)
+        self._position += count
+
+    def _encode_run(
+        self, frames: Animation, start: int, stop: int, rows: slots.Int32, skips: npt.NDArray[np.int64]
+    ) -> None:
+        """Encode frames start..stop, which all send the same."""
+        masks = _masks(frames, start)
+        if self.statistics.planes == 0:
+            # The first plane carries every track there is, even where it sends nothing yet.
+            present = [
+                p for p, track in zip(_PARTS, (frames.face, frames.body), strict=True) if track is not None
+            ]
+        else:
+            present = [part for part in _PARTS if masks[part] is not None and masks[part].any()]
+        if not present:
+            present = [slots.FACE_BIT if frames.face is not None else slots.BODY_BIT]
+        same = all(
+            (force := self._writer.mask_in_force(part)) is not None and np.array_equal(force, masks[part])
+            for part in present
+        )
+        position = start
+        if not same:
+            self._intra(frames, position, present, masks, rows, int(skips[position]))
+            position += 1
+        while position < stop:
+            due = self._intra_due(frames, position, stop)
+            try:
+                self._writer.predicted(sum(present), rows[position:due], skips[position:due])
+                self.statistics.planes += due - position
+                position = due
+                if position == stop:
+                    break
+            except DoesNotFitError as error:
+                self.statistics.planes += error.position
+                position += error.position
+                part = slots.FACE_BIT if error.slot < slots.FAPS.stop else slots.BODY_BIT
+                ranges = self._ranges[part]
+                if ranges.fits(error.level):
+                    ranges.widen(error.slot, (0, 0, max(error.level, 0), max(-error.level, 0)))
+                    self._stale[part] = True
+            self._intra(frames, position, present, masks, rows, int(skips[position]))
+            position += 1
+
+    def _intra_due(self, frames: Animation, start: int, stop: int) -> int:
+        """First of the frames start..stop at which the intra period is over."""
+        if self.options.intra_period is None:
+            return stop
+        next_intra = self._last_intra + float(self.options.intra_period * frames.rate)
+        return start + int(np.searchsorted(frames.index[start:stop], next_intra - 1e-9))
+
+    def _intra(
+        self,
+        frames: Animation,
+        position: int,
+        present: list[int],
+        masks: dict[int, slots.Bool | None],
+        rows: slots.Int32,
+        skip: int,
+    ) -> None:
+        first = self.statistics.planes == 0
+        if first:
+            self._writer.begin_object()
+        index = int(frames.index[position])
+        row = rows[position]
+        settings = {part: self._part_settings(part, masks[part], row, position, first) for part in present}
+        plane = PlaneSettings(
+            intra=True,
+            face=settings.get(slots.FACE_BIT),
+            body=settings.get(slots.BODY_BIT),
+            frame_rate=planner.frame_rate(frames.rate) if first or self.options.start_codes else None,
+            time_code=planner.time_code(index, frames.rate) if first else None,
+            skip=skip,
+            start_code=self.options.start_codes and not first,
+        )
+        self.statistics.clamped += self._writer.intra(plane, row, clamp=True)
+        self.statistics.planes += 1
+        self.statistics.intra_planes += 1
+        self._last_intra = index
+
+    def _part_settings(
+        self, part: int, mask: slots.Bool | None, row: slots.Int32, position: int, first: bool
+    ) -> PartSettings:
+        """Settings for an I plane, with ranges that hold its values. Raises RangeError where none do."""
+        options = self.options
+        if part not in self._ranges:
+            self._ranges[part] = Ranges(part, options.quant(part))
+            self._ranges[part].start_from_tables()
+        ranges = self._ranges[part]
+        assert mask is not None
+        force = self._writer.mask_in_force(part)
+        new_mask = force is None or not np.array_equal(force, mask)
+        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        order = np.flatnonzero(mask[2:] if part == slots.FACE_BIT else mask) + place.start
+        step = planner.quantiser.steps(part, options.quant(part), options.bap_steps)
+        base = 0 if part == slots.FACE_BIT else place.start
+        for slot in order.tolist():
+            level = planner.plane.quantise(int(row[slot]), int(step[slot - base]))
+            if not ranges.fits(level) and not options.clamp:
+                raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
+            before = ranges.codes.copy() if level else None
+            ranges.widen(slot, (max(level, 0), max(-level, 0), 0, 0))
+            if before is not None and not np.array_equal(before, ranges.codes):
+                self._stale[part] = True
+        send = self._stale[part] or new_mask or options.start_codes
+        self._stale[part] = False
+        return PartSettings(
+            planner.mask_types(part, mask, options.unsent),
+            mask,
+            options.quant(part),
+            options.gender,
+            ranges=ranges.lists() if send else RangeLists(),
+        )
+
+
+def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes:
+    """Encode an animation as one FBA object, with ranges fitted to all of it.
+
+    Raises RangeError for what the syntax cannot carry (see `EncoderOptions.clamp`), ValueError for an
+    animation without frames. What was clamped is told in an FbaWarning.
+    """
+    return encode_with_statistics(animation, options)[0]
+
+
+def encode_with_statistics(
+    animation: Animation, options: EncoderOptions | None = None
+) -> tuple[bytes, EncoderStatistics]:
+    """Like `encode`, and what the encoder counted."""
+    options = options or EncoderOptions()
+    encoder = Encoder(options, ranges=planner.fitting_ranges(animation, options))
+    chunks = []
+    for start in range(0, len(animation), _CHUNK):
+        chunks.append(encoder.push_animation(animation[start : start + _CHUNK]))
+    chunks.append(encoder.finish())
+    return b"".join(chunks), encoder.statistics
+
+
+def _masks(frames: Animation, position: int) -> dict[int, slots.Bool | None]:
+    return {
+        slots.FACE_BIT: frames.face.mask[position] if frames.face is not None else None,
+        slots.BODY_BIT: frames.body.mask[position] if frames.body is not None else None,
+    }
+
+
+def _runs(frames: Animation, count: int) -> list[tuple[int, int]]:
+    """Stretches of the first `count` frames that send the same."""
+    changes = np.zeros(count, dtype=bool)
+    for track in (frames.face, frames.body):
+        if track is not None:
+            changes[1:] |= (track.mask[1:count] != track.mask[: count - 1]).any(axis=1)
+    borders = [0, *np.flatnonzero(changes).tolist(), count]
+    return list(zip(borders[:-1], borders[1:], strict=True))
+
+
+def _followed(first: Animation, second: Animation) -> Animation:
+    """Two pieces of one animation, the second with the later indices, as one."""
+    return Animation(
+        first.rate,
+        np.concatenate([first.index, second.index]),
+        FaceTrack.join([(first.face, len(first)), (second.face, len(second))]),
+        BodyTrack.join([(first.body, len(first)), (second.body, len(second))]),
+    )

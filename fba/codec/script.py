@@ -1,0 +1,112 @@
+"""Encoding as a list of `PlaneSettings` says, such as an EPF file gives: nothing is decided here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.codec import slots
+from fba.codec.plane_writer import DoesNotFitError, PlaneWriter
+from fba.codec.settings import PlaneSettings
+from fba.errors import RangeError
+
+
+def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_steps: str = "iso") -> bytes:
+    """Encode the frames of an animation plane by plane.
+
+    Each plane says which frames it codes: `face_frame` and `body_frame` are frame numbers, as in
+    `animation.index`. Its masks override those of the animation: what was not sent there is coded as 0.
+
+    Raises RangeError where a value does not fit the ranges in force or a frame is missing, ValueError
+    where the first plane is no I plane or a plane codes a part that has no settings yet.
+    """
+    if not planes:
+        raise ValueError("encode_planes: no planes to encode")
+    writer = PlaneWriter(bap_steps)
+    writer.begin_object()
+    rows = _rows(animation, planes)
+    chunks = []
+    position = 0
+    while position < len(planes):
+        settings = planes[position]
+        try:
+            if settings.intra:
+                count = 1
+                writer.intra(settings, rows[position])
+            else:
+                count = _run_length(planes, position)
+                skips = np.array([one.skip for one in planes[position : position + count]], dtype=np.int64)
+                for part in (slots.FACE_BIT, slots.BODY_BIT):
+                    if _object_mask(settings) & part and writer.mask_in_force(part) is None:
+                        raise ValueError(
+                            f"encode_planes: plane {position} is a P plane before the first I plane"
+                        )
+                writer.predicted(_object_mask(settings), rows[position : position + count], skips)
+        except DoesNotFitError as error:
+            plane = position + error.position
+            value = int(rows[plane, error.slot])
+            raise RangeError(
+                f"plane {plane} codes the value {value} as level {error.level}, which the ranges in force "
+                "do not hold; widen them (or let the encoder choose)",
+                parameter=slots.label(error.slot),
+                value=value,
+                frame=settings.face_frame if settings.face_frame is not None else settings.body_frame,
+            ) from None
+        position += count
+        chunks.append(writer.take_bytes())
+    writer.end_object()
+    chunks.append(writer.take_bytes())
+    return b"".join(chunks)
+
+
+def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> npt.NDArray[np.int32]:
+    rows = np.zeros((len(planes), slots.ROW), dtype=np.int32)
+    if any(one.face is not None for one in planes):
+        track = animation.face
+        if track is None:
+            raise RangeError("the planes to be coded carry FAPs, but the animation has no face track")
+        chosen, positions = _frames(animation, [p.face_frame if p.face is not None else None for p in planes])
+        source = np.zeros((len(animation), slots.ROW), dtype=np.int32)
+        slots.face_rows(track, source)
+        rows[chosen] = source[positions]
+    if any(one.body is not None for one in planes):
+        if animation.body is None:
+            raise RangeError("the planes to be coded carry BAPs, but the animation has no body track")
+        chosen, positions = _frames(animation, [p.body_frame if p.body is not None else None for p in planes])
+        rows[chosen, slots.BAPS] = animation.body.values[positions]
+    return rows
+
+
+def _frames(
+    animation: Animation, numbers: Sequence[int | None]
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Which planes want a frame, and where in the animation it is."""
+    chosen = np.array([i for i, number in enumerate(numbers) if number is not None], dtype=np.intp)
+    wanted = np.array([number for number in numbers if number is not None], dtype=np.int64)
+    positions = np.searchsorted(animation.index, wanted)
+    found = animation.index[np.minimum(positions, len(animation) - 1)] == wanted
+    if not found.all():
+        at = int(np.argmin(found))
+        raise RangeError(
+            f"plane {chosen[at]} codes frame {wanted[at]}, but the animation has no frame of that number "
+            f"(it has {animation.index[0]}..{animation.index[-1]})",
+            frame=int(wanted[at]),
+        )
+    return chosen, positions
+
+
+def _object_mask(settings: PlaneSettings) -> int:
+    face = slots.FACE_BIT if settings.face is not None else 0
+    return face | (slots.BODY_BIT if settings.body is not None else 0)
+
+
+def _run_length(planes: Sequence[PlaneSettings], position: int) -> int:
+    """How many P planes from here on carry the same parts."""
+    first = planes[position]
+    stop = position + 1
+    while stop < len(planes) and not planes[stop].intra and _object_mask(planes[stop]) == _object_mask(first):
+        stop += 1
+    return stop - position
