@@ -76,8 +76,8 @@ class Reader:
     def _need(self, name: str, bits: int) -> None:
         if self.bit + bits > self.size:
             raise self.error(
-                f"{name}: needs {bits} bits, but the data ends after {self.size - self.bit}; the stream is cut "
-                "or damaged"
+                f"{name}: needs {bits} bits, but the data ends after {self.size - self.bit}; "
+                "the stream is cut or damaged"
             )
 
     def number(self, name: str, bits: int, section: str) -> int:

@@ -165,8 +165,8 @@ def decode_segment(
         )
     if end > len(data) * 8:
         raise BitstreamError(
-            f"{name}: starts at bit {start} and needs {end - start} bits, but the data ends after "
-            f"{len(data) * 8 - start}; the stream is cut or damaged",
+            f"{name}: starts at bit {start} and is not over where the data ends; "
+            "the stream is cut or damaged",
             plane=plane,
             bit=len(data) * 8,
         )
