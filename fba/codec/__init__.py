@@ -5,6 +5,7 @@ from fba.codec.encoder import Encoder, EncoderStatistics, encode, encode_with_st
 from fba.codec.planner import EncoderOptions
 from fba.codec.script import encode_planes
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
+from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
 
 __all__ = [
     "Block",
@@ -14,14 +15,17 @@ __all__ = [
     "EncoderOptions",
     "EncoderStatistics",
     "FrameRate",
+    "PartInfo",
     "PartSettings",
     "PlaneInfo",
     "PlaneSettings",
     "RangeLists",
+    "StreamInfo",
     "TimeCode",
     "animation_of",
     "decode",
     "encode",
     "encode_planes",
     "encode_with_statistics",
+    "probe_stream",
 ]

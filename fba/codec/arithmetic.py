@@ -21,6 +21,8 @@ All functions work on NumPy arrays and plain integers, check every bound, and ru
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -52,25 +54,33 @@ UInt16 = npt.NDArray[np.uint16]
 Int64 = npt.NDArray[np.int64]
 
 
+class Counts(NamedTuple):
+    """The models of all slots. int64 (slots,): size of the alphabet, usual symbol, total of the counts, sum
+    of those of the symbols below the usual one. uint16 (slots, STRIDE): what was added to the counts, and
+    the Fenwick tree over that."""
+
+    size: Int64
+    usual: Int64
+    total: Int64
+    below_usual: Int64
+    added: UInt16
+    tree: UInt16
+
+
 @compiled
 def decode_segment(
     data: UInt8,
     bit: int,
     end: int,
     slots: Int64,
-    size: Int64,
-    usual: Int64,
-    total: Int64,
-    below_usual: Int64,
-    added: UInt16,
-    tree: UInt16,
+    models: Counts,
     adaptive: bool,
     symbols: Int64,
 ) -> tuple[int, int]:
     """Decode one segment that starts at `bit`: symbols[k] becomes the symbol of slot slots[k].
 
     data: the stream; `end` bits of it are there, zeros are assumed beyond.
-    size, total: per slot; added, tree: (slots, STRIDE). Not adaptive: all counts are 1 (I planes).
+    Not adaptive: all counts are 1 (I planes).
     Returns (status, bit): OK and the bit after the segment; OUT_OF_DATA where it needs bits beyond
     `end`; or the kind and place of the damage.
     """
@@ -113,19 +123,19 @@ def decode_segment(
 
         slot = int(slots[position])
         span = high - low + 1
-        whole = int(total[slot]) if adaptive else int(size[slot])
+        whole = int(models.total[slot]) if adaptive else int(models.size[slot])
         target = whole - 1 - ((code - low + 1) * whole - 1) // span  # counted from symbol 0 upwards
         if adaptive:
-            symbol = int(usual[slot])
-            below = int(below_usual[slot])
-            share = 1 + int(added[slot, symbol])
+            symbol = int(models.usual[slot])
+            below = int(models.below_usual[slot])
+            share = 1 + int(models.added[slot, symbol])
             if target < below:
-                symbol, below = _find(tree, slot, int(size[slot]), target)
-                share = 1 + int(added[slot, symbol])
+                symbol, below = _find(models.tree, slot, int(models.size[slot]), target)
+                share = 1 + int(models.added[slot, symbol])
             elif target >= below + share:
-                symbol, below = _find(tree, slot, int(size[slot]), target - share + 1)
+                symbol, below = _find(models.tree, slot, int(models.size[slot]), target - share + 1)
                 below += share - 1
-                share = 1 + int(added[slot, symbol])
+                share = 1 + int(models.added[slot, symbol])
         else:
             symbol, below, share = target, target, 1
         symbols[position] = symbol
@@ -152,12 +162,7 @@ def encode_segment(
     data: UInt8,
     bit: int,
     slots: Int64,
-    size: Int64,
-    usual: Int64,
-    total: Int64,
-    below_usual: Int64,
-    added: UInt16,
-    tree: UInt16,
+    models: Counts,
     adaptive: bool,
     symbols: Int64,
 ) -> int:
@@ -176,16 +181,16 @@ def encode_segment(
             symbol = int(symbols[position])
             span = high - low + 1
             if adaptive:
-                whole = int(total[slot])
-                if symbol == usual[slot]:
-                    above = whole - int(below_usual[slot])
+                whole = int(models.total[slot])
+                if symbol == models.usual[slot]:
+                    above = whole - int(models.below_usual[slot])
                 else:
-                    above = whole - _sum_below(tree, slot, symbol)
-                    if symbol > usual[slot]:
-                        above -= int(added[slot, usual[slot]])
-                share = 1 + int(added[slot, symbol])
+                    above = whole - _sum_below(models.tree, slot, symbol)
+                    if symbol > models.usual[slot]:
+                        above -= int(models.added[slot, models.usual[slot]])
+                share = 1 + int(models.added[slot, symbol])
             else:
-                whole = int(size[slot])
+                whole = int(models.size[slot])
                 above = whole - symbol
                 share = 1
             high = low - 1 + span * above // whole
@@ -228,28 +233,21 @@ def encode_segment(
 
 
 @compiled
-def learn(
-    slots: Int64,
-    symbols: Int64,
-    size: Int64,
-    usual: Int64,
-    total: Int64,
-    below_usual: Int64,
-    added: UInt16,
-    tree: UInt16,
-) -> None:
+def learn(slots: Int64, symbols: Int64, models: Counts) -> None:
     """Raise the count of symbols[k] in the model of slots[k], halving the model's counts where it is full."""
     for position in range(len(slots)):
         slot = int(slots[position])
-        if total[slot] == TOTAL_MAX:
-            total[slot], below_usual[slot] = _halve(added, tree, slot, int(size[slot]), int(usual[slot]))
+        if models.total[slot] == TOTAL_MAX:
+            models.total[slot], models.below_usual[slot] = _halve(
+                models.added, models.tree, slot, int(models.size[slot]), int(models.usual[slot])
+            )
         symbol = int(symbols[position])
-        added[slot, symbol] += np.uint16(1)
-        total[slot] += 1
-        if symbol != usual[slot]:
-            if symbol < usual[slot]:
-                below_usual[slot] += 1
-            _raise(tree, slot, int(size[slot]), symbol, 1)
+        models.added[slot, symbol] += np.uint16(1)
+        models.total[slot] += 1
+        if symbol != models.usual[slot]:
+            if symbol < models.usual[slot]:
+                models.below_usual[slot] += 1
+            _raise(models.tree, slot, int(models.size[slot]), symbol, 1)
 
 
 @compiled

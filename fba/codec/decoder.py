@@ -18,6 +18,7 @@ from fba.codec.arithmetic import OK, OUT_OF_DATA
 from fba.codec.bits import BitReader, OutOfDataError
 from fba.codec.buffer import Buffer
 from fba.codec.models import Models
+from fba.codec.plane import Layout
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, TimeCode
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
@@ -124,6 +125,10 @@ class Decoder:
         self._anchor_index = 0
         self._index = 0  # of the next plane
         self._lost_from = 0
+        self._rows = np.zeros((_RUN, slots.ROW), dtype=np.int32)
+        self._rows_layout: Layout | None = None
+        self._skips = np.zeros(_RUN, dtype=np.int64)
+        self._borders = np.zeros(_RUN + 1, dtype=np.int64)
         self._begin_object()
 
     # ---- what users call
@@ -320,10 +325,16 @@ class Decoder:
             symbols, decoded = np.zeros_like(order), np.zeros_like(order)
             flags = np.zeros(3, dtype=np.int64)
             status, place = plane.decode_values(
-                reader.data, reader.bit, reader.end, order, segments, False, models.i_minimum, models.i_size,
-                models.usual, models.total, models.below_usual, models.added, models.tree, models.step,
-                models.lowest, models.highest, models.last, symbols, decoded, flags,
-            )  # fmt: skip
+                reader.data,
+                reader.bit,
+                reader.end,
+                Layout(order, segments),
+                models.intra,
+                False,
+                symbols,
+                decoded,
+                flags,
+            )
             self._check(status, place)
             reader.bit = place
             row[0, order] = decoded
@@ -363,25 +374,24 @@ class Decoder:
         face = self._settings[slots.FACE_BIT] if mask & slots.FACE_BIT else None
         body = self._settings[slots.BODY_BIT] if mask & slots.BODY_BIT else None
         if mask not in self._layouts:
-            self._layouts[mask] = slots.coding_order(face and face.mask, body and body.mask)
-            self._rows[:] = 0
-        elif mask != self._rows_mask:
-            self._rows[:] = 0
-        self._rows_mask = mask
-        order, segments = self._layouts[mask]
-        models = self._models
-        count, status, bit, place = plane.decode_run(
-            self._buffer.data, self._bit, end, mask, order, segments, models.minimum, models.size,
-            models.usual, models.total, models.below_usual, models.added, models.tree, models.step,
-            models.lowest, models.highest, models.last, self._rows, self._skips, self._borders,
+            self._layouts[mask] = Layout(
+                *slots.coding_order(
+                    face.mask if face is not None else None, body.mask if body is not None else None
+                )
+            )
+        layout = self._layouts[mask]
+        if self._rows_layout is not layout:
+            self._rows_layout = layout
+            self._rows[:] = 0  # what this layout does not code stays 0
+        count, status, _, place = plane.decode_run(
+            self._buffer.data, self._bit, end, mask, layout, self._models.predicted,
+            self._rows, self._skips, self._borders,
         )  # fmt: skip
         if count == 0:
             self._check(status, place)
-        if count == 0:
             return []
         settings = PlaneSettings(intra=False, face=face, body=body, start_code=self._start_code_seen)
         block = self._block(self._rows[:count], self._borders[: count + 1], self._skips[:count], settings)
-        self._bit = bit
         return [block]
 
     def _block(
@@ -460,11 +470,8 @@ class Decoder:
     def _begin_object(self) -> None:
         self._models = Models(self._bap_steps)
         self._settings: dict[int, PartSettings] = {}
-        self._layouts: dict[int, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = {}
-        self._rows = np.zeros((_RUN, slots.ROW), dtype=np.int32)
-        self._rows_mask = 0
-        self._skips = np.zeros(_RUN, dtype=np.int64)
-        self._borders = np.zeros(_RUN + 1, dtype=np.int64)
+        self._layouts: dict[int, Layout] = {}
+        self._rows_layout = None
         self._start_code_seen = False
 
     def _end_object(self, code: int) -> None:

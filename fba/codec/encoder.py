@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack, Frame
-from fba.codec import planner, slots
-from fba.codec.plane import SKIP_MAX
+from fba.codec import planner, quantiser, slots
+from fba.codec.plane import SKIP_MAX, quantise
 from fba.codec.plane_writer import DoesNotFitError, PlaneWriter
 from fba.codec.planner import EncoderOptions, Ranges
 from fba.codec.settings import PartSettings, PlaneSettings, RangeLists
@@ -49,7 +50,7 @@ class Encoder:
         self.statistics = EncoderStatistics()
         self._writer = PlaneWriter(self.options.bap_steps)
         self._ranges = dict(ranges or {})
-        self._stale = {part: True for part in _PARTS}  # ranges that the reader does not know yet
+        self._stale = dict.fromkeys(_PARTS, True)  # ranges that the reader does not know yet
         self._held: Animation | None = None
         self._rate: Fraction | None = None
         self._last_intra = 0  # index of the last I plane
@@ -74,7 +75,7 @@ class Encoder:
         if self._held is not None:
             if animation.index[0] <= self._held.index[0]:
                 raise ValueError(
-                    f"frame index {animation.index[0]} comes after {self._held.index[0]}; indices must increase"
+                    f"frame index {animation.index[0]} comes after {self._held.index[0]}; they must increase"
                 )
             frames = _followed(self._held, animation)
         self._check_skips(frames)
@@ -128,15 +129,9 @@ class Encoder:
     ) -> None:
         """Encode frames start..stop, which all send the same."""
         masks = _masks(frames, start)
-        if self.statistics.planes == 0:
-            # The first plane carries every track there is, even where it sends nothing yet.
-            present = [
-                p for p, track in zip(_PARTS, (frames.face, frames.body), strict=True) if track is not None
-            ]
-        else:
-            present = [part for part in _PARTS if masks[part] is not None and masks[part].any()]
-        if not present:
-            present = [slots.FACE_BIT if frames.face is not None else slots.BODY_BIT]
+        # The first plane carries every track there is, even where it sends nothing yet.
+        first = self.statistics.planes == 0
+        present = [part for part, mask in masks.items() if first or mask.any()] or [min(masks)]
         same = all(
             (force := self._writer.mask_in_force(part)) is not None and np.array_equal(force, masks[part])
             for part in present
@@ -176,7 +171,7 @@ class Encoder:
         frames: Animation,
         position: int,
         present: list[int],
-        masks: dict[int, slots.Bool | None],
+        masks: dict[int, slots.Bool],
         rows: slots.Int32,
         skip: int,
     ) -> None:
@@ -185,7 +180,7 @@ class Encoder:
             self._writer.begin_object()
         index = int(frames.index[position])
         row = rows[position]
-        settings = {part: self._part_settings(part, masks[part], row, position, first) for part in present}
+        settings = {part: self._part_settings(part, masks[part], row, position) for part in present}
         plane = PlaneSettings(
             intra=True,
             face=settings.get(slots.FACE_BIT),
@@ -200,24 +195,21 @@ class Encoder:
         self.statistics.intra_planes += 1
         self._last_intra = index
 
-    def _part_settings(
-        self, part: int, mask: slots.Bool | None, row: slots.Int32, position: int, first: bool
-    ) -> PartSettings:
+    def _part_settings(self, part: int, mask: slots.Bool, row: slots.Int32, position: int) -> PartSettings:
         """Settings for an I plane, with ranges that hold its values. Raises RangeError where none do."""
         options = self.options
         if part not in self._ranges:
             self._ranges[part] = Ranges(part, options.quant(part))
             self._ranges[part].start_from_tables()
         ranges = self._ranges[part]
-        assert mask is not None
         force = self._writer.mask_in_force(part)
         new_mask = force is None or not np.array_equal(force, mask)
         place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
         order = np.flatnonzero(mask[2:] if part == slots.FACE_BIT else mask) + place.start
-        step = planner.quantiser.steps(part, options.quant(part), options.bap_steps)
+        step = quantiser.steps(part, options.quant(part), options.bap_steps)
         base = 0 if part == slots.FACE_BIT else place.start
         for slot in order.tolist():
-            level = planner.plane.quantise(int(row[slot]), int(step[slot - base]))
+            level = quantise(int(row[slot]), int(step[slot - base]))
             if not ranges.fits(level) and not options.clamp:
                 raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
             before = ranges.codes.copy() if level else None
@@ -250,18 +242,16 @@ def encode_with_statistics(
     """Like `encode`, and what the encoder counted."""
     options = options or EncoderOptions()
     encoder = Encoder(options, ranges=planner.fitting_ranges(animation, options))
-    chunks = []
-    for start in range(0, len(animation), _CHUNK):
-        chunks.append(encoder.push_animation(animation[start : start + _CHUNK]))
+    starts = range(0, len(animation), _CHUNK)
+    chunks = [encoder.push_animation(animation[start : start + _CHUNK]) for start in starts]
     chunks.append(encoder.finish())
     return b"".join(chunks), encoder.statistics
 
 
-def _masks(frames: Animation, position: int) -> dict[int, slots.Bool | None]:
-    return {
-        slots.FACE_BIT: frames.face.mask[position] if frames.face is not None else None,
-        slots.BODY_BIT: frames.body.mask[position] if frames.body is not None else None,
-    }
+def _masks(frames: Animation, position: int) -> dict[int, slots.Bool]:
+    """What a frame sends, by part; a part without a track is missing."""
+    tracks = ((slots.FACE_BIT, frames.face), (slots.BODY_BIT, frames.body))
+    return {part: track.mask[position] for part, track in tracks if track is not None}
 
 
 def _runs(frames: Animation, count: int) -> list[tuple[int, int]]:
@@ -271,7 +261,7 @@ def _runs(frames: Animation, count: int) -> list[tuple[int, int]]:
         if track is not None:
             changes[1:] |= (track.mask[1:count] != track.mask[: count - 1]).any(axis=1)
     borders = [0, *np.flatnonzero(changes).tolist(), count]
-    return list(zip(borders[:-1], borders[1:], strict=True))
+    return list(pairwise(borders))
 
 
 def _followed(first: Animation, second: Animation) -> Animation:

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.codec import quantiser, slots
-from fba.codec.arithmetic import STRIDE
+from fba.codec.arithmetic import STRIDE, Counts
+from fba.codec.plane import Coding
 from fba.codec.settings import RANGE_UNIT, PartSettings
 from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, baps, faps
 
@@ -31,6 +32,7 @@ class Models:
     `i_minimum`, `i_size`, `minimum`, `size`: smallest level and number of symbols, for I and P planes.
     `step`, `last`: quantiser step and last value. `usual`, `total`, `below_usual`, `added`, `tree`:
     the adaptive models of P planes (see `arithmetic`). `lowest`, `highest`: what a value may be.
+    `intra` and `predicted` bundle them for the compiled loops.
     """
 
     def __init__(self, bap_table: str = "iso") -> None:
@@ -54,6 +56,11 @@ class Models:
         self.highest[list(_AMOUNTS)] = 2 * INTENSITY_MAX
         self.lowest[list(_SELECTS)] = 0
         self.highest[list(_SELECTS)] = _SELECT_LIMITS[list(_SELECTS)]
+
+        shared = (self.usual, self.total, self.below_usual, self.added, self.tree)
+        value = (self.step, self.lowest, self.highest, self.last)
+        self.intra = Coding(self.i_minimum, *value, Counts(self.i_size, *shared))
+        self.predicted = Coding(self.minimum, *value, Counts(self.size, *shared))
 
     def begin_intra(self, part: int, settings: PartSettings) -> None:
         """Put the settings of an I plane in force for a part: new ranges, steps and fresh models."""

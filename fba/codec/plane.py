@@ -7,11 +7,13 @@ runs of them are coded without returning to Python. I planes bring new settings:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 from fba.codec import arithmetic
-from fba.codec.arithmetic import OK, OUT_OF_DATA, decode_segment, encode_segment, learn
+from fba.codec.arithmetic import OK, OUT_OF_DATA, Counts, decode_segment, encode_segment, learn
 from fba.compiled import compiled
 
 # Why a run of planes ended; the first four are those of the arithmetic coder.
@@ -41,6 +43,25 @@ Int32 = npt.NDArray[np.int32]
 Int64 = npt.NDArray[np.int64]
 
 
+class Layout(NamedTuple):
+    """What a plane codes, and in which order: see `slots.coding_order`."""
+
+    order: Int64
+    segments: Int64
+
+
+class Coding(NamedTuple):
+    """How values become symbols, int64 (slots,) each: smallest level, quantiser step, what a parameter can
+    hold, its last value; and the models of the symbols."""
+
+    minimum: Int64
+    step: Int64
+    lowest: Int64
+    highest: Int64
+    last: Int64
+    models: Counts
+
+
 @compiled
 def read_bit(data: UInt8, bit: int) -> int:
     return (int(data[bit >> 3]) >> (7 - (bit & 7))) & 1
@@ -64,7 +85,7 @@ def find_start_code(data: UInt8, bit: int, end: int) -> tuple[int, int]:
         if aligned > end:  # `end` is a byte border
             return UNDECIDED, bit
         rest = int(data[bit >> 3]) & (255 >> here)
-        if rest != 0 and rest != (255 >> here) >> 1:  # noqa: PLR1714 - a set would not compile well
+        if rest != 0 and rest != (255 >> here) >> 1:
             return NO_START_CODE, bit
     for position in range(4):
         if aligned + 8 * position + 8 > end:
@@ -82,42 +103,29 @@ def decode_values(
     data: UInt8,
     bit: int,
     end: int,
-    order: Int64,
-    segments: Int64,
+    layout: Layout,
+    coding: Coding,
     adaptive: bool,
-    minimum: Int64,
-    size: Int64,
-    usual: Int64,
-    total: Int64,
-    below_usual: Int64,
-    added: UInt16,
-    tree: UInt16,
-    step: Int64,
-    lowest: Int64,
-    highest: Int64,
-    last: Int64,
     symbols: Int64,
     values: Int64,
     flags: Int64,
 ) -> tuple[int, int]:
     """Decode one plane's segments from `bit` on: (status, bit after them or of the damage).
 
-    order, segments: `slots.coding_order`. minimum, size ... tree: the models, those for P planes where
-    `adaptive`. step, lowest, highest, last: per slot, the quantiser step, what the parameter can hold,
-    and its last value. Writes symbols[k] and values[k] for slot order[k] and flags[0:3] (viseme_def,
-    init_face, expression_def); changes neither models nor `last`. OUT_OF_RANGE returns the slot
-    instead of a bit.
+    adaptive: a P plane, else an I plane. Writes symbols[k] and values[k] for slot layout.order[k], and
+    flags[0:3] (viseme_def, init_face, expression_def); changes neither models nor last values.
+    OUT_OF_RANGE returns the slot instead of a bit.
     """
     flags[:] = 0
     flag = 0
-    for segment in range(len(segments)):
-        first = int(segments[segment, 0])
-        stop = int(segments[segment, 1])
-        flag_count = int(segments[segment, 2])
+    order = layout.order
+    for segment in range(len(layout.segments)):
+        first = int(layout.segments[segment, 0])
+        stop = int(layout.segments[segment, 1])
+        flag_count = int(layout.segments[segment, 2])
         status, bit = decode_segment(
-            data, bit, end, order[first:stop], size, usual, total, below_usual, added, tree, adaptive,
-            symbols[first:stop],
-        )  # fmt: skip
+            data, bit, end, order[first:stop], coding.models, adaptive, symbols[first:stop]
+        )
         if status != OK:
             return status, bit
         if flag_count > 0:
@@ -130,10 +138,10 @@ def decode_values(
                 bit += 1
     for position in range(len(order)):
         slot = int(order[position])
-        value = (int(symbols[position]) + int(minimum[slot])) * int(step[slot])
+        value = (int(symbols[position]) + int(coding.minimum[slot])) * int(coding.step[slot])
         if adaptive:
-            value += int(last[slot])
-        if value < lowest[slot] or value > highest[slot]:
+            value += int(coding.last[slot])
+        if value < coding.lowest[slot] or value > coding.highest[slot]:
             return OUT_OF_RANGE, slot
         values[position] = value
     return OK, bit
@@ -145,19 +153,8 @@ def decode_run(
     bit: int,
     end: int,
     object_mask: int,
-    order: Int64,
-    segments: Int64,
-    minimum: Int64,
-    size: Int64,
-    usual: Int64,
-    total: Int64,
-    below_usual: Int64,
-    added: UInt16,
-    tree: UInt16,
-    step: Int64,
-    lowest: Int64,
-    highest: Int64,
-    last: Int64,
+    layout: Layout,
+    coding: Coding,
     rows: Int32,
     skips: Int64,
     borders: Int64,
@@ -169,6 +166,7 @@ def decode_run(
     it ended; place: the bit (or slot) that a failed plane failed at. A plane that fails leaves models
     and `last` as they were.
     """
+    order = layout.order
     symbols = np.zeros(len(order), np.int64)
     values = np.zeros(len(order), np.int64)
     flags = np.zeros(3, np.int64)
@@ -201,16 +199,13 @@ def decode_run(
                 skip += word
                 if skip > SKIP_MAX:
                     return count, SKIP_TOO_LONG, bit, place - 4
-        status, place = decode_values(
-            data, place, end, order, segments, True, minimum, size, usual, total, below_usual, added, tree,
-            step, lowest, highest, last, symbols, values, flags,
-        )  # fmt: skip
+        status, place = decode_values(data, place, end, layout, coding, True, symbols, values, flags)
         if status != OK:
             return count, status, bit, place
-        learn(order, symbols, size, usual, total, below_usual, added, tree)
+        learn(order, symbols, coding.models)
         for position in range(len(order)):
             slot = int(order[position])
-            last[slot] = values[position]
+            coding.last[slot] = values[position]
             rows[count, slot] = values[position]
         for flag in range(3):
             rows[count, 369 + flag] = flags[flag]
@@ -223,7 +218,7 @@ def decode_run(
 
 @compiled
 def quantise(value: int, step: int) -> int:
-    """Level of a value: to the nearest multiple of the step, halves away from zero, |value| <= step // 2 to 0."""
+    """Level of a value: the nearest multiple of the step, halves away from zero, but 0 up to step // 2."""
     if value < 0:
         return -quantise_size(-value, step)
     return quantise_size(value, step)
@@ -239,30 +234,24 @@ def quantise_size(size: int, step: int) -> int:
 def encode_values(
     data: UInt8,
     bit: int,
-    order: Int64,
-    segments: Int64,
+    layout: Layout,
+    coding: Coding,
     adaptive: bool,
-    size: Int64,
-    usual: Int64,
-    total: Int64,
-    below_usual: Int64,
-    added: UInt16,
-    tree: UInt16,
     symbols: Int64,
     flags: Int64,
 ) -> int:
-    """Encode one plane's segments (symbols[k] for slot order[k]; flags as decoded) at `bit`; the bit after.
+    """Encode one plane's segments (symbols[k] for slot layout.order[k]; flags as decoded) at `bit`; the bit
+    after them.
 
     data: zeroed from `bit` on, with room for 16 bits a symbol and 20 a segment.
     """
-    for segment in range(len(segments)):
-        first = int(segments[segment, 0])
-        stop = int(segments[segment, 1])
-        flag_count = int(segments[segment, 2])
+    for segment in range(len(layout.segments)):
+        first = int(layout.segments[segment, 0])
+        stop = int(layout.segments[segment, 1])
+        flag_count = int(layout.segments[segment, 2])
         bit = encode_segment(
-            data, bit, order[first:stop], size, usual, total, below_usual, added, tree, adaptive,
-            symbols[first:stop],
-        )  # fmt: skip
+            data, bit, layout.order[first:stop], coding.models, adaptive, symbols[first:stop]
+        )
         flag = 0 if flag_count == 1 else 1
         for _ in range(flag_count):
             if flags[flag]:
@@ -273,21 +262,21 @@ def encode_values(
 
 
 @compiled
+def _write_nibble(data: UInt8, bit: int, value: int) -> int:
+    for shift in range(3, -1, -1):
+        if (value >> shift) & 1:
+            data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+        bit += 1
+    return bit
+
+
+@compiled
 def encode_run(
     data: UInt8,
     bit: int,
     object_mask: int,
-    order: Int64,
-    segments: Int64,
-    minimum: Int64,
-    size: Int64,
-    usual: Int64,
-    total: Int64,
-    below_usual: Int64,
-    added: UInt16,
-    tree: UInt16,
-    step: Int64,
-    last: Int64,
+    layout: Layout,
+    coding: Coding,
     rows: Int32,
     skips: Int64,
     borders: Int64,
@@ -298,38 +287,31 @@ def encode_run(
     plane was written. OUT_OF_DATA: `data` has no room for another. borders: first bit of each, and the
     bit after the last.
     """
+    order, minimum, step, last = layout.order, coding.minimum, coding.step, coding.last
     symbols = np.zeros(len(order), np.int64)
     flags = np.zeros(3, np.int64)
     room = 8 * len(data)
     borders[0] = bit
     for count in range(len(rows)):
         skip = int(skips[count])
-        if bit + 64 + 4 * (skip // 15) + 20 * len(segments) + 17 * len(order) > room:
+        if bit + 64 + 4 * (skip // 15) + 20 * len(layout.segments) + 17 * len(order) > room:
             return count, OUT_OF_DATA, bit, -1
         for position in range(len(order)):
             slot = int(order[position])
             symbol = quantise(int(rows[count, slot]) - int(last[slot]), int(step[slot])) - int(minimum[slot])
-            if symbol < 0 or symbol >= size[slot]:
+            if symbol < 0 or symbol >= coding.models.size[slot]:
                 return count, OUT_OF_RANGE, bit, slot
             symbols[position] = symbol
         for flag in range(3):
             flags[flag] = rows[count, 369 + flag]
         header = 2 * object_mask + (1 if skip > 0 else 0)  # is_intra 0, fba_object_mask, skip_frames
-        for shift in range(3, -1, -1):
-            if (header >> shift) & 1:
-                data[bit >> 3] |= np.uint8(128 >> (bit & 7))
-            bit += 1
+        bit = _write_nibble(data, bit, header)
         while skip >= 0 and header & 1:
             word = min(skip, 15)
-            for shift in range(3, -1, -1):
-                if (word >> shift) & 1:
-                    data[bit >> 3] |= np.uint8(128 >> (bit & 7))
-                bit += 1
+            bit = _write_nibble(data, bit, word)
             skip = skip - 15 if word == 15 else -1
-        bit = encode_values(
-            data, bit, order, segments, True, size, usual, total, below_usual, added, tree, symbols, flags
-        )
-        learn(order, symbols, size, usual, total, below_usual, added, tree)
+        bit = encode_values(data, bit, layout, coding, True, symbols, flags)
+        learn(order, symbols, coding.models)
         for position in range(len(order)):
             slot = int(order[position])
             last[slot] += (int(symbols[position]) + int(minimum[slot])) * int(step[slot])

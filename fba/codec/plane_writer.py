@@ -9,6 +9,7 @@ from fba.codec import plane, slots, syntax
 from fba.codec.arithmetic import OUT_OF_DATA
 from fba.codec.bits import BitWriter
 from fba.codec.models import Models
+from fba.codec.plane import Layout
 from fba.codec.settings import PartSettings, PlaneSettings
 
 Int64 = npt.NDArray[np.int64]
@@ -38,7 +39,7 @@ class PlaneWriter:
         self._writer = BitWriter()
         self._taken = 0
         self._settings: dict[int, PartSettings] = {}
-        self._layouts: dict[int, tuple[Int64, Int64]] = {}
+        self._layouts: dict[int, Layout] = {}
 
     @property
     def bits(self) -> int:
@@ -110,10 +111,10 @@ class PlaneWriter:
         for part, one, order, segments, levels in plan:
             syntax.write_part(writer, part, one)
             writer.reserve(17 * len(order) + _SEGMENT_BITS * len(segments))
+            symbols = levels - models.i_minimum[order]
             writer.bit = plane.encode_values(
-                writer.data, writer.bit, order, segments, False, models.i_size, models.usual, models.total,
-                models.below_usual, models.added, models.tree, levels - models.i_minimum[order], flags,
-            )  # fmt: skip
+                writer.data, writer.bit, Layout(order, segments), models.intra, False, symbols, flags
+            )
             models.last[order] = levels * models.step[order]
             self._settings[part] = one
         self._layouts.clear()
@@ -129,8 +130,8 @@ class PlaneWriter:
         if mask not in self._layouts:
             face = self._settings[slots.FACE_BIT].mask if mask & slots.FACE_BIT else None
             body = self._settings[slots.BODY_BIT].mask if mask & slots.BODY_BIT else None
-            self._layouts[mask] = slots.coding_order(face, body)
-        order, segments = self._layouts[mask]
+            self._layouts[mask] = Layout(*slots.coding_order(face, body))
+        layout = self._layouts[mask]
         models, writer = self.models, self._writer
         if borders is None:
             borders = np.zeros(len(rows) + 1, dtype=np.int64)
@@ -138,10 +139,15 @@ class PlaneWriter:
         while done < len(rows):
             offset = 8 * self._taken
             count, status, bit, slot = plane.encode_run(
-                writer.data, writer.bit, mask, order, segments, models.minimum, models.size, models.usual,
-                models.total, models.below_usual, models.added, models.tree, models.step, models.last,
-                rows[done:], skips[done:], borders[done:],
-            )  # fmt: skip
+                writer.data,
+                writer.bit,
+                mask,
+                layout,
+                models.predicted,
+                rows[done:],
+                skips[done:],
+                borders[done:],
+            )
             borders[done : done + count + 1] += offset
             writer.bit = bit
             done += count
@@ -150,7 +156,12 @@ class PlaneWriter:
                 difference = int(rows[done, slot]) - int(models.last[slot])
                 raise DoesNotFitError(slot, plane.quantise(difference, int(models.step[slot])), done)
             if status == OUT_OF_DATA:
-                need = 64 + 4 * (int(skips[done]) // 15) + _SEGMENT_BITS * len(segments) + 17 * len(order)
+                need = (
+                    64
+                    + 4 * (int(skips[done]) // 15)
+                    + _SEGMENT_BITS * len(layout.segments)
+                    + 17 * len(layout.order)
+                )
                 writer.reserve(max(need, 8 * len(writer.data)))
 
     def _start_code(self, code: int) -> None:

@@ -23,7 +23,7 @@ from fba.codec.settings import (
 )
 from fba.compiled import compiled
 from fba.errors import FbaWarning, RangeError
-from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, baps, faps
+from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, Bap, Fap, baps, faps
 
 PRESETS = ("reference",)
 _HOURS = 32
@@ -80,7 +80,10 @@ class EncoderOptions:
 
 
 class Ranges:
-    """Range codes of a part that grow with the data: uint8 (4, 68) or (4, 296), I max, I min, P max, P min."""
+    """Range codes of a part that grow with the data.
+
+    codes: uint8 (4, 68) or (4, 296); I max, I min, P max, P min.
+    """
 
     def __init__(self, part: int, quant: int) -> None:
         self._part = part
@@ -90,7 +93,8 @@ class Ranges:
 
     def start_from_tables(self) -> None:
         """The standard's own limits: where to begin when the data is not known yet."""
-        for column, one in enumerate(faps() if self._part == slots.FACE_BIT else baps()):
+        table: tuple[Fap | Bap, ...] = faps() if self._part == slots.FACE_BIT else baps()
+        for column, one in enumerate(table):
             if one.i_limits is not None and one.p_limits is not None:
                 limits = (one.i_limits[1], -one.i_limits[0], one.p_limits[1], -one.p_limits[0])
                 self.codes[:, column] = [-(-limit // RANGE_UNIT) for limit in limits]

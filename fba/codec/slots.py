@@ -56,9 +56,7 @@ def label(slot: int) -> str:
     return baps()[slot - BAPS.start].label
 
 
-def coding_order(
-    face_mask: Bool | None, body_mask: Bool | None
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def coding_order(face_mask: Bool | None, body_mask: Bool | None) -> tuple[Int64, Int64]:
     """What a plane codes: (order int64 (K,), segments int64 (S, 3)).
 
     order: slots in coding order. segments: one row for each arithmetic segment: position in `order` of

@@ -16,8 +16,6 @@ Reading and writing stand side by side, element by element. A plane is::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from fba.codec import slots
@@ -142,7 +140,7 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
                         writer.write(int(codes[number - 1]), 5)
 
 
-def _listed(part: int) -> Sequence[Sequence[int]]:
+def _listed(part: int) -> tuple[tuple[int, ...], ...]:
     """Groups whose parameters have ranges: FAP 1 and 2 have none."""
     return groups(part)[1:] if part == slots.FACE_BIT else groups(part)
 

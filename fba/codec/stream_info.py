@@ -1,0 +1,205 @@
+"""What a stream is, without keeping its values: `probe_stream`, and the `StreamInfo` it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.codec import syntax
+from fba.codec.decoder import Block, Damage, Decoder
+from fba.codec.settings import PartSettings
+from fba.errors import BitstreamError
+
+_CHUNK = 1 << 16
+_MASK_NAMES = {
+    syntax.MASK_NONE: "none",
+    syntax.MASK_KEEP: "keep",
+    syntax.MASK_INTERPOLATE: "interpolate",
+    syntax.MASK_ALL: "all",
+}
+
+
+@dataclass(frozen=True)
+class PartInfo:
+    """The FAPs or the BAPs of a stream.
+
+    parameters: numbers of those ever sent, ascending. frames: frames that carry the part. For FBA
+    streams also quants (all fap_quant or bap_quant values used), mask_types (names of those used) and
+    genders (suggested_gender values).
+    """
+
+    parameters: tuple[int, ...]
+    frames: int
+    quants: tuple[int, ...] = ()
+    mask_types: tuple[str, ...] = ()
+    genders: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class StreamInfo:
+    """What `fba info` prints.
+
+    format: name of the file format, "fba" for streams. size: bytes. rate: frames a second. frames:
+    frames (planes). duration, start: seconds, exact; duration runs from the first frame to one period
+    after the last. skipped: frames left out between frames. bits_per_second: size over duration.
+
+    For FBA streams: intra_planes, start_codes (planes with one before them), plane_bits int64 (T,) and
+    plane_intra bool (T,), frame_index int64 (T,), and the damage that was stepped over.
+    """
+
+    format: str
+    size: int
+    rate: Fraction
+    frames: int
+    duration: Fraction
+    start: Fraction
+    skipped: int
+    face: PartInfo | None
+    body: PartInfo | None
+    intra_planes: int | None = None
+    start_codes: int | None = None
+    plane_bits: npt.NDArray[np.int64] | None = field(default=None, repr=False)
+    plane_intra: npt.NDArray[np.bool_] | None = field(default=None, repr=False)
+    frame_index: npt.NDArray[np.int64] | None = field(default=None, repr=False)
+    damage: tuple[Damage, ...] = ()
+
+    @property
+    def bits_per_second(self) -> float:
+        return float(8 * self.size / self.duration) if self.duration else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and strings, for JSON."""
+
+        def part(info: PartInfo | None) -> dict[str, Any] | None:
+            if info is None:
+                return None
+            return {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(info).items()}
+
+        return {
+            "format": self.format,
+            "size": self.size,
+            "rate": str(self.rate),
+            "frames_per_second": float(self.rate),
+            "frames": self.frames,
+            "duration": float(self.duration),
+            "start": float(self.start),
+            "skipped": self.skipped,
+            "bits_per_second": round(self.bits_per_second, 3),
+            "face": part(self.face),
+            "body": part(self.body),
+            "intra_planes": self.intra_planes,
+            "start_codes": self.start_codes,
+            "damage": [{"start": d.start, "stop": d.stop, "error": str(d.error)} for d in self.damage],
+        }
+
+    @classmethod
+    def of_animation(cls, animation: Animation, format: str, size: int) -> StreamInfo:
+        """What a file of another format holds, from the animation that was read from it."""
+        parts: list[PartInfo | None] = []
+        for track in (animation.face, animation.body):
+            if track is None:
+                parts.append(None)
+                continue
+            sent = np.flatnonzero(track.mask.any(axis=0)) + 1
+            parts.append(PartInfo(tuple(sent.tolist()), int(track.mask.any(axis=1).sum())))
+        frames = len(animation)
+        first, last = (int(animation.index[0]), int(animation.index[-1])) if frames else (0, -1)
+        return cls(
+            format=format,
+            size=size,
+            rate=animation.rate,
+            frames=frames,
+            duration=animation.duration,
+            start=Fraction(first) / animation.rate,
+            skipped=last - first + 1 - frames,
+            face=parts[0],
+            body=parts[1],
+        )
+
+
+class _PartCount:
+    """Gathers a `PartInfo`."""
+
+    def __init__(self) -> None:
+        self.settings: dict[int, PartSettings] = {}
+        self.frames = 0
+
+    def add(self, settings: PartSettings | None, frames: int) -> None:
+        if settings is not None:
+            self.settings[id(settings)] = settings
+            self.frames += frames
+
+    def info(self) -> PartInfo | None:
+        if not self.settings:
+            return None
+        used = list(self.settings.values())
+        sent = np.logical_or.reduce([one.mask for one in used])
+        kinds = sorted({kind for one in used for kind in one.mask_types})
+        return PartInfo(
+            tuple((np.flatnonzero(sent) + 1).tolist()),
+            self.frames,
+            tuple(sorted({one.quant for one in used})),
+            tuple(_MASK_NAMES[kind] for kind in kinds),
+            tuple(sorted({one.gender for one in used})),
+        )
+
+
+def probe_stream(data: bytes | bytearray | memoryview, *, bap_steps: str = "iso") -> StreamInfo:
+    """What an FBA stream is: its planes, rates, parameters, bits.
+
+    Decodes it, since nothing but the arithmetic decoder knows where a plane ends, but keeps no values.
+    Steps over damage and lists it. Raises BitstreamError where no plane can be decoded at all.
+    """
+    decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
+    face, body = _PartCount(), _PartCount()
+    bits: list[npt.NDArray[np.int64]] = []
+    intra: list[npt.NDArray[np.bool_]] = []
+    index: list[npt.NDArray[np.int64]] = []
+    start_codes = 0
+    first: Block | None = None
+    block: Block | None = None
+    for block in _blocks(decoder, memoryview(data)):
+        first = first or block
+        count = len(block.index)
+        face.add(block.settings.face, count)
+        body.add(block.settings.body, count)
+        bits.append(np.diff(block.borders))
+        intra.append(np.full(count, block.settings.intra))
+        index.append(block.index)
+        start_codes += block.settings.start_code
+    if first is None or block is None:
+        if decoder.damage:
+            raise decoder.damage[0].error
+        raise BitstreamError("the object has no plane", plane=0, bit=32)
+    all_index = np.concatenate(index)
+    end = block.start + Fraction(int(block.index[-1] - block.index[0]) + 1) / block.rate
+    all_intra = np.concatenate(intra)
+    return StreamInfo(
+        format="fba",
+        size=len(data),
+        rate=first.rate,
+        frames=len(all_index),
+        duration=end - first.start,
+        start=first.start,
+        skipped=int(all_index[-1] - all_index[0]) + 1 - len(all_index),
+        face=face.info(),
+        body=body.info(),
+        intra_planes=int(all_intra.sum()),
+        start_codes=start_codes,
+        plane_bits=np.concatenate(bits),
+        plane_intra=all_intra,
+        frame_index=all_index,
+        damage=tuple(decoder.damage),
+    )
+
+
+def _blocks(decoder: Decoder, data: memoryview) -> Iterator[Block]:
+    for start in range(0, len(data), _CHUNK):
+        yield from decoder.push_blocks(data[start : start + _CHUNK])
+    yield from decoder.finish_blocks()
