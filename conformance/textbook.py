@@ -126,8 +126,9 @@ def decode_segment(
 ) -> Segment:
     """Read one symbol per table from bit `start` of data; with `learn`, the tables count them.
 
-    Raises BitstreamError, with `name` and `plane` in it, where the data ends inside the segment or a
-    run of 22 zeros is not followed by a 1.
+    Raises BitstreamError, with `name` and `plane` in it, where the data ends inside the segment, a run
+    of 22 zeros is not followed by a 1, or the segment does not close as a coder closes it: that finds
+    much of the damage that would otherwise turn into wrong values.
     """
     source = _GuardedBits(data, start)
     low, high, code = 0, TOP, 0
@@ -169,6 +170,13 @@ def decode_segment(
             "the stream is cut or damaged",
             plane=plane,
             bit=len(data) * 8,
+        )
+    if code // QUARTER != (1 if low < QUARTER else 2):
+        raise BitstreamError(
+            f"{name}: starts at bit {start} and does not end with the bits that a coder flushes; "
+            "the stream is damaged here or before",
+            plane=plane,
+            bit=end - FLUSH_BITS,
         )
     inserted = sum(1 for before in source.insertions if before < used)
     return Segment(tuple(symbols), end - start, inserted)
