@@ -1,0 +1,114 @@
+"""The camera: an orbit about a target, with the standard views of a face and a body."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+
+PRESETS = {
+    "front": (0.0, 0.0),
+    "three-quarter": (35.0, 5.0),
+    "profile": (90.0, 0.0),
+    "body": (25.0, 8.0),
+}
+"""Yaw (to the subject's left) and pitch (from above) of the named views, degrees."""
+PITCH_LIMIT = 89.0
+DISTANCES = (0.05, 100.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What a camera is fitted to: centre (x, y, z) and half the height and width to be seen, metres."""
+
+    centre: tuple[float, float, float]
+    half_height: float
+    half_width: float
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """An orbiting camera.
+
+    target: the point looked at. yaw, pitch: degrees; 0, 0 looks at the subject's face from the front, a
+    positive yaw goes to the subject's left, a positive pitch above. distance: metres from the target.
+    field_of_view: vertical, degrees. Immutable; `orbit`, `zoom`, `pan` give the moved one.
+    """
+
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw: float = 0.0
+    pitch: float = 0.0
+    distance: float = 1.0
+    field_of_view: float = 24.0
+
+    @classmethod
+    def preset(cls, name: str, subject: Subject, aspect: float = 16 / 9) -> Camera:
+        """A named view ("front", "three-quarter", "profile", "body") that fits the subject.
+
+        aspect: width / height of the picture. Raises ValueError on another name.
+        """
+        if name not in PRESETS:
+            raise ValueError(f"no camera preset {name!r}; there are {', '.join(PRESETS)}")
+        yaw, pitch = PRESETS[name]
+        return cls(yaw=yaw, pitch=pitch).fit(subject, aspect)
+
+    def fit(self, subject: Subject, aspect: float) -> Camera:
+        """The same direction, moved so that the subject fills the picture."""
+        half = max(subject.half_height, subject.half_width / max(aspect, 1e-3))
+        distance = half / math.tan(math.radians(self.field_of_view) / 2)
+        return replace(self, target=subject.centre, distance=_clamped(distance, DISTANCES))
+
+    def orbit(self, yaw: float, pitch: float) -> Camera:
+        """Turned about the target by degrees."""
+        turned = (self.yaw + yaw + 180.0) % 360.0 - 180.0
+        return replace(self, yaw=turned, pitch=_clamped(self.pitch + pitch, (-PITCH_LIMIT, PITCH_LIMIT)))
+
+    def zoom(self, factor: float) -> Camera:
+        """Distance times factor: below 1 comes nearer."""
+        return replace(self, distance=_clamped(self.distance * factor, DISTANCES))
+
+    def pan(self, right: float, up: float) -> Camera:
+        """Target and camera moved across the view, in fractions of the picture's height."""
+        size = 2 * self.distance * math.tan(math.radians(self.field_of_view) / 2)
+        axes = self._axes()
+        moved = np.array(self.target) + (axes[0] * right + axes[1] * up) * size
+        return replace(self, target=(float(moved[0]), float(moved[1]), float(moved[2])))
+
+    @property
+    def eye(self) -> Float64:
+        """(3,) where the camera stands."""
+        place: Float64 = np.array(self.target) + self._axes()[2] * self.distance
+        return place
+
+    def view_matrix(self) -> Float64:
+        """(4, 4) world to camera."""
+        axes = self._axes()
+        matrix = np.eye(4)
+        matrix[:3, :3] = axes
+        matrix[:3, 3] = -axes @ self.eye
+        return matrix
+
+    def projection_matrix(self, aspect: float) -> Float64:
+        """(4, 4) camera to clip space, OpenGL's convention."""
+        near, far = self.distance * 0.05, self.distance * 4 + 60.0
+        scale = 1 / math.tan(math.radians(self.field_of_view) / 2)
+        matrix = np.zeros((4, 4))
+        matrix[0, 0], matrix[1, 1] = scale / max(aspect, 1e-3), scale
+        matrix[2, 2], matrix[2, 3] = (far + near) / (near - far), 2 * far * near / (near - far)
+        matrix[3, 2] = -1.0
+        return matrix
+
+    def _axes(self) -> Float64:
+        """Rows: right, up and backward of the camera, in the world."""
+        yaw, pitch = math.radians(self.yaw), math.radians(self.pitch)
+        back = np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
+        right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+        return np.stack([right, np.cross(back, right), back])
+
+
+def _clamped(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])

@@ -1,0 +1,5 @@
+"""The player's built-in head."""
+
+from player.head.head import Head
+
+__all__ = ["Head"]

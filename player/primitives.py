@@ -1,0 +1,46 @@
+"""Small meshes that the renderer draws many times."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float32 = npt.NDArray[np.float32]
+Int32 = npt.NDArray[np.int32]
+
+
+def _sheet(rows: int, columns: int) -> Int32:
+    """Triangles of a closed band: rows x columns vertices, the last column joins the first."""
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    a, b = r * columns + c, r * columns + (c + 1) % columns
+    both = np.stack([a, b, b + columns, a, b + columns, a + columns], axis=-1)
+    return both.reshape(-1, 3).astype(np.int32)
+
+
+def capsule_mesh(around: int = 20, cap: int = 6) -> tuple[Float32, Int32]:
+    """(V, 4): place on the unit sphere (y along the axis) and which end it belongs to; (F, 3)."""
+    lower = np.linspace(-np.pi / 2, 0, cap + 1)
+    latitudes = np.concatenate([lower, -lower[::-1]])
+    ends = np.repeat([0.0, 1.0], cap + 1)
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    flat = np.cos(latitudes)[:, None]
+    x, z = flat * np.cos(turn), flat * np.sin(turn)
+    y = np.repeat(np.sin(latitudes)[:, None], around, axis=1)
+    end = np.repeat(ends[:, None], around, axis=1)
+    vertices = np.stack([x, y, z, end], axis=-1).reshape(-1, 4).astype(np.float32)
+    return vertices, _sheet(len(latitudes), around)
+
+
+def sphere_mesh(rows: int = 20, around: int = 32) -> tuple[Float32, Int32]:
+    """(V, 3) unit sphere with its pole along +z; (F, 3)."""
+    latitudes = np.linspace(0, np.pi, rows)
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    flat = np.sin(latitudes)[:, None]
+    x, y = flat * np.cos(turn), flat * np.sin(turn)
+    z = np.repeat(np.cos(latitudes)[:, None], around, axis=1)
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3).astype(np.float32), _sheet(rows, around)
+
+
+def tube_mesh(count: int, around: int = 8) -> Int32:
+    """Triangles of a tube of `count` rings of `around` vertices."""
+    return _sheet(count, around)

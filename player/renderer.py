@@ -1,0 +1,185 @@
+"""Draws a `View` with OpenGL 3.3 core: one program for meshes, one for capsules, one for eyes."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from player.camera import Camera
+from player.primitives import capsule_mesh, sphere_mesh
+from player.shapes import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
+
+MOST_BLOBS = 8
+MOST_SHAPES = 32
+"""Meshes remembered on the graphics card; the longest unused goes first."""
+
+
+class Renderer:
+    """Draws views into whatever framebuffer is bound.
+
+    context: a moderngl context (OpenGL 3.3 or later). The renderer owns what it allocates there;
+    `close` gives it back. Not thread-safe, as OpenGL is not.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._gl = context
+        self._programs = {name: self._program(name) for name in ("mesh", "capsule", "eye")}
+        self._programs["studio"] = self._program("studio")
+        corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
+        self._studio_buffer = context.buffer(corners.tobytes())
+        self._studio = context.vertex_array(self._programs["studio"], [(self._studio_buffer, "2f", "in_corner")])
+        self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
+        self._capsule_parts = self._uploaded(*capsule_mesh())
+        self._capsules = self._capsule_array()
+        self._eye_parts = self._uploaded(*sphere_mesh())
+        self._eye = context.vertex_array(
+            self._programs["eye"], [(self._eye_parts[0], "3f", "in_position")], index_buffer=self._eye_parts[1]
+        )
+        self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
+
+    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> None:
+        """Clear the bound framebuffer and draw the view; size: its width and height in pixels."""
+        gl = self._gl
+        aspect = size[0] / max(size[1], 1)
+        matrix = camera.projection_matrix(aspect) @ camera.view_matrix()
+        gl.viewport = (0, 0, *size)
+        gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
+        eye = tuple(float(v) for v in camera.eye)
+        for program in self._programs.values():
+            _set(program, "eye", eye)
+            _set(program, "camera", _bytes(matrix))
+        self._draw_studio(view, camera, matrix)
+        gl.enable_only(gl.DEPTH_TEST)
+        for mesh in view.meshes:
+            self._draw_mesh(mesh)
+        self._draw_capsules(view.capsules)
+        for ball in view.eyes:
+            self._draw_eye(ball)
+
+    def close(self) -> None:
+        """Free everything allocated on the graphics card."""
+        for _, parts in self._shapes.values():
+            for part in parts:
+                part.release()
+        self._shapes.clear()
+        for part in (
+            self._studio, self._studio_buffer, self._capsules, self._instances, *self._capsule_parts,
+            self._eye, *self._eye_parts, *self._programs.values(),
+        ):  # fmt: skip
+            part.release()
+
+    def _program(self, name: str) -> Any:
+        folder = files(__package__) / "shaders"
+        sources = {}
+        for stage, suffix in (("vertex_shader", "vert"), ("fragment_shader", "frag")):
+            file = folder / f"{name}.{suffix}"
+            if not file.is_file():
+                file = folder / f"mesh.{suffix}"
+            text = file.read_text(encoding="utf-8")
+            sources[stage] = text.replace(
+                "//include lighting.glsl", (folder / "lighting.glsl").read_text(encoding="utf-8")
+            )
+        return self._gl.program(**sources)
+
+    def _uploaded(self, vertices: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]) -> tuple[Any, Any]:
+        return self._gl.buffer(vertices.tobytes()), self._gl.buffer(triangles.tobytes())
+
+    def _capsule_array(self) -> Any:
+        return self._gl.vertex_array(
+            self._programs["capsule"],
+            [
+                (self._capsule_parts[0], "3f 1f", "in_sphere", "in_end"),
+                (self._instances, "4f 4f 4f 4f/i", "in_start", "in_finish", "in_front", "in_colour"),
+            ],
+            index_buffer=self._capsule_parts[1],
+        )
+
+    def _draw_studio(self, view: View, camera: Camera, matrix: npt.NDArray[np.float64]) -> None:
+        program = self._programs["studio"]
+        blobs = view.blobs[:MOST_BLOBS]
+        padded = np.zeros((MOST_BLOBS, 4), dtype="f4")
+        padded[: len(blobs)] = blobs
+        _set(program, "unproject", _bytes(np.linalg.inv(matrix)))
+        _set(program, "ground", 1.0 if view.ground else 0.0)
+        _set(program, "blob_count", len(blobs))
+        _set(program, "blobs", padded.tobytes())
+        at = padded[: len(blobs), :2].mean(axis=0) if len(blobs) else np.zeros(2)
+        _set(program, "centre", (float(at[0]), float(at[1])))
+        self._gl.enable_only(self._gl.NOTHING)
+        self._studio.render()
+
+    def _draw_mesh(self, mesh: Mesh) -> None:
+        positions, normals, array = self._shape_parts(mesh)
+        positions.orphan()
+        positions.write(np.ascontiguousarray(mesh.positions, dtype="f4"))
+        normals.orphan()
+        normals.write(np.ascontiguousarray(mesh.normals, dtype="f4"))
+        _set(self._programs["mesh"], "world", _bytes(mesh.matrix))
+        _set(self._programs["mesh"], "two_sided", 1.0 if mesh.shape.two_sided else 0.0)
+        array.render()
+
+    def _shape_parts(self, mesh: Mesh) -> tuple[Any, Any, Any]:
+        key = id(mesh.shape)
+        if key in self._shapes:
+            self._shapes[key] = self._shapes.pop(key)  # now the latest used
+        else:
+            while len(self._shapes) >= MOST_SHAPES:
+                for part in self._shapes.pop(next(iter(self._shapes)))[1]:
+                    part.release()
+            gl, shape = self._gl, mesh.shape
+            positions = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
+            normals = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
+            colours = gl.buffer(np.ascontiguousarray(shape.colours, dtype="f4").tobytes())
+            triangles = gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes())
+            array = gl.vertex_array(
+                self._programs["mesh"],
+                [
+                    (positions, "3f", "in_position"),
+                    (normals, "3f", "in_normal"),
+                    (colours, "4f", "in_colour"),
+                ],
+                index_buffer=triangles,
+            )
+            self._shapes[key] = (shape, [positions, normals, array, colours, triangles])
+        parts = self._shapes[key][1]
+        return parts[0], parts[1], parts[2]
+
+    def _draw_capsules(self, capsules: npt.NDArray[np.float32]) -> None:
+        if not len(capsules):
+            return
+        data = np.ascontiguousarray(capsules, dtype="f4")
+        if data.nbytes > self._instances.size:
+            self._capsules.release()
+            self._instances.release()
+            self._instances = self._gl.buffer(reserve=data.nbytes, dynamic=True)
+            self._capsules = self._capsule_array()
+        self._instances.orphan(max(self._instances.size, data.nbytes))
+        self._instances.write(data)
+        self._capsules.render(instances=len(data))
+
+    def _draw_eye(self, ball: Eye) -> None:
+        program = self._programs["eye"]
+        up = ball.up / max(float(np.linalg.norm(ball.up)), 1e-9)
+        _set(program, "world", _bytes(ball.matrix))
+        _set(program, "iris", ball.iris)
+        _set(program, "pupil", ball.pupil)
+        _set(program, "lid", ball.lid)
+        _set(program, "up", tuple(float(v) for v in up))
+        self._eye.render()
+
+
+def _set(program: Any, name: str, value: Any) -> None:
+    member = program.get(name, None)
+    if member is None:
+        return
+    if isinstance(value, bytes):
+        member.write(value)
+    else:
+        member.value = value
+
+
+def _bytes(matrix: npt.NDArray[np.float64]) -> bytes:
+    return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()

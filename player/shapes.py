@@ -1,0 +1,105 @@
+"""What a scene hands to a renderer: meshes, capsules and eyes in the world, at one moment.
+
+The seam between "what is shown" (`Scene`) and "how" (`Renderer`): a face mesh or a skinned body is one
+more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres; the ground is y = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+CAPSULE_FLOATS = 16
+"""A capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshShape:
+    """What does not change from frame to frame; keep the object, renderers remember it.
+
+    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light 0..1,
+    the fourth how glossy. two_sided: False where the inside is to look dark, as that of a mouth.
+    """
+
+    triangles: npt.NDArray[np.int32]
+    colours: Float32
+    two_sided: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A mesh in one pose: positions and normals float32 (V, 3), matrix (4, 4) into the world."""
+
+    shape: MeshShape
+    positions: Float32
+    normals: Float32
+    matrix: Float64
+
+
+@dataclass(frozen=True, eq=False)
+class Eye:
+    """An eyeball. matrix (4, 4): its frame (looking along +z, radius 1) into the world.
+
+    iris, pupil: their radii as fractions of the eyeball's. lid: height of the upper lid's margin above
+    the eyeball's centre, as a fraction of the radius, for its shadow. up (3,): the head's, in the world.
+    """
+
+    matrix: Float64
+    iris: float
+    pupil: float
+    lid: float
+    up: Float64
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Everything to be drawn at one moment.
+
+    capsules: float32 (N, 16), see `CAPSULE_FLOATS`. blobs: float32 (K, 4), soft shadows on the ground:
+    x, z, radius, darkness. ground: whether there is a ground.
+    """
+
+    meshes: list[Mesh] = field(default_factory=list)
+    capsules: Float32 = field(default_factory=lambda: np.zeros((0, CAPSULE_FLOATS), dtype=np.float32))
+    eyes: list[Eye] = field(default_factory=list)
+    blobs: Float32 = field(default_factory=lambda: np.zeros((0, 4), dtype=np.float32))
+    ground: bool = False
+
+
+class Normals:
+    """Vertex normals of one triangulation, for any positions."""
+
+    def __init__(self, triangles: npt.NDArray[np.int32], vertices: int) -> None:
+        from scipy.sparse import csr_matrix
+
+        self._triangles = triangles
+        flat = triangles.ravel()
+        rows = np.repeat(np.arange(len(triangles)), 3)
+        self._gather = csr_matrix((np.ones(len(flat), dtype=np.float32), (flat, rows)), (vertices, len(triangles)))
+
+    def __call__(self, positions: Float32) -> Float32:
+        """(V, 3) positions -> (V, 3) unit normals, weighted by area."""
+        a, b, c = (positions[self._triangles[:, i]] for i in range(3))
+        normals = self._gather @ np.cross(b - a, c - a)
+        length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
+        result: Float32 = (normals / np.maximum(length, 1e-20)[:, None]).astype(np.float32)
+        return result
+
+
+def srgb(text: str) -> tuple[float, float, float]:
+    """A colour written "#rrggbb" in sRGB, as linear light."""
+    values = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values)
+    return red, green, blue
+
+
+def translation(offset: npt.ArrayLike) -> Float64:
+    """(4, 4) matrix of a shift."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
