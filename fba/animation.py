@@ -255,8 +255,8 @@ class Animation:
         rates = {part.rate for part in parts}
         if len(rates) > 1:
             raise ValueError(
-                f"Animation.concatenate: the parts have different frame rates ({', '.join(map(str, sorted(rates)))}); "
-                "resample them to one"
+                "Animation.concatenate: the parts have different frame rates "
+                f"({', '.join(map(str, sorted(rates)))}); resample them to one"
             )
         indices: list[npt.NDArray[np.int64]] = []
         following: int | None = None

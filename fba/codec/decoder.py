@@ -129,7 +129,10 @@ class Decoder:
         self._rows_layout: Layout | None = None
         self._skips = np.zeros(_RUN, dtype=np.int64)
         self._borders = np.zeros(_RUN + 1, dtype=np.int64)
-        self._begin_object()
+        self._models = Models(bap_steps)
+        self._settings: dict[int, PartSettings] = {}
+        self._layouts: dict[int, Layout] = {}
+        self._start_code_seen = False
 
     # ---- what users call
 
@@ -207,7 +210,6 @@ class Decoder:
                 self._bit = 8 * self._scanned
                 self._scanned = 0
                 self._begin_object()
-                self._objects += 1
                 self._step = self._decode_planes
                 return iter(())
         self._scanned = max(self._scanned, buffer.length - 3)
@@ -239,7 +241,6 @@ class Decoder:
             self._start_code_seen = code in syntax.PLANE_CODES
             if code in syntax.OBJECT_CODES:
                 self._begin_object()
-                self._objects += 1
             elif code not in syntax.PLANE_CODES:
                 self._end_object(code)
             return iter(())
@@ -468,10 +469,11 @@ class Decoder:
             self._index = self._anchor_index = max(nearest, self._index)
 
     def _begin_object(self) -> None:
-        self._models = Models(self._bap_steps)
-        self._settings: dict[int, PartSettings] = {}
-        self._layouts: dict[int, Layout] = {}
-        self._rows_layout = None
+        if self._objects:
+            self._models = Models(self._bap_steps)
+        self._objects += 1
+        self._settings.clear()
+        self._layouts.clear()
         self._start_code_seen = False
 
     def _end_object(self, code: int) -> None:

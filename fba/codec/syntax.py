@@ -21,7 +21,7 @@ import numpy as np
 from fba.codec import slots
 from fba.codec.bits import BitReader, BitWriter
 from fba.codec.plane import SKIP_MAX
-from fba.codec.settings import FrameRate, PartSettings, RangeLists, TimeCode
+from fba.codec.settings import RANGE_CODE_MAX, FrameRate, PartSettings, RangeLists, TimeCode
 from fba.errors import BitstreamError
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_groups, fap_groups
 
@@ -36,6 +36,7 @@ PREDICTIVE, DCT = 0, 1
 MASK_NONE, MASK_KEEP, MASK_INTERPOLATE, MASK_ALL = range(4)
 
 LISTS = ("i_max", "i_min", "p_max", "p_min")
+RANGE_BITS = 5
 _MARKER_EVERY = 4
 
 
@@ -97,8 +98,10 @@ def read_part(reader: BitReader, part: int, plane: int) -> PartSettings:
     quant = reader.read(5)
     types = []
     for number, group in enumerate(groups(part), 1):
-        _read_marker(reader, plane, f"before {name}_mask_type of group {number}")
-        kind = reader.read(2)
+        bits = reader.read(3)
+        if not bits >> 2:
+            raise _marker_error(reader, plane, f"before {name}_mask_type of group {number}", 3)
+        kind = bits & 3
         if kind == MASK_INTERPOLATE and part == slots.BODY_BIT:
             raise BitstreamError(
                 f"bap_mask_type of group {number} is 2 (interpolate), which exists for FAPs only",
@@ -130,40 +133,46 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
     writer.write(settings.coding_type, 1)
     for codes in settings.ranges:
         writer.write(int(codes is not None), 1)
+    chunks = _range_chunks(part, settings.mask) if settings.ranges else []
     for codes in settings.ranges:
         if codes is not None:
-            for group in _listed(part):
-                for position, number in enumerate(group):
-                    if position % _MARKER_EVERY == 0:
-                        writer.write(1, 1)
-                    if settings.mask[number - 1]:
-                        writer.write(int(codes[number - 1]), 5)
-
-
-def _listed(part: int) -> tuple[tuple[int, ...], ...]:
-    """Groups whose parameters have ranges: FAP 1 and 2 have none."""
-    return groups(part)[1:] if part == slots.FACE_BIT else groups(part)
+            for chunk in chunks:
+                bits = 1
+                for number in chunk:
+                    bits = bits << RANGE_BITS | int(codes[number - 1])
+                writer.write(bits, 1 + RANGE_BITS * len(chunk))
 
 
 def _read_ranges(reader: BitReader, part: int, mask: slots.Bool, plane: int) -> RangeLists:
     flags = [reader.read(1) for _ in LISTS]
+    chunks = _range_chunks(part, mask) if any(flags) else []
     lists: list[np.ndarray | None] = []
     for name, present in zip(LISTS, flags, strict=True):
         if not present:
             lists.append(None)
             continue
         codes = np.zeros(len(mask), dtype=np.uint8)
-        for number, group in enumerate(_listed(part), 2 if part == slots.FACE_BIT else 1):
-            for position, parameter in enumerate(group):
-                if position % _MARKER_EVERY == 0:
-                    _read_marker(reader, plane, f"in the {name} range list, group {number}")
-                if mask[parameter - 1]:
-                    codes[parameter - 1] = reader.read(5)
+        for chunk in chunks:
+            bits = reader.read(1 + RANGE_BITS * len(chunk))
+            if not bits >> RANGE_BITS * len(chunk):
+                raise _marker_error(reader, plane, f"in the {name} range list", 1 + RANGE_BITS * len(chunk))
+            for parameter in reversed(chunk):
+                codes[parameter - 1] = bits & RANGE_CODE_MAX
+                bits >>= RANGE_BITS
         codes.flags.writeable = False
         lists.append(codes)
     return RangeLists(*lists)
 
 
-def _read_marker(reader: BitReader, plane: int, where: str) -> None:
-    if not reader.read(1):
-        raise BitstreamError(f"marker bit {where} is 0, expected 1", plane=plane, bit=reader.bit - 1)
+def _range_chunks(part: int, mask: slots.Bool) -> list[list[int]]:
+    """How a range list is cut: parameters whose limits follow one marker bit, those masked out left out."""
+    listed = groups(part)[1:] if part == slots.FACE_BIT else groups(part)  # FAP 1 and 2 have no ranges
+    return [
+        [number for number in group[start : start + _MARKER_EVERY] if mask[number - 1]]
+        for group in listed
+        for start in range(0, len(group), _MARKER_EVERY)
+    ]
+
+
+def _marker_error(reader: BitReader, plane: int, where: str, back: int) -> BitstreamError:
+    return BitstreamError(f"marker bit {where} is 0, expected 1", plane=plane, bit=reader.bit - back)
