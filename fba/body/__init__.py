@@ -1,1 +1,33 @@
+"""The body: its skeleton, and the solver between body animation parameters and joint matrices."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fba.body.conventions import convention_names
+    from fba.body.skeleton import Skeleton
+    from fba.body.solver import BapSolver
+    from fba.body.wrapping import wrapped
+
+_PLACES = {
+    "BapSolver": "fba.body.solver",
+    "Skeleton": "fba.body.skeleton",
+    "convention_names": "fba.body.conventions",
+    "wrapped": "fba.body.wrapping",
+}
+
+__all__ = ["BapSolver", "Skeleton", "convention_names", "wrapped"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'fba.body' has no attribute {name!r}")
+    value = getattr(import_module(_PLACES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

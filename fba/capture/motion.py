@@ -1,0 +1,123 @@
+"""Captured motion of a skeleton, whatever file it came from: `SkeletonMotion`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import MAX_FRAMES
+from fba.capture import rotations
+from fba.errors import ModelError
+
+
+@dataclass(frozen=True, eq=False)
+class SkeletonMotion:
+    """Joints that turn over time, in the units and the frame of the source.
+
+    names: J joint names. parents: int64 (J,), -1 for the root, which comes first; parents come before
+        children. offsets: float64 (J, 3), from the parent, in the rest pose (all rotations identity).
+    rotations: float64 (T, J, 4), unit quaternions (w, x, y, z) relative to the parent.
+    positions: float64 (T, 3), of the root. rate: frames a second.
+    end_parents: int64 (E,), end_offsets: float64 (E, 3): ends of the last bones, where known.
+    name: of the performance.
+
+    Raises ModelError where the parts contradict each other or are not finite.
+    """
+
+    names: tuple[str, ...]
+    parents: npt.NDArray[np.int64]
+    offsets: npt.NDArray[np.float64]
+    rotations: npt.NDArray[np.float64]
+    positions: npt.NDArray[np.float64]
+    rate: Fraction
+    end_parents: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    end_offsets: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        for what, kind in (
+            ("parents", np.int64),
+            ("offsets", np.float64),
+            ("rotations", np.float64),
+            ("positions", np.float64),
+            ("end_parents", np.int64),
+            ("end_offsets", np.float64),
+        ):
+            array = np.array(getattr(self, what), dtype=kind)
+            if not np.isfinite(array).all():
+                raise ModelError(f"SkeletonMotion: {what} must be finite")
+            array.flags.writeable = False
+            object.__setattr__(self, what, array)
+        object.__setattr__(self, "rate", Fraction(self.rate))
+        frames, ends = len(self.positions), len(self.end_parents)
+        for what, shape in (
+            ("parents", (count,)),
+            ("offsets", (count, 3)),
+            ("rotations", (frames, count, 4)),
+            ("positions", (frames, 3)),
+            ("end_parents", (ends,)),
+            ("end_offsets", (ends, 3)),
+        ):
+            if getattr(self, what).shape != shape:
+                raise ModelError(f"SkeletonMotion: {what} has shape {getattr(self, what).shape}, not {shape}")
+        if count == 0 or self.rate <= 0:
+            raise ModelError("SkeletonMotion: needs a joint at least, and a positive rate")
+        numbers = np.arange(count)
+        if self.parents[0] != -1 or ((self.parents[1:] < 0) | (self.parents[1:] >= numbers[1:])).any():
+            raise ModelError("SkeletonMotion: needs one root, first, and every parent before its children")
+        if ends and not ((self.end_parents >= 0) & (self.end_parents < count)).all():
+            raise ModelError("SkeletonMotion: an end hangs on a joint that is not there")
+        if frames and np.abs(np.linalg.norm(self.rotations, axis=-1) - 1).max(initial=0.0) > 1e-6:
+            raise ModelError("SkeletonMotion: rotations must be unit quaternions")
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def resample(self, rate: Fraction | int | str) -> SkeletonMotion:
+        """The same motion at another frame rate, turned by slerp; first frame stays, no extrapolation.
+
+        ValueError for a rate that is not positive, or where there would be too many frames.
+        """
+        rate = Fraction(rate)
+        if rate <= 0:
+            raise ValueError(f"resample: the frame rate must be positive, not {rate}")
+        if rate == self.rate or not len(self):
+            return replace(self, rate=rate)
+        ratio = self.rate / rate
+        count = (len(self) - 1) * ratio.denominator // ratio.numerator + 1
+        if count > MAX_FRAMES:
+            raise ValueError(
+                f"resample: {count} frames at {rate} frames/s are too many (at most {MAX_FRAMES})"
+            )
+        at = np.arange(count) * float(ratio)
+        before = np.minimum(at.astype(np.intp), len(self) - 1)
+        after = np.minimum(before + 1, len(self) - 1)
+        weight = at - before
+        positions = self.positions[before] * (1 - weight[:, None]) + self.positions[after] * weight[:, None]
+        turned = rotations.interpolate(self.rotations, before, after, weight)
+        return replace(self, rate=rate, rotations=turned, positions=positions)
+
+    def world(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Forward kinematics: world rotations (T, J, 4), quaternions, and joint positions (T, J, 3)."""
+        turned = np.array(self.rotations)
+        places = np.empty((len(self), len(self.names), 3))  # every joint is written below
+        for joint, parent in enumerate(self.parents):
+            if parent < 0:
+                places[:, joint] = self.positions
+                continue
+            turned[:, joint] = rotations.multiply(turned[:, parent], self.rotations[:, joint])
+            offset = rotations.matrices(turned[:, parent]) @ self.offsets[joint]
+            places[:, joint] = places[:, parent] + offset
+        return turned, places
+
+    def rest(self) -> npt.NDArray[np.float64]:
+        """(J, 3): joint positions in the rest pose, the root at its offset."""
+        places = np.array(self.offsets)
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                places[joint] += places[parent]
+        return places

@@ -1,0 +1,90 @@
+"""Rotations over arrays: quaternions (w, x, y, z) and 3 x 3 matrices, leading axes free."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+
+
+def multiply(a: Float, b: Float) -> Float:
+    """Quaternion product, a after b: (..., 4)."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def about(axis: int, angle: Float) -> Float:
+    """Quaternions (..., 4) of turns about x, y or z (0, 1, 2) by angles (...) in radians."""
+    result = np.zeros((*np.shape(angle), 4))
+    result[..., 0] = np.cos(np.asarray(angle) / 2)
+    result[..., 1 + axis] = np.sin(np.asarray(angle) / 2)
+    return result
+
+
+def matrices(quaternions: Float) -> Float:
+    """Matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def turn(axis: Float, angle: Float) -> Float:
+    """Matrices (..., 3, 3) of turns about unit axes (3,) or (..., 3) by angles (...)."""
+    axis = np.broadcast_to(axis, (*np.shape(angle), 3))
+    x, y, z = np.moveaxis(axis, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack(
+        [np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], axis=-2
+    )
+    s = np.sin(angle)[..., None, None]
+    c = np.cos(angle)[..., None, None]
+    return np.eye(3) + s * cross + (1 - c) * (cross @ cross)
+
+
+def between(start: Float, end: Float) -> Float:
+    """The smallest rotation (3, 3) that takes one direction (3,) to another; neither may be zero."""
+    a = start / np.linalg.norm(start)
+    b = end / np.linalg.norm(end)
+    axis = np.cross(a, b)
+    sine = float(np.linalg.norm(axis))
+    cosine = float(a @ b)
+    if sine < 1e-9:
+        if cosine > 0:
+            return np.eye(3)
+        axis = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
+        sine_axis = axis / np.linalg.norm(axis)
+        return turn(sine_axis, np.array(np.pi))
+    return turn(axis / sine, np.array(np.arctan2(sine, cosine)))
+
+
+def interpolate(
+    quaternions: Float, before: npt.NDArray[np.intp], after: npt.NDArray[np.intp], weight: Float
+) -> Float:
+    """Spherical interpolation: quaternions (T, J, 4) at frames before (S,) to after (S,), weight in 0..1."""
+    a = quaternions[before]
+    b = quaternions[after]
+    cosine = np.sum(a * b, axis=-1, keepdims=True)
+    b = np.where(cosine < 0, -b, b)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    w = weight[:, None, None]
+    sine = np.sin(angle)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mixed = (np.sin((1 - w) * angle) * a + np.sin(w * angle) * b) / sine
+    near = (1 - w) * a + w * b  # the same to working accuracy where the two almost coincide
+    mixed = np.where(sine < 1e-6, near, mixed)
+    result: Float = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+    return result
