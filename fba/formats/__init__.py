@@ -1,1 +1,8 @@
+"""Files to `Animation` and back: one module a format, one registry over them."""
 
+from __future__ import annotations
+
+from fba.formats.join import merge
+from fba.formats.registry import Format, OptionError, format_of, formats, probe, read, write
+
+__all__ = ["Format", "OptionError", "format_of", "formats", "merge", "probe", "read", "write"]

@@ -24,11 +24,11 @@ def atomic(path: Path) -> Iterator[BinaryIO]:
     FormatError where the target cannot be written.
     """
     name = os.fspath(path)
-    target = os.path.realpath(name)
     try:
+        target = os.path.realpath(name)
         mode = os.stat(target).st_mode
     except FileNotFoundError:
-        mode = None
+        mode = None  # the folder may be missing too: creating the temporary file will tell
     except (OSError, ValueError) as error:
         raise FormatError(f"cannot be written: {_reason(error)}", path=name) from error
     if mode is not None and stat.S_ISDIR(mode):

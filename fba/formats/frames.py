@@ -46,9 +46,12 @@ def read_frames(
     """Everything in the file; options as `fba.formats.fap.read_fap`. Raises FormatError, warns with
     FbaWarning."""
     rate = None if fps is None else parse_rate(fps)
-    scale = float(angle_scale)
+    try:
+        scale = float(angle_scale)
+    except (TypeError, ValueError, OverflowError):
+        scale = 0.0
     if not np.isfinite(scale) or not scale:
-        raise FormatError(f"angle_scale must be a number other than 0, not {angle_scale}")
+        raise FormatError(f"angle_scale must be a number other than 0, not {str(angle_scale)[:40]}")
     file, size = open_source(path)
     with file:
         lines = Lines(file, size, path)
@@ -166,8 +169,8 @@ class _Reader:
         self._blocks.clear()
         if self.values.rounded:
             warnings.warn(
-                f"{path}: {self.values.rounded} values are no integers (the first on line {self.values.rounded_line}); "
-                "rounded half away from zero",
+                f"{path}: {self.values.rounded} values are no integers, the first on line "
+                f"{self.values.rounded_line}; rounded half away from zero",
                 FbaWarning,
                 stacklevel=4,
             )

@@ -20,7 +20,7 @@ NTSC = {
 }
 """Rounded decimals that programs write for rates x 1000/1001."""
 
-_NUMBER = re.compile(r"\+?(\d{1,40}(\.\d{0,40})?|\.\d{1,40})(/\d{1,40})?")
+_NUMBER = re.compile(r"\+?([0-9]{1,40}(\.[0-9]{0,40})?|\.[0-9]{1,40})(/[0-9]{1,40})?")
 
 
 def parse_rate(text: str | float | Fraction) -> Fraction:

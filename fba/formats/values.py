@@ -18,7 +18,7 @@ Float = npt.NDArray[np.float64]
 
 FRAME_NUMBER_MAX = 2**31 - 1
 
-_NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,93 @@
+"""FBA files (.fba): the layer between a file and the codec."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+from fba.animation import Animation
+from fba.errors import BitstreamError, RangeError
+from fba.formats.atomic import atomic
+from fba.formats.source import Path, read_whole
+
+if TYPE_CHECKING:
+    from fba.codec import EncoderOptions
+
+START_CODES = (b"\0\0\1\xba", b"\0\0\1\x01")
+"""fba_object_start_code, and the one of old streams."""
+_BEFORE = (b"\0\0\1\xb0", b"\0\0\1\xb5")
+"""Visual object sequence and visual object: the layers of a stream that may stand before the object."""
+
+
+def sniff_fba(head: bytes, suffix: str) -> bool:
+    """Whether a file that begins so is an FBA stream.
+
+    MPEG program streams begin with the same start code; there a 0 bit follows, in an FBA object the 1
+    of the first I plane, or the start code of a plane, which may have a byte of stuffing before it.
+    """
+    for code in START_CODES:
+        if head.startswith(code):
+            after = head[len(code) :]
+            plane = after.removeprefix(b"\x7f").startswith(b"\0\0\1")
+            return suffix == ".fba" or not after or after[0] >= 0x80 or plane
+    return head.startswith(_BEFORE) and any(code in head for code in START_CODES)
+
+
+def read_fba(path: Path, *, bap_steps: str = "iso", salvage: bool = False) -> Animation:
+    """Decode an FBA file.
+
+    bap_steps: "iso" or "visage", the step table with which it was encoded. salvage: skip what is damaged,
+    with an FbaWarning, in place of raising. Raises FormatError (the file), BitstreamError and
+    UnsupportedError (the stream). The animation gets the file's name.
+    """
+    from fba.codec import decode
+
+    data = read_whole(path)
+    with located(path):
+        animation = decode(data, bap_steps=bap_steps, on_error="salvage" if salvage else "raise")
+    name = animation.name or os.path.splitext(os.path.basename(os.fspath(path)))[0]
+    return Animation(animation.rate, animation.index, animation.face, animation.body, name)
+
+
+def write_fba(
+    path: Path, animation: Animation, *, options: EncoderOptions | None = None, **settings: Any
+) -> None:
+    """Encode into an FBA file.
+
+    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Raises OptionError where
+    both are given, RangeError for values that no stream can carry, FormatError where the file cannot be
+    written.
+    """
+    from fba.codec import EncoderOptions, encode
+    from fba.formats.registry import OptionError
+
+    if settings:
+        if options is not None:
+            raise OptionError(f"give either options or {', '.join(settings)}, not both")
+        options = EncoderOptions(**settings)
+    with located(path):
+        data = encode(animation, options)
+    with atomic(path) as file:
+        file.write(data)
+
+
+def _encoder_settings() -> tuple[str, ...]:
+    from fba.codec import EncoderOptions
+
+    return tuple(field.name for field in fields(EncoderOptions) if field.init)
+
+
+write_fba.extra_options = _encoder_settings  # type: ignore[attr-defined]
+
+
+@contextlib.contextmanager
+def located(path: Path) -> Iterator[None]:
+    """Errors of the codec get the file's name in front; their type and attributes stay."""
+    try:
+        yield
+    except (BitstreamError, RangeError) as error:
+        error.args = (f"{os.fspath(path)}: {error}",)
+        raise

@@ -1,0 +1,244 @@
+"""All file formats in one table, and `read`, `write` and `probe` over it.
+
+What a file is, is found in its content; the name's suffix only decides where the content leaves it
+open. Modules of formats are imported when they are used.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from fba.animation import Animation
+from fba.errors import FbaError, FbaWarning, FormatError, UnsupportedError
+from fba.formats.source import Path, read_head
+
+if TYPE_CHECKING:
+    from fba.codec import StreamInfo
+
+
+class OptionError(FbaError, TypeError):
+    """An option that a format does not know, or options that contradict each other."""
+
+
+class Lazy:
+    """A function by name, "module:function", imported on the first call."""
+
+    def __init__(self, place: str) -> None:
+        self._place = place
+        self._function: Callable[..., Any] | None = None
+
+    def __repr__(self) -> str:
+        return f"Lazy({self._place!r})"
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return self.load()(*arguments, **options)
+
+    def load(self) -> Callable[..., Any]:
+        if self._function is None:
+            module, _, name = self._place.partition(":")
+            self._function = getattr(import_module(module), name)
+        return self._function
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format.
+
+    name: as in `format=`. suffixes: lower case, with the dot, the first is the usual one. sniff: whether
+    a file with this beginning (up to 64 KiB) and this lower-case suffix is one. read, write: file to
+    Animation and back; write is None where there is no writer. carries: the parts that it can hold.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    description: str
+    sniff: Callable[[bytes, str], bool]
+    read: Callable[..., Animation]
+    write: Callable[..., None] | None
+    carries: tuple[str, ...] = ("face", "body")
+
+    @property
+    def read_options(self) -> tuple[str, ...]:
+        """Names of the keyword options of `read`."""
+        return _options(self.read)
+
+    @property
+    def write_options(self) -> tuple[str, ...]:
+        """Names of the keyword options of `write`; empty where there is no writer."""
+        return () if self.write is None else _options(self.write)
+
+
+@cache
+def formats() -> tuple[Format, ...]:
+    """The formats, in the order in which they are tried on a file's content."""
+
+    def place(name: str, module: str = "") -> Lazy:
+        return Lazy(f"fba.formats.{module or name.partition('_')[2]}:{name}")
+
+    return (
+        Format(
+            "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
+            place("sniff_fba"), place("read_fba"), place("write_fba"),
+        ),
+        Format(
+            "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
+            place("sniff", "bvh"), place("read", "bvh"), None, ("body",),
+        ),
+        Format(
+            "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
+            place("sniff_fap"), place("read_fap"), place("write_fap"), ("face",),
+        ),
+        Format(
+            "bap", (".bap",), "ASCII body animation parameters, versions 3.1 and 3.2",
+            place("sniff_bap"), place("read_bap"), place("write_bap"), ("body",),
+        ),
+        Format(
+            "epf", (".epf",), "encoder parameter file: how to code an animation; holds none itself",
+            place("sniff_epf"), place("read_animation", "epf"), None, (),
+        ),
+    )  # fmt: skip
+
+
+def format_of(path: Path, format: str | None = None) -> Format:
+    """The format of a file that is to be read; format: its name, where it is known already.
+
+    Raises FormatError where the file cannot be read or is of no known format, OptionError for an
+    unknown name. A content that another suffix belongs to is an FbaWarning.
+    """
+    if format is not None:
+        return _named(format)
+    head, suffix = read_head(path), _suffix(path)
+    matching = [entry for entry in formats() if entry.sniff(head, suffix)]
+    by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
+    for entry in matching or by_suffix:
+        if entry in by_suffix or not matching:
+            return entry
+    if not matching:
+        raise FormatError(
+            f"is in no format known here: {_list()}; name it (format=, --format) if it is one of them",
+            path=path,
+        )
+    found = matching[0]
+    if by_suffix:
+        warnings.warn(
+            f"{os.fspath(path)}: is named {suffix}, but holds {found.name.upper()} content; "
+            f"read as {found.name}",
+            FbaWarning,
+            stacklevel=3,
+        )
+    return found
+
+
+def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
+    """Read an animation from a file of any known format.
+
+    format: its name where the content should not be asked. options: those of the format's reader, see
+    `formats()` and e.g. `fba.formats.fap.read_fap`. Raises FormatError, BitstreamError,
+    UnsupportedError or OptionError.
+    """
+    found = format_of(path, format)
+    _check_options(found.name, "reading", options, found.read_options)
+    return found.read(path, **options)
+
+
+def write(path: Path, animation: Animation, *, format: str | None = None, **options: Any) -> None:
+    """Write an animation; the suffix of `path` chooses the format, where `format` does not name it.
+
+    The file appears whole or not at all. What the format cannot hold is left out with an FbaWarning.
+    Raises FormatError, RangeError, UnsupportedError or OptionError.
+    """
+    if format is not None:
+        chosen = _named(format)
+    else:
+        suffix = _suffix(path)
+        by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
+        if not by_suffix:
+            raise FormatError(
+                f"the suffix does not say which format to write; known: {_list(writing=True)} (or format=)",
+                path=path,
+                token=suffix or None,
+            )
+        chosen = by_suffix[0]
+    if chosen.write is None:
+        raise UnsupportedError(
+            f"{os.fspath(path)}: {chosen.name.upper()} can be read only; write one of {_list(writing=True)}",
+            what=f"writing {chosen.name.upper()}",
+        )
+    _check_options(chosen.name, "writing", options, chosen.write_options)
+    present = [part for part in ("face", "body") if getattr(animation, part) is not None]
+    left_out = [part for part in present if part not in chosen.carries]
+    chosen.write(path, animation, **options)
+    if left_out:
+        warnings.warn(
+            f"{os.fspath(path)}: {chosen.name.upper()} holds no {left_out[0]}; only the "
+            f"{chosen.carries[0]} was written",
+            FbaWarning,
+            stacklevel=2,
+        )
+
+
+def probe(data_or_path: bytes | bytearray | memoryview | Path) -> StreamInfo:
+    """What an FBA stream, in memory or in a file, says of itself, without decoding its values.
+
+    Raises FormatError, BitstreamError, and UnsupportedError for a file of another format.
+    """
+    from fba.codec import probe_stream
+    from fba.formats.fba import located
+    from fba.formats.source import read_whole
+
+    if isinstance(data_or_path, bytes | bytearray | memoryview):
+        return probe_stream(bytes(data_or_path))
+    found = format_of(data_or_path)
+    if found.name != "fba":
+        raise UnsupportedError(
+            f"{os.fspath(data_or_path)}: is a {found.name.upper()} file, and only FBA streams can be probed; "
+            "read it",
+            what=f"probing {found.name.upper()}",
+        )
+    with located(data_or_path):
+        return probe_stream(read_whole(data_or_path))
+
+
+def _named(name: str) -> Format:
+    for entry in formats():
+        if entry.name == str(name).lower().removeprefix("."):
+            return entry
+    raise OptionError(f"there is no format {name!r}; known: {', '.join(entry.name for entry in formats())}")
+
+
+def _check_options(name: str, doing: str, options: dict[str, Any], known: tuple[str, ...]) -> None:
+    for option in options:
+        if option not in known:
+            raise OptionError(
+                f"{doing} {name} takes no option {option!r}; it takes {', '.join(known) or 'none'}"
+            )
+
+
+def _options(function: Callable[..., Any]) -> tuple[str, ...]:
+    loaded = function.load() if isinstance(function, Lazy) else function
+    extra = getattr(loaded, "extra_options", None)  # names that a reader or writer takes as **settings
+    names = [
+        parameter.name
+        for parameter in inspect.signature(loaded).parameters.values()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+    ]
+    return tuple(dict.fromkeys([*names, *(extra() if extra else ())]))
+
+
+def _suffix(path: Path) -> str:
+    return os.path.splitext(os.fspath(path))[1].lower()
+
+
+def _list(writing: bool = False) -> str:
+    return ", ".join(
+        f"{entry.name.upper()} ({' '.join(entry.suffixes)})"
+        for entry in formats()
+        if entry.write is not None or not writing
+    )
