@@ -77,7 +77,7 @@ class Format:
 
 @cache
 def formats() -> tuple[Format, ...]:
-    """The formats, in the order in which they are tried on a file's content."""
+    """The formats, in the order in which they are tried on a file's content: what is quick to import first."""
 
     def place(name: str, module: str = "") -> Lazy:
         return Lazy(f"fba.formats.{module or name.partition('_')[2]}:{name}")
@@ -86,10 +86,6 @@ def formats() -> tuple[Format, ...]:
         Format(
             "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
             place("sniff_fba"), place("read_fba"), place("write_fba"),
-        ),
-        Format(
-            "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-            place("sniff", "bvh"), place("read", "bvh"), None, ("body",),
         ),
         Format(
             "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
@@ -103,6 +99,10 @@ def formats() -> tuple[Format, ...]:
             "epf", (".epf",), "encoder parameter file: how to code an animation; holds none itself",
             place("sniff_epf"), place("read_animation", "epf"), None, (),
         ),
+        Format(
+            "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
+            place("sniff", "bvh"), place("read", "bvh"), None, ("body",),
+        ),
     )  # fmt: skip
 
 
@@ -115,18 +115,17 @@ def format_of(path: Path, format: str | None = None) -> Format:
     if format is not None:
         return _named(format)
     head, suffix = read_head(path), _suffix(path)
-    matching = [entry for entry in formats() if entry.sniff(head, suffix)]
     by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
-    for entry in matching or by_suffix:
-        if entry in by_suffix or not matching:
-            return entry
-    if not matching:
+    others = [entry for entry in formats() if entry not in by_suffix]
+    found = next((entry for entry in (*by_suffix, *others) if entry.sniff(head, suffix)), None)
+    if found is None and by_suffix:
+        return by_suffix[0]  # its reader says what is wrong with it
+    if found is None:
         raise FormatError(
             f"is in no format known here: {_list()}; name it (format=, --format) if it is one of them",
             path=path,
         )
-    found = matching[0]
-    if by_suffix:
+    if by_suffix and found not in by_suffix:
         warnings.warn(
             f"{os.fspath(path)}: is named {suffix}, but holds {found.name.upper()} content; "
             f"read as {found.name}",

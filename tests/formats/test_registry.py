@@ -34,7 +34,7 @@ def performance(face: bool = True, body: bool = True, rate: int = 25, first: int
 
 
 def test_the_table() -> None:
-    assert [entry.name for entry in formats()] == ["fba", "bvh", "fap", "bap", "epf"]
+    assert [entry.name for entry in formats()] == ["fba", "fap", "bap", "epf", "bvh"]
     by_name = {entry.name: entry for entry in formats()}
     assert by_name["fap"].read_options == ("fps", "name", "salvage", "angle_scale")
     assert by_name["fap"].write_options == by_name["epf"].write_options == ()
@@ -81,7 +81,7 @@ def test_a_wrong_suffix_is_a_warning(tmp_path: Path) -> None:
 def test_other_files(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "a.dat"
     path.write_bytes(content)
-    with pytest.raises(FormatError, match=r"no format known here: FBA \(\.fba\), BVH"):
+    with pytest.raises(FormatError, match=r"no format known here: FBA \(\.fba\), FAP"):
         fba.read(path)
 
 
@@ -111,7 +111,7 @@ def test_options(tmp_path: Path) -> None:
         fba.read(path, speed=3)
     with pytest.raises(TypeError, match="bap_steps"):
         fba.read(path, bap_steps="iso")
-    with pytest.raises(OptionError, match="no format 'mp3'; known: fba, bvh, fap"):
+    with pytest.raises(OptionError, match="no format 'mp3'; known: fba, fap, bap, epf, bvh"):
         fba.read(path, format="mp3")
     with pytest.raises(OptionError, match="writing fap takes no option 'fps'; it takes none"):
         fba.write(tmp_path / "b.fap", performance(), fps=3)
