@@ -22,15 +22,22 @@ def compiled(function: Function) -> Function:
     """Compile on first call, cache the machine code on disk, release the GIL while running."""
     if numba is None:
         return function
-    result: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return result
+    return _njit(function)
 
 
 def inlined(function: Function) -> Function:
     """Like `compiled`, for small helpers that only compiled functions call."""
     if numba is None:
         return function
-    result: Function = numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")(function)
+    return _njit(function, inline="always")
+
+
+def _njit(function: Function, **options: str) -> Function:
+    result: Function
+    try:
+        result = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    except RuntimeError:  # no folder to keep machine code in: neither beside the source nor in a home
+        result = numba.njit(nogil=True, error_model="numpy", **options)(function)
     return result
 
 

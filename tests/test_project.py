@@ -85,6 +85,24 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert names & HEAVY == set()
 
 
+def test_compiled_code_runs_where_no_folder_can_be_written() -> None:
+    pytest.importorskip("numba")
+    code = """
+from numba.core import caching
+caching.FunctionCache._impl_class._locator_classes = []  # as for a user without a home, in a system-wide installation
+from fba.compiled import compiled, inlined
+@inlined
+def double(x):
+    return 2 * x
+@compiled
+def quadruple(x):
+    return double(double(x))
+print(quadruple(21))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("84\n", "")
+
+
 @pytest.mark.parametrize(
     ("name", "rows"), [("fap.csv", 68), ("bap.csv", 296), ("feature_points.csv", 84), ("joints.csv", 87)]
 )
