@@ -77,7 +77,7 @@ class Format:
 
 @cache
 def formats() -> tuple[Format, ...]:
-    """The formats, in the order in which they are tried on a file's content: what is quick to import first."""
+    """The formats, in the order in which they are tried on a content: the quick to import first."""
 
     def place(name: str, module: str = "") -> Lazy:
         return Lazy(f"fba.formats.{module or name.partition('_')[2]}:{name}")
