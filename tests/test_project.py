@@ -89,7 +89,7 @@ def test_compiled_code_runs_where_no_folder_can_be_written() -> None:
     pytest.importorskip("numba")
     code = """
 from numba.core import caching
-caching.FunctionCache._impl_class._locator_classes = []  # as for a user without a home, in a system-wide installation
+caching.FunctionCache._impl_class._locator_classes = []  # as for a user without a home
 from fba.compiled import compiled, inlined
 @inlined
 def double(x):
