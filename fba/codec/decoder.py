@@ -125,7 +125,7 @@ class Decoder:
         self._anchor_index = 0
         self._index = 0  # of the next plane
         self._lost_from = 0
-        self._rows = np.zeros((_RUN, slots.ROW), dtype=np.int32)
+        self._rows = np.zeros((0, 0), dtype=np.int32)
         self._rows_layout: Layout | None = None
         self._skips = np.zeros(_RUN, dtype=np.int64)
         self._borders = np.zeros(_RUN + 1, dtype=np.int64)
@@ -291,7 +291,7 @@ class Decoder:
         frame_rate = self._read_frame_rate(reader)
         time_code = syntax.read_time_code(reader) if reader.read(1) else None
         skip = syntax.read_skip(reader, number)
-        row = np.zeros((1, slots.ROW), dtype=np.int32)
+        row = np.zeros((1, slots.row_width(body=bool(mask & slots.BODY_BIT))), dtype=np.int32)
         settings: dict[int, PartSettings] = {}
         values: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
         models = self._models
@@ -340,7 +340,7 @@ class Decoder:
             reader.bit = place
             row[0, order] = decoded
             if part == slots.FACE_BIT:
-                row[0, slots.VISEME_DEF :] = flags
+                row[0, slots.FLAGS] = flags
             values.append((order, decoded))
         for order, decoded in values:
             models.last[order] = decoded
@@ -383,7 +383,8 @@ class Decoder:
         layout = self._layouts[mask]
         if self._rows_layout is not layout:
             self._rows_layout = layout
-            self._rows[:] = 0  # what this layout does not code stays 0
+            width = slots.row_width(body=body is not None)
+            self._rows = np.zeros((_RUN, width), dtype=np.int32)  # what this layout does not code stays 0
         count, status, _, place = plane.decode_run(
             self._buffer.data, self._bit, end, mask, layout, self._models.predicted,
             self._rows, self._skips, self._borders,

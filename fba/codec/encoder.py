@@ -111,7 +111,7 @@ class Encoder:
         """Encode the first `count` frames; one after them, where there is one, says the last skip."""
         if not count:
             return
-        rows = np.zeros((count, slots.ROW), dtype=np.int32)
+        rows = np.zeros((count, slots.row_width(body=frames.body is not None)), dtype=np.int32)
         if frames.face is not None:
             slots.face_rows(frames.face[:count], rows)
             planner.clip_amounts(rows)

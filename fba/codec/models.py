@@ -27,7 +27,7 @@ _INT32 = np.iinfo(np.int32)
 
 
 class Models:
-    """What encoder and decoder must agree on, as arrays over the 369 slots (see `slots`).
+    """What encoder and decoder must agree on, as arrays over the 372 slots (see `slots`).
 
     `i_minimum`, `i_size`, `minimum`, `size`: smallest level and number of symbols, for I and P planes.
     `step`, `last`: quantiser step and last value. `usual`, `total`, `below_usual`, `added`, `tree`:
@@ -102,7 +102,7 @@ class Models:
 
 @cache
 def default_limits() -> Int64:
-    """Ranges where none were sent, int64 (4, 369): I max, I min, P max, P min, as sizes, unscaled.
+    """Ranges where none were sent, int64 (4, 372): I max, I min, P max, P min, as sizes, unscaled.
 
     FAPs: symmetric, the largest limit of the standard's table rounded up to a multiple of 60; FAP 47 as
     the reference decoder has it. BAPs: the table's. Extension BAPs have none: UNDEFINED.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fba.codec import arithmetic
+from fba.codec import arithmetic, slots
 from fba.codec.arithmetic import OK, OUT_OF_DATA, Counts, decode_segment, encode_segment, learn
 from fba.compiled import compiled
 
@@ -30,6 +30,8 @@ OUT_OF_RANGE = 9
 
 SKIP_MAX = 15 << 20
 """Most frames that one plane may skip: a week at 25 Hz. More is damage."""
+
+FIRST_FLAG = slots.FLAGS.start
 
 # Results of `find_start_code` where there is none.
 NO_START_CODE = -1
@@ -161,7 +163,7 @@ def decode_run(
 ) -> tuple[int, int, int, int]:
     """Decode P planes from `bit` on, until something else comes: (planes, status, bit, place).
 
-    Fills rows[t] (372 columns, see `slots`; only those coded are written), skips[t], borders[t] (first
+    Fills rows[t] (columns: see `slots`; only those coded are written), skips[t], borders[t] (first
     bit) and borders[t + 1]. `bit`: after the last whole plane. status: OK where rows are full, else why
     it ended; place: the bit (or slot) that a failed plane failed at. A plane that fails leaves models
     and `last` as they were.
@@ -208,7 +210,7 @@ def decode_run(
             coding.last[slot] = values[position]
             rows[count, slot] = values[position]
         for flag in range(3):
-            rows[count, 369 + flag] = flags[flag]
+            rows[count, FIRST_FLAG + flag] = flags[flag]
         skips[count] = skip
         bit = place
         count += 1
@@ -281,7 +283,7 @@ def encode_run(
     skips: Int64,
     borders: Int64,
 ) -> tuple[int, int, int, int]:
-    """Encode rows[t] (372 columns) as P planes at `bit`: (planes, status, bit, slot).
+    """Encode rows[t] as P planes at `bit`: (planes, status, bit, slot).
 
     OUT_OF_RANGE: a difference in the next plane, that of `slot`, does not fit its range; nothing of that
     plane was written. OUT_OF_DATA: `data` has no room for another. borders: first bit of each, and the
@@ -303,7 +305,7 @@ def encode_run(
                 return count, OUT_OF_RANGE, bit, slot
             symbols[position] = symbol
         for flag in range(3):
-            flags[flag] = rows[count, 369 + flag]
+            flags[flag] = rows[count, FIRST_FLAG + flag]
         header = 2 * object_mask + (1 if skip > 0 else 0)  # is_intra 0, fba_object_mask, skip_frames
         bit = _write_nibble(data, bit, header)
         while skip >= 0 and header & 1:

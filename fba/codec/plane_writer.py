@@ -69,7 +69,7 @@ class PlaneWriter:
         return np.sign(values) * np.where(size <= half, 0, (size + half) // step)
 
     def intra(self, settings: PlaneSettings, row: slots.Int32, *, clamp: bool = False) -> int:
-        """Write an I plane with the values of row (372,); how many values were clamped to their range.
+        """Write an I plane with the values of row (columns,); how many values were clamped to their range.
 
         Raises DoesNotFitError before anything was written, unless `clamp`.
         """
@@ -107,7 +107,7 @@ class PlaneWriter:
         if settings.time_code is not None:
             syntax.write_time_code(writer, settings.time_code)
         syntax.write_skip(writer, settings.skip)
-        flags = row[slots.VISEME_DEF :].astype(np.int64)
+        flags = row[slots.FLAGS].astype(np.int64)
         for part, one, order, segments, levels in plan:
             syntax.write_part(writer, part, one)
             writer.reserve(17 * len(order) + _SEGMENT_BITS * len(segments))
@@ -122,7 +122,7 @@ class PlaneWriter:
         return clamped
 
     def predicted(self, mask: int, rows: slots.Int32, skips: Int64, borders: Int64 | None = None) -> None:
-        """Write P planes with fba_object_mask `mask` and the values of rows (T, 372).
+        """Write P planes with fba_object_mask `mask` and the values of rows (T, columns).
 
         borders: int64 (T + 1,) to be filled with bit positions. Raises DoesNotFitError at the first that
         does not fit its ranges, with those before it written and nothing of it.

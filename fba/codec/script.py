@@ -63,15 +63,15 @@ def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_
 
 
 def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> npt.NDArray[np.int32]:
-    rows = np.zeros((len(planes), slots.ROW), dtype=np.int32)
+    rows = np.zeros((len(planes), slots.SLOTS), dtype=np.int32)
     if any(one.face is not None for one in planes):
         track = animation.face
         if track is None:
             raise RangeError("the planes to be coded carry FAPs, but the animation has no face track")
         chosen, positions = _frames(animation, [p.face_frame if p.face is not None else None for p in planes])
-        source = np.zeros((len(animation), slots.ROW), dtype=np.int32)
+        source = np.zeros((len(animation), slots.row_width(body=False)), dtype=np.int32)
         slots.face_rows(track, source)
-        rows[chosen] = source[positions]
+        rows[chosen, : slots.FLAGS.stop] = source[positions]
     if any(one.body is not None for one in planes):
         if animation.body is None:
             raise RangeError("the planes to be coded carry BAPs, but the animation has no body track")

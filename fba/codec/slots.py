@@ -1,7 +1,8 @@
-"""Numbering of everything that the arithmetic coder carries: 369 slots and 3 flags.
+"""Numbering of everything that a plane carries: 372 slots.
 
 The codec's loops know parameters by slot: 3 of the viseme, 4 of the expression, FAPs 3..68, BAPs
-1..296. A row of coded values is int32 (372,): the slots, then viseme_def, init_face, expression_def.
+1..296. Three slots between face and body hold the flags viseme_def, init_face and expression_def, which
+are plain bits. A row of values is int32, one column a slot; of a face alone it ends before the BAPs.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELD
 VISEME = slice(0, 3)
 EXPRESSION = slice(3, 7)
 FAPS = slice(7, 73)
-BAPS = slice(73, 369)
-SLOTS = 369
-VISEME_DEF, INIT_FACE, EXPRESSION_DEF = 369, 370, 371
-ROW = 372
+FLAGS = slice(73, 76)
+VISEME_DEF, INIT_FACE, EXPRESSION_DEF = 73, 74, 75
+BAPS = slice(76, 372)
+SLOTS = 372
 
 FACE_BIT, BODY_BIT = 1, 2
 """Bits of fba_object_mask."""
@@ -28,6 +29,11 @@ FACE_BIT, BODY_BIT = 1, 2
 Int32 = npt.NDArray[np.int32]
 Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
+
+
+def row_width(*, body: bool) -> int:
+    """Columns of a row of values with or without a body."""
+    return SLOTS if body else FLAGS.stop
 
 
 def fap_slot(number: int) -> int:
@@ -83,21 +89,21 @@ def coding_order(face_mask: Bool | None, body_mask: Bool | None) -> tuple[Int64,
 
 
 def face_rows(track: FaceTrack, rows: Int32) -> None:
-    """Write a face track into rows (T, 372)."""
+    """Write a face track into rows (T, columns)."""
     rows[:, VISEME] = track.viseme[:, :3]
     rows[:, VISEME_DEF] = track.viseme[:, 3]
     rows[:, EXPRESSION] = track.expression[:, :4]
-    rows[:, INIT_FACE : EXPRESSION_DEF + 1] = track.expression[:, 4:]
+    rows[:, INIT_FACE : FLAGS.stop] = track.expression[:, 4:]
     rows[:, FAPS] = track.values[:, 2:]
 
 
 def body_rows(track: BodyTrack, rows: Int32) -> None:
-    """Write a body track into rows (T, 372)."""
+    """Write a body track into rows (T, columns)."""
     rows[:, BAPS] = track.values
 
 
 def face_track(rows: Int32, mask: Bool) -> FaceTrack:
-    """The face track that rows (T, 372) and one mask (68,) for all of them hold."""
+    """The face track that rows (T, columns) and one mask (68,) for all of them hold."""
     count = len(rows)
     values = np.zeros((count, FAP_COUNT), dtype=np.int32)
     values[:, 2:] = rows[:, FAPS]
@@ -106,14 +112,14 @@ def face_track(rows: Int32, mask: Bool) -> FaceTrack:
     viseme[:, 3] = rows[:, VISEME_DEF]
     expression = np.zeros((count, len(EXPRESSION_FIELDS)), dtype=np.int16)
     expression[:, :4] = rows[:, EXPRESSION]
-    expression[:, 4:] = rows[:, INIT_FACE : EXPRESSION_DEF + 1]
+    expression[:, 4:] = rows[:, INIT_FACE : FLAGS.stop]
     for array in (values, viseme, expression):
         array.flags.writeable = False
     return FaceTrack(values, np.broadcast_to(mask, (count, FAP_COUNT)), viseme, expression)
 
 
 def body_track(rows: Int32, mask: Bool) -> BodyTrack:
-    """The body track that rows (T, 372) and one mask (296,) for all of them hold."""
+    """The body track that rows (T, columns) and one mask (296,) for all of them hold."""
     values = rows[:, BAPS].copy()
     values.flags.writeable = False
     return BodyTrack(values, np.broadcast_to(mask, (len(rows), BAP_COUNT)))

@@ -1,0 +1,152 @@
+"""Speed and memory of the codec.
+
+The textbook coder of `conformance.linear` and ours code the same symbols in the same run, compiled the
+same way: the ratio is what to quote.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from statistics import median
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+from conformance import linear
+from fba import Animation
+from fba.codec import encode_planes
+from fba.codec.arithmetic import ALPHABET_MAX
+from fba.codec.settings import RANGE_CODE_MAX, FrameRate, PartSettings, PlaneSettings, RangeLists
+from fba.parameters import fap_steps
+
+ROUNDS = 15
+LEVEL_MAX = ALPHABET_MAX // 2
+
+
+@pytest.fixture(scope="module")
+def wide(head_motion: tuple[Animation, str, str]) -> bytes:
+    """The animation coded with the widest ranges: alphabets of 3721 symbols, as old encoders do."""
+    animation, bap_steps, _ = head_motion
+    assert animation.face is not None
+    codes = np.full(68, RANGE_CODE_MAX, dtype=np.uint8)
+    mask = animation.face.mask[0]
+    types = tuple(3 if mask[np.array(group) - 1].all() else 0 for group in fba.parameters.fap_groups())
+    settings = PartSettings(types, mask, ranges=RangeLists(codes, codes, codes, codes))
+    planes = [
+        PlaneSettings(
+            intra=not position,
+            face_frame=int(index),
+            face=settings,
+            frame_rate=FrameRate.from_fraction(animation.rate) if not position else None,
+        )
+        for position, index in enumerate(animation.index)
+    ]
+    return encode_planes(animation, planes, bap_steps=bap_steps)
+
+
+def textbook_symbols(animation: Animation) -> np.ndarray:
+    """The P-plane symbols of the low-level FAPs, (T - 1, 66)."""
+    assert animation.face is not None
+    levels = np.rint(animation.face.values[:, 2:] / fap_steps()[2:]).astype(np.int64)
+    symbols = np.diff(levels, axis=0) + LEVEL_MAX
+    return np.ascontiguousarray(np.clip(symbols, 0, ALPHABET_MAX - 1))
+
+
+def timed(function: Callable[[], Any]) -> float:
+    times = []
+    for _ in range(ROUNDS):
+        start = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - start)
+    return median(times)
+
+
+def test_decode(
+    benchmark: Any, wide: bytes, head_motion: tuple[Animation, str, str], report: Callable[[str], None]
+) -> None:
+    animation, bap_steps, source = head_motion
+    symbols = textbook_symbols(animation)
+    models = np.zeros((symbols.shape[1], ALPHABET_MAX + 1), dtype=np.int64)
+    data = np.zeros(4 * symbols.size, dtype=np.uint8)
+    linear.reset(models, ALPHABET_MAX)
+    bits = linear.encode(data, symbols, ALPHABET_MAX, models)
+    decoded = np.zeros_like(symbols)
+
+    def textbook() -> None:
+        linear.reset(models, ALPHABET_MAX)
+        assert linear.decode(data, decoded, ALPHABET_MAX, models) == bits
+
+    textbook()
+    assert np.array_equal(decoded, symbols)
+    slow = timed(textbook) / symbols.size
+    result = benchmark.pedantic(fba.decode, (wide,), {"bap_steps": bap_steps}, rounds=ROUNDS, warmup_rounds=2)
+    assert result == animation
+    fast = benchmark.stats.stats.median / (66 * len(animation))
+    report(
+        f"decode {source}: {1e-6 / fast:.1f} million symbols/s; textbook coder {1e-6 / slow:.2f}; "
+        f"ratio {slow / fast:.1f}"
+    )
+
+
+def test_encode(
+    benchmark: Any, head_motion: tuple[Animation, str, str], wide: bytes, report: Callable[[str], None]
+) -> None:
+    animation, bap_steps, source = head_motion
+    symbols = textbook_symbols(animation)
+    models = np.zeros((symbols.shape[1], ALPHABET_MAX + 1), dtype=np.int64)
+
+    def textbook() -> None:
+        linear.reset(models, ALPHABET_MAX)
+        linear.encode(np.zeros(4 * symbols.size, dtype=np.uint8), symbols, ALPHABET_MAX, models)
+
+    textbook()
+    slow = timed(textbook) / symbols.size
+    options = fba.EncoderOptions(bap_steps=bap_steps)
+    data = benchmark.pedantic(fba.encode, (animation, options), rounds=ROUNDS, warmup_rounds=2)
+    assert fba.decode(data, bap_steps=bap_steps) == animation
+    fast = benchmark.stats.stats.median / (66 * len(animation))
+    report(
+        f"encode {source}: {1e-6 / fast:.1f} million symbols/s; textbook coder {1e-6 / slow:.2f}; "
+        f"ratio {slow / fast:.1f}; {len(data)} bytes with fitted ranges, {len(wide)} with the widest"
+    )
+
+
+@pytest.mark.parametrize("way", ["one-shot", "streaming"])
+def test_memory_of_an_hour(way: str, report: Callable[[str], None]) -> None:
+    """Peak memory of a process that decodes an hour of 68 FAPs at 25 Hz."""
+    script = textwrap.dedent(
+        f"""
+        import resource, sys
+        import fba
+        data = sys.stdin.buffer.read()
+        fba.decode(data[:0] + data[: 1 << 12], on_error="salvage")  # compiles
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        if {way == "one-shot"}:
+            frames = len(fba.decode(data))
+        else:
+            decoder, frames = fba.Decoder(), 0
+            for start in range(0, len(data), 4096):
+                frames += len(decoder.push(data[start : start + 4096]))
+            frames += len(decoder.finish())
+        after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        print(frames, before, after)
+        """
+    )
+    from bench.conftest import synthetic  # pytest puts the project's root on the path
+
+    data = fba.encode(synthetic(90_000))
+    run = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", script], input=data, capture_output=True, check=True
+    )
+    frames, before, after = map(int, run.stdout.split())
+    assert frames == 90_000
+    report(
+        f"an hour of 68 FAPs at 25 Hz ({len(data)} bytes), {way}: peak {after / 1024:.0f} MB, "
+        f"of which {before / 1024:.0f} MB are Python, NumPy and numba"
+    )
