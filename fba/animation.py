@@ -172,7 +172,7 @@ class Frame:
     rate: Fraction
     face: FaceTrack | None = None
     body: BodyTrack | None = None
-    plane: object | None = field(default=None, repr=False)
+    plane: Any = field(default=None, repr=False)
 
     @property
     def time(self) -> Fraction:

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from fba.formats.join import merge
-from fba.formats.registry import Format, OptionError, format_of, formats, probe, read, write
+from fba.formats.registry import Format, OptionError, format_of, formats, probe, read, write, writer_for
 
-__all__ = ["Format", "OptionError", "format_of", "formats", "merge", "probe", "read", "write"]
+__all__ = ["Format", "OptionError", "format_of", "formats", "merge", "probe", "read", "write", "writer_for"]

@@ -47,16 +47,20 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read(
-    path: str | Path, *, rate: Fraction | int | str | None = None, scale: float | None = None
+    path: str | Path,
+    *,
+    rate: Fraction | int | str | None = None,
+    scale: float | None = None,
+    origin: str = "source",
 ) -> Animation:
-    """A BVH file as BAPs (see `fba.capture.from_skeleton` for rate and scale).
+    """A BVH file as BAPs (see `fba.capture.from_skeleton` for rate, scale and origin).
 
     Raises FormatError for anything that is not BVH or whose skeleton is not a body; warns (FbaWarning)
     of oddities.
     """
     motion = read_motion(path)
     try:
-        return from_skeleton(motion, rate, scale=scale)
+        return from_skeleton(motion, rate, scale=scale, origin=origin)
     except ModelError as error:
         raise FormatError(str(error), path=path) from error
 
@@ -324,6 +328,13 @@ def _motion(
         )
     turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
     return SkeletonMotion(
-        tuple(tree.names), np.array(tree.parents, dtype=np.int64), offsets, turned, positions, rate,
-        np.array(tree.end_parents, dtype=np.int64), np.array(tree.end_offsets, dtype=np.float64).reshape(-1, 3), name,
-    )  # fmt: skip
+        names=tuple(tree.names),
+        parents=np.array(tree.parents, dtype=np.int64),
+        offsets=offsets,
+        rotations=turned,
+        positions=positions,
+        rate=rate,
+        end_parents=np.array(tree.end_parents, dtype=np.int64),
+        end_offsets=np.array(tree.end_offsets, dtype=np.float64).reshape(-1, 3),
+        name=name,
+    )

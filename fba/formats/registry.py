@@ -153,6 +153,26 @@ def write(path: Path, animation: Animation, *, format: str | None = None, **opti
     The file appears whole or not at all. What the format cannot hold is left out with an FbaWarning.
     Raises FormatError, RangeError, UnsupportedError or OptionError.
     """
+    chosen = writer_for(path, format)
+    _check_options(chosen.name, "writing", options, chosen.write_options)
+    present = [part for part in ("face", "body") if getattr(animation, part) is not None]
+    left_out = [part for part in present if part not in chosen.carries]
+    assert chosen.write is not None  # writer_for saw to that
+    chosen.write(path, animation, **options)
+    if left_out:
+        warnings.warn(
+            f"{os.fspath(path)}: {chosen.name.upper()} holds no {left_out[0]}; only the "
+            f"{chosen.carries[0]} was written",
+            FbaWarning,
+            stacklevel=2,
+        )
+
+
+def writer_for(path: Path, format: str | None = None) -> Format:
+    """The format to write a file of this name in; format: its name, where the suffix is not to say.
+
+    Raises FormatError for an unknown suffix, UnsupportedError for a format that can be read only.
+    """
     if format is not None:
         chosen = _named(format)
     else:
@@ -170,39 +190,27 @@ def write(path: Path, animation: Animation, *, format: str | None = None, **opti
             f"{os.fspath(path)}: {chosen.name.upper()} can be read only; write one of {_list(writing=True)}",
             what=f"writing {chosen.name.upper()}",
         )
-    _check_options(chosen.name, "writing", options, chosen.write_options)
-    present = [part for part in ("face", "body") if getattr(animation, part) is not None]
-    left_out = [part for part in present if part not in chosen.carries]
-    chosen.write(path, animation, **options)
-    if left_out:
-        warnings.warn(
-            f"{os.fspath(path)}: {chosen.name.upper()} holds no {left_out[0]}; only the "
-            f"{chosen.carries[0]} was written",
-            FbaWarning,
-            stacklevel=2,
-        )
+    return chosen
 
 
-def probe(data_or_path: bytes | bytearray | memoryview | Path) -> StreamInfo:
-    """What an FBA stream, in memory or in a file, says of itself, without decoding its values.
+def probe(data_or_path: bytes | bytearray | memoryview | Path, *, bap_steps: str = "iso") -> StreamInfo:
+    """What an FBA stream, in memory or in a file, or a file of another format holds.
 
-    Raises FormatError, BitstreamError, and UnsupportedError for a file of another format.
+    bap_steps: as for `fba.decode`; it matters to no more than what counts as damage. Values of a stream
+    are decoded, but not kept; damage is stepped over and listed. Raises FormatError, BitstreamError.
     """
-    from fba.codec import probe_stream
+    from fba.codec import StreamInfo, probe_stream
     from fba.formats.fba import located
     from fba.formats.source import read_whole
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
-        return probe_stream(bytes(data_or_path))
+        return probe_stream(data_or_path, bap_steps=bap_steps)
     found = format_of(data_or_path)
-    if found.name != "fba":
-        raise UnsupportedError(
-            f"{os.fspath(data_or_path)}: is a {found.name.upper()} file, and only FBA streams can be probed; "
-            "read it",
-            what=f"probing {found.name.upper()}",
-        )
-    with located(data_or_path):
-        return probe_stream(read_whole(data_or_path))
+    if found.name == "fba":
+        with located(data_or_path):
+            return probe_stream(read_whole(data_or_path), bap_steps=bap_steps)
+    animation = found.read(data_or_path)
+    return StreamInfo.of_animation(animation, found.name, os.stat(data_or_path).st_size)
 
 
 def _named(name: str) -> Format:

@@ -1,0 +1,77 @@
+"""`fba demo`: the main job, from motion capture to a picture, on samples that come with fba."""
+
+from __future__ import annotations
+
+import tempfile
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import click
+
+from fba.animation import Animation
+from fba.cli import options
+from fba.errors import DisplayError
+
+BAP_STEPS = "visage"
+"""The standard's own table moves a root in steps of 64 mm, which shows."""
+
+
+@click.command(epilog=options.examples("fba demo", "fba demo --no-play --out demo/"))
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for what is made; default: a new one.",
+)
+@click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
+def command(out: Path | None, play: bool | None) -> None:
+    """Encode sample motion capture, print what came out, and play it.
+
+    Without a display, render it to a video and a picture instead.
+    """
+    import player
+    from fba.codec import EncoderOptions, encode, probe_stream
+    from fba.formats import merge, read
+
+    folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    with as_file(files("fba") / "samples") as samples:
+        body, face = read(samples / "hello.bvh"), read(samples / "hello.fap")
+        captured = sum((samples / name).stat().st_size for name in ("hello.bvh", "hello.fap"))
+    animation = merge(face, body.resample(face.rate))
+    click.echo(
+        f"motion capture: {options.seconds(animation.duration)}, a body of {len(body)} frames and a face of "
+        f"{len(face)}, {captured} bytes"
+    )
+    stream = folder / "hello.fba"
+    data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
+    options.write_bytes(stream, data)
+    info = probe_stream(data, bap_steps=BAP_STEPS)
+    click.echo(
+        f"encoded: {stream}, {len(data)} bytes, {info.bits_per_second / 1000:.2f} kbit/s, "
+        f"{captured / len(data):.0f} times smaller"
+    )
+    decoded = read(stream, bap_steps=BAP_STEPS)
+    click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")
+    if play is not False and _played(player, decoded, asked=play is True):
+        return
+    _render(player, decoded, folder)
+
+
+def _played(player: object, animation: Animation, *, asked: bool) -> bool:
+    try:
+        click.echo("playing it in a window; Esc closes it")
+        player.play(animation, loop=True, title="fba demo")  # type: ignore[attr-defined]
+    except DisplayError as error:
+        if asked:
+            raise
+        click.echo(f"no window: {str(error).splitlines()[0]}")
+        return False
+    return True
+
+
+def _render(player: object, animation: Animation, folder: Path) -> None:
+    video, picture = folder / "hello.mp4", folder / "hello.png"
+    with options.progress("rendering", None) as step:
+        player.render(animation, video, size=(640, 360), progress=step.of)  # type: ignore[attr-defined]
+    player.render(animation, picture, time=float(animation.times[0]) + 2.0)  # type: ignore[attr-defined]
+    click.echo(f"rendered: {video} and {picture}")

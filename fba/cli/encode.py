@@ -1,0 +1,175 @@
+"""`fba encode`: FAP, BAP and motion-capture files to an FBA stream."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import click
+
+from fba.animation import Animation
+from fba.cli import options
+from fba.errors import FormatError
+
+
+@click.command(
+    epilog=options.examples(
+        "fba encode walk.bvh -o walk.fba",
+        "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4",
+        "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
+        "fba encode talk.fap -o talk.fba --epf talk.epf",
+    )
+)
+@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=options.EXISTING)
+@click.option(
+    "-o", "--output", metavar="OUT.fba", required=True, type=options.OUTPUT, help="- for standard output."
+)
+@options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
+@click.option("--name", help="Name of the sequence, for input without a header.")
+@click.option(
+    "--quant", type=click.IntRange(0, 31), default=1, show_default=True, help="fap_quant; 0: unquantised."
+)
+@click.option(
+    "--bap-quant", type=click.IntRange(0, 31), default=1, show_default=True, help="bap_quant; 0: unquantised."
+)
+@click.option(
+    "--intra-period", type=options.PeriodType(), metavar="SECONDS", help="An I plane at least this often."
+)
+@click.option(
+    "--start-codes", is_flag=True, help="Start codes before I planes: points to seek to and resume at."
+)
+@options.bap_steps_option
+@click.option("--preset", type=click.Choice(["reference"]), default="reference", show_default=True)
+@click.option(
+    "--unsent",
+    type=click.Choice(["keep", "interpolate"]),
+    default="keep",
+    show_default=True,
+    help="What a player shows for FAPs that are not sent.",
+)
+@click.option(
+    "--gender",
+    type=click.Choice(["female", "male"]),
+    default="female",
+    show_default=True,
+    help="suggested_gender.",
+)
+@click.option(
+    "--clamp", is_flag=True, help="Bring values that cannot be coded into range instead of failing."
+)
+@click.option(
+    "--epf", type=options.EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says."
+)
+@options.salvage_option
+@options.json_option
+def command(
+    inputs: tuple[Path, ...],
+    output: Path,
+    fps: Fraction | None,
+    name: str | None,
+    quant: int,
+    bap_quant: int,
+    intra_period: Fraction | None,
+    start_codes: bool,
+    bap_steps: str,
+    preset: str,
+    unsent: str,
+    gender: str,
+    clamp: bool,
+    epf: Path | None,
+    salvage: bool,
+    as_json: bool,
+) -> None:
+    """Encode FAP, BAP or motion-capture files as an FBA stream.
+
+    A face file and a body file together become one stream. Ranges fit the data; a value that no range
+    can carry is an error, or clamped with --clamp.
+    """
+    from fba.codec import EncoderOptions, encode_planes, encode_with_statistics
+
+    with options.progress("reading", len(inputs)) as step:
+        animation = _joined(inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step)
+    if epf is not None:
+        from fba.formats.epf import read_epf
+
+        planes = read_epf(epf)
+        data = encode_planes(animation, planes, bap_steps=bap_steps)
+        frames, intra, clamped = len(planes), sum(plane.intra for plane in planes), 0
+    else:
+        data, statistics = encode_with_statistics(
+            animation,
+            EncoderOptions(
+                fap_quant=quant,
+                bap_quant=bap_quant,
+                intra_period=intra_period,
+                start_codes=start_codes,
+                bap_steps=bap_steps,
+                preset=preset,
+                unsent=unsent,
+                gender=int(gender == "male"),
+                clamp=clamp,
+            ),
+        )
+        frames, intra, clamped = statistics.planes, statistics.intra_planes, statistics.clamped
+    options.write_bytes(output, data)
+    rate = 8 * len(data) / float(animation.duration)
+    if as_json:
+        options.print_json(
+            {
+                "output": str(output),
+                "size": len(data),
+                "frames": frames,
+                "intra_planes": intra,
+                "rate": str(animation.rate),
+                "duration": float(animation.duration),
+                "bits_per_second": round(rate, 3),
+                "clamped": clamped,
+            }
+        )
+        return
+    text = (
+        f"{output}: {frames} frames, {options.seconds(animation.duration)} at "
+        f"{options.rate_text(animation.rate)} frames/s, {len(data)} bytes, {rate / 1000:.2f} kbit/s, "
+        f"{intra} I plane{'s' if intra != 1 else ''}"
+    )
+    if clamped:
+        text += f"; {clamped} values clamped"
+    click.echo(text, err=str(output) == "-")
+
+
+def _joined(
+    inputs: tuple[Path, ...],
+    *,
+    fps: Fraction | None,
+    name: str | None,
+    bap_steps: str,
+    salvage: bool,
+    step: options.Progress,
+) -> Animation:
+    """Face and body of all inputs as one animation."""
+    from fba.formats import merge
+
+    result: Animation | None = None
+    for path in inputs:
+        animation = options.read_input(path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage)
+        step(1)
+        if not len(animation):
+            raise FormatError("the file holds no frames; there is nothing to encode", path=path)
+        if result is None:
+            result = animation
+            continue
+        if (result.face is not None and animation.face is not None) or (
+            result.body is not None and animation.body is not None
+        ):
+            raise click.UsageError(
+                f"{path} is a second {'face' if animation.face is not None else 'body'} file; "
+                "encode one face and one body file at most"
+            )
+        if animation.rate != result.rate:
+            raise click.UsageError(
+                f"{path} has {options.rate_text(animation.rate)} frames/s, the file before it "
+                f"{options.rate_text(result.rate)}; bring them to one rate with --fps"
+            )
+        result = merge(result, animation) if result.face is not None else merge(animation, result)
+    assert result is not None
+    return result

@@ -1,0 +1,105 @@
+"""Entry point of the `fba` command: finds subcommands, turns errors into one line and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from importlib import import_module
+
+import click
+
+from fba import __version__
+from fba.errors import FbaError, FbaWarning
+
+_COMMANDS = {
+    "info": "What a file holds: frames, rate, parameters, bits; every syntax element with --trace.",
+    "encode": "Encode FAP, BAP or motion-capture files as an FBA stream.",
+    "decode": "Decode FBA streams to FAP, BAP and EPF files.",
+    "convert": "Convert a file into another format.",
+    "play": "Play a file in a window.",
+    "render": "Render a file to a picture or a video, without a window.",
+    "stats": "Where the bits of FBA streams go.",
+    "conformance": "Check this codec against test vectors.",
+    "bench": "Measure the speed of this codec on a stream.",
+    "demo": "Encode sample motion capture, print what came out, and play it.",
+}
+
+BAD_DATA, BAD_USAGE, INTERRUPTED = 1, 2, 130
+
+
+class _Commands(click.Group):
+    """Lists subcommands without importing them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _COMMANDS:
+            return None
+        command: click.Command = import_module(f"fba.cli.{cmd_name}").command
+        if not any(param.name == "debug" for param in command.params):
+            command.params.append(
+                click.Option(["--debug"], is_flag=True, expose_value=False, help="Show tracebacks of errors.")
+            )
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(_COMMANDS.items()))
+
+
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Examples:\n\n\b\n  fba encode walk.bvh -o walk.fba\n  fba info walk.fba\n  fba play walk.fba\n",
+)
+@click.version_option(__version__, prog_name="fba")
+@click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks of errors.")
+def group() -> None:
+    """MPEG-4 Face and Body Animation: encode, decode, convert, play and measure."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit: 0 done, 1 bad data, 2 bad usage, 130 interrupted."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
+    warnings.simplefilter("always", FbaWarning)
+    warnings.showwarning = _show_warning  # type: ignore[assignment]
+    try:
+        result = group.main(arguments, prog_name="fba", standalone_mode=False)
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(BAD_USAGE)
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("fba: interrupted", err=True)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever read our output has seen enough. Python would complain once more while it shuts down.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except (FbaError, OSError, MemoryError) as error:
+        if debug:
+            raise
+        click.echo(f"fba: error: {_one_line(error)}", err=True)
+        sys.exit(BAD_DATA)
+    sys.exit(result if isinstance(result, int) else 0)
+
+
+def _one_line(error: BaseException) -> str:
+    if isinstance(error, MemoryError):
+        return "not enough memory for this; work on parts of it (--start, --end)"
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+    if issubclass(category, FbaWarning):
+        click.echo(f"fba: warning: {message}", err=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,222 @@
+"""Options that several subcommands share, and what they all do with files and output."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from fba.animation import Animation
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+EXISTING = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
+OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
+
+
+class RateType(click.ParamType[Fraction]):
+    """A frame rate: 25, 29.97, 30000/1001."""
+
+    name = "rate"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
+        from fba.formats.rates import parse_rate
+
+        try:
+            return parse_rate(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+class PeriodType(click.ParamType[Fraction]):
+    """A positive number of seconds."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
+        try:
+            seconds = Fraction(value)
+        except (ValueError, ZeroDivisionError):
+            self.fail(f"{value!r} is not a number of seconds", param, ctx)
+        if seconds <= 0:
+            self.fail(f"{value} is not positive", param, ctx)
+        return seconds
+
+
+class SizeType(click.ParamType[tuple[int, int]]):
+    """Width and height in pixels: 1280x720."""
+
+    name = "size"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        width, _, height = str(value).lower().partition("x")
+        if not (width.isdecimal() and height.isdecimal()) or not (0 < int(width) <= 16384 > int(height) > 0):
+            self.fail(f"{value!r} is not a size; write e.g. 1280x720", param, ctx)
+        return int(width), int(height)
+
+
+def fps_option(text: str) -> Callable[[Command], Command]:
+    return click.option("--fps", type=RateType(), metavar="RATE", help=text)
+
+
+def bap_steps_option(command: Command) -> Command:
+    return click.option(
+        "--bap-steps",
+        type=click.Choice(["iso", "visage"]),
+        default="iso",
+        show_default=True,
+        help="Table of BAP quantiser steps: the standard's, or one vendor's. Streams do not say which.",
+    )(command)
+
+
+def camera_option(command: Command) -> Command:
+    return click.option(
+        "--camera",
+        type=click.Choice(["front", "three-quarter", "profile", "body"]),
+        help="Default: one that suits the content.",
+    )(command)
+
+
+def axes_option(command: Command) -> Command:
+    return click.option(
+        "--axes",
+        type=click.Choice(["iso", "vreng"]),
+        default="iso",
+        show_default=True,
+        help="Which way BAPs turn: as the standard says, or as in some old files.",
+    )(command)
+
+
+def json_option(command: Command) -> Command:
+    return click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")(command)
+
+
+def salvage_option(command: Command) -> Command:
+    return click.option(
+        "--salvage", is_flag=True, help="Keep what can be read of damaged input, and say what was lost."
+    )(command)
+
+
+def examples(*lines: str) -> str:
+    """An epilog that shows commands as they are typed."""
+    return "Examples:\n\n\b\n" + "\n".join(f"  {line}" for line in lines) + "\n"
+
+
+def print_json(value: object) -> None:
+    click.echo(json.dumps(value, indent=2))
+
+
+@contextmanager
+def input_file(path: Path) -> Iterator[Path]:
+    """The file itself, or for "-" a temporary one that holds standard input."""
+    if str(path) != "-":
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="fba-") as folder:
+        spooled = Path(folder) / "stdin"
+        with spooled.open("wb") as file:
+            while chunk := sys.stdin.buffer.read(1 << 20):
+                file.write(chunk)
+        yield spooled
+
+
+def read_input(
+    path: Path,
+    *,
+    bap_steps: str = "iso",
+    fps: Fraction | None = None,
+    header_fps: Fraction | None = None,
+    name: str | None = None,
+    salvage: bool = False,
+) -> Animation:
+    """Read a file of any format.
+
+    fps resamples what was read; it, or header_fps, and name stand in for a header that a file lacks.
+    """
+    from fba.formats import format_of, read
+
+    wanted = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name, "salvage": salvage or None}
+    with input_file(path) as file:
+        found = format_of(file)
+        taken = {
+            key: value for key, value in wanted.items() if value is not None and key in found.read_options
+        }
+        animation = read(file, format=found.name, **taken)
+    if fps is not None and animation.rate != fps:
+        animation = animation.resample(fps)
+    return animation
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a whole file, or standard output for "-"; an interrupted command leaves an old file whole."""
+    from fba.formats.atomic import atomic
+
+    if str(path) == "-":
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+        return
+    with atomic(path) as file:
+        file.write(data)
+
+
+def seconds(value: Fraction | float) -> str:
+    return f"{float(value):.2f} s"
+
+
+def rate_text(rate: Fraction) -> str:
+    """25, 30.5, 29.97 for 30000/1001."""
+    return f"{float(rate):.3f}".rstrip("0").rstrip(".")
+
+
+class Progress:
+    """Steps of a long job, shown as a bar on standard error where that is a terminal."""
+
+    def __init__(self, label: str, total: int | None) -> None:
+        self._label, self._total = label, total
+        self._bar: Any = None
+        self._task: Any = None
+
+    def __enter__(self) -> Progress:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+            from rich.progress import Progress as Bar
+
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeRemainingColumn(),
+            )
+            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._task = self._bar.add_task(self._label, total=self._total)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, done: int) -> None:
+        """That many more steps are done."""
+        if self._bar is not None:
+            self._bar.update(self._task, advance=done)
+
+    def of(self, done: int, total: int) -> None:
+        """So many steps of so many are done."""
+        if self._bar is not None:
+            self._bar.update(self._task, completed=done, total=total)
+
+
+def progress(label: str, total: int | None) -> Progress:
+    """A progress bar for a `with` statement; call it with the number of steps done."""
+    return Progress(label, total)

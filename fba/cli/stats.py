@@ -1,0 +1,98 @@
+"""`fba stats`: where the bits of FBA streams go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from fba.cli import options
+from fba.codec.stream_info import StreamInfo
+
+
+@click.command(epilog=options.examples("fba stats talk.fba", "fba stats --json *.fba"))
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
+@options.bap_steps_option
+@options.json_option
+def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
+    """Where the bits of FBA streams go: I and P planes, mean and peak rates."""
+    from fba.codec import probe_stream
+
+    rows = []
+    for path in files:
+        with options.input_file(path) as file:
+            rows.append(
+                {"file": str(path), **statistics(probe_stream(file.read_bytes(), bap_steps=bap_steps))}
+            )
+    if as_json:
+        options.print_json(rows if len(rows) > 1 else rows[0])
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    columns = (
+        "bytes",
+        "frames",
+        "seconds",
+        "kbit/s",
+        "peak kbit/s",
+        "I planes",
+        "bits/I",
+        "bits/P",
+        "P 95 %",
+        "I share",
+    )
+    table.add_column("file", overflow="fold")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for row in rows:
+        table.add_row(
+            row["file"],
+            str(row["size"]),
+            str(row["frames"]),
+            f"{row['duration']:.2f}",
+            f"{row['bits_per_second'] / 1000:.2f}",
+            f"{row['peak_bits_per_second'] / 1000:.2f}",
+            str(row["intra_planes"]),
+            f"{row['intra_bits_mean']:.0f}",
+            f"{row['predicted_bits_median']:.0f}",
+            f"{row['predicted_bits_95']:.0f}",
+            f"{100 * row['intra_share']:.0f} %",
+        )
+    Console(width=None if Console().is_terminal else 160).print(table)
+
+
+def statistics(info: StreamInfo) -> dict[str, Any]:
+    """Bits of a stream: size, bits_per_second, the busiest second, and how planes share them.
+
+    intra_bits_mean, predicted_bits_median, predicted_bits_95: bits a plane; 0 where there are none of
+    that kind. intra_share: what part of the planes' bits the I planes take.
+    """
+    assert info.plane_bits is not None
+    assert info.plane_intra is not None
+    assert info.frame_index is not None
+    intra, predicted = info.plane_bits[info.plane_intra], info.plane_bits[~info.plane_intra]
+    total = int(info.plane_bits.sum())
+    return {
+        "size": info.size,
+        "frames": info.frames,
+        "duration": float(info.duration),
+        "bits_per_second": round(info.bits_per_second, 3),
+        "peak_bits_per_second": _peak(info.plane_bits, info.frame_index / float(info.rate)),
+        "intra_planes": len(intra),
+        "intra_bits_mean": float(intra.mean()) if len(intra) else 0.0,
+        "predicted_bits_mean": float(predicted.mean()) if len(predicted) else 0.0,
+        "predicted_bits_median": float(np.median(predicted)) if len(predicted) else 0.0,
+        "predicted_bits_95": float(np.percentile(predicted, 95)) if len(predicted) else 0.0,
+        "intra_share": float(intra.sum() / total) if total else 0.0,
+    }
+
+
+def _peak(bits: np.ndarray, times: np.ndarray) -> int:
+    """Most bits within any one second that starts with a plane."""
+    sums = np.concatenate([[0], np.cumsum(bits)])
+    stops = np.searchsorted(times, times + 1.0 - 1e-9)
+    return int((sums[stops] - sums[: len(bits)]).max())
