@@ -118,14 +118,16 @@ class Reader:
         self.stream.pos = start + segment.bits
         return segment.symbols, start, segment.inserted
 
-    def stuffing_before_start_code(self) -> int | None:
+    def stuffing_before_start_code(self, *, behind_start_code: bool = False) -> int | None:
         """Bits of alignment stuffing between here and a start code; None where none follows.
 
         Stuffing is a 0 and then 1s to the byte boundary: 1 to 8 bits. Where we are aligned already it may
-        be missing, as it is behind another start code.
+        be missing; behind another start code it must be, for there the byte 0x7F can begin a plane. (A P
+        plane with BAPs may look like stuffing and a start code in other places too: the guard against
+        emulation counts zeros in its segment only. A writer must set a plane start code before such a one.)
         """
         unaligned = -self.bit % 8
-        for bits in (unaligned,) if unaligned else (0, 8):
+        for bits in (unaligned,) if unaligned else (0,) if behind_start_code else (0, 8):
             if self.bit + bits + PREFIX_BITS > self.size:
                 continue
             ahead = str(self.stream.peek(f"bin:{bits + PREFIX_BITS}"))

@@ -103,7 +103,9 @@ class Walker:
         reader = self.reader
         begin, start_code = reader.bit, None
         reader.plane = None
-        while (stuffing := reader.stuffing_before_start_code()) is not None:
+        while (
+            stuffing := reader.stuffing_before_start_code(behind_start_code=start_code is not None)
+        ) is not None:
             code = reader.start_code(stuffing)
             if code not in PLANE_START_CODES:
                 self._read_rest()

@@ -237,6 +237,19 @@ def test_start_codes_between_planes_old_and_new() -> None:
     assert [p["fap"] for p in decode_values(old)] == [{3: 20}]
 
 
+def test_plane_behind_a_start_code_may_look_like_another() -> None:
+    """P plane, FAPs and BAPs, skip 15: 0 11 1 1111 is 0x7F; then 0000 and 19 zeros of levels, and a 1."""
+    both = "1" + "11" + NO_RATE + NO_TIME + NO_SKIP
+    no_baps = f"{1:05b}" + NO_BAPS * 24 + GENDER_CODING + NO_LISTS + "01"
+    levels = coded([0, 0], [(-1080, 1080), (-600, 600)])
+    first = both + f"{1:05b}" + fap_masks(3, 4) + GENDER_CODING + NO_LISTS + levels + no_baps
+    highest = encode_segment([720, 360], [FrequencyTable(721), FrequencyTable(361)], learn=True)
+    assert highest == "0" * 19 + "1"
+    second = "0" + "11" + "1" + "1111" + "0000" + highest + "01"
+    planes = decode_values(as_bytes(stuffed(stuffed(OBJECT + first) + PLANE + second) + END))
+    assert [p["fap"] for p in planes] == [{3: 0, 4: 0}, {3: 360 * 4, 4: 180 * 2}]
+
+
 @pytest.mark.parametrize("end", ["", OBJECT, f"{0x1B0:032b}"])
 def test_any_other_start_code_or_the_end_of_the_data_ends_the_object(end: str) -> None:
     data = as_bytes(stuffed(OBJECT + JAW_PLANE) + end)
