@@ -9,8 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.compiled import compiled, inlined
+
+Float = npt.NDArray[np.float64]
+Int = npt.NDArray[np.int64]
 
 UNIT = 1e-5
 """Radians in one unit of a rotational BAP."""
@@ -22,7 +26,7 @@ TURN = 2.0 * math.pi
 
 
 @inlined
-def _turn(matrix, axis, angle):  # type: ignore[no-untyped-def]
+def _turn(matrix: Float, axis: int, angle: float) -> None:
     """matrix := matrix . Rot(axis, angle), in place, on the upper left 3 x 3."""
     c = math.cos(angle)
     s = math.sin(angle)
@@ -36,7 +40,17 @@ def _turn(matrix, axis, angle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def pose(values, parents, offsets, bap, axis, sign, translation, translation_sign, result):  # type: ignore[no-untyped-def]
+def pose(
+    values: Float,
+    parents: Int,
+    offsets: Float,
+    bap: Int,
+    axis: Int,
+    sign: Float,
+    translation: Int,
+    translation_sign: Float,
+    result: Float,
+) -> None:
     """values float64 (T, 296) -> result float64 (T, J, 4, 4), given filled with 0.
 
     offsets: float64 (J, 3) from the parent; bap, axis, sign: (J, 3), see `Convention`.
@@ -71,13 +85,13 @@ def pose(values, parents, offsets, bap, axis, sign, translation, translation_sig
 
 
 @inlined
-def _nearest(angle, wanted):  # type: ignore[no-untyped-def]
+def _nearest(angle: float, wanted: float) -> float:
     """The angle plus the number of whole turns that bring it closest to the wanted one."""
     return angle + TURN * math.floor((wanted - angle) / TURN + 0.5)
 
 
 @inlined
-def _angle_about(m, axis):  # type: ignore[no-untyped-def]
+def _angle_about(m: Float, axis: int) -> float:
     """The turn about one axis that comes closest to the rotation m (largest trace of their quotient)."""
     a = (axis + 1) % 3
     b = (axis + 2) % 3
@@ -85,7 +99,9 @@ def _angle_about(m, axis):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def local_angles(m, count, axis, sign, before, angles, work):  # type: ignore[no-untyped-def]
+def local_angles(
+    m: Float, count: int, axis: Int, sign: Float, before: Float, angles: Float, work: Float
+) -> None:
     """Angles (radians, outermost first) whose turns give the rotation m, closest to those before.
 
     m: (3, 3). count: number of freedoms, 1 to 3. before, angles: (3,). work: (3, 3) scratch.
@@ -154,7 +170,7 @@ def local_angles(m, count, axis, sign, before, angles, work):  # type: ignore[no
 
 
 @inlined
-def _turn_rows(matrix, axis, angle):  # type: ignore[no-untyped-def]
+def _turn_rows(matrix: Float, axis: int, angle: float) -> None:
     """matrix := Rot(axis, -angle) . matrix, in place: takes an outermost turn off."""
     c = math.cos(angle)
     s = math.sin(angle)
@@ -169,8 +185,19 @@ def _turn_rows(matrix, axis, angle):  # type: ignore[no-untyped-def]
 
 @compiled
 def solve(
-    matrices, parents, centre, bap, axis, sign, translation, translation_sign, wanted, previous, limit, values
-):  # type: ignore[no-untyped-def]
+    matrices: Float,
+    parents: Int,
+    centre: Float,
+    bap: Int,
+    axis: Int,
+    sign: Float,
+    translation: Int,
+    translation_sign: Float,
+    wanted: npt.NDArray[np.bool_],
+    previous: Float,
+    limit: int,
+    values: npt.NDArray[np.int32],
+) -> bool:
     """matrices float64 (T, J, 4, 4) -> values int32 (T, 296), given filled with 0.
 
     centre: (3,) of the root. wanted: bool (J,), joints to solve; the others stay unturned. previous:
@@ -222,7 +249,7 @@ def solve(
 
 
 @compiled
-def joint_angles(local, count, axis, sign, angles):  # type: ignore[no-untyped-def]
+def joint_angles(local: Float, count: int, axis: Int, sign: Float, angles: Float) -> None:
     """local float64 (T, 3, 3) -> angles (T, 3), each frame close to the one before (`local_angles`)."""
     work = np.zeros((3, 3))
     before = np.zeros(3)

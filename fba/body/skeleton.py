@@ -54,7 +54,8 @@ class Skeleton:
             raise ModelError(f"Skeleton: two joints are called {twice!r}; names must be unique")
         if parents[0] != -1:
             raise ModelError(
-                f"Skeleton: the first joint, {names[0]!r}, must be the root (parent -1), not a child of {parents[0]}"
+                f"Skeleton: the first joint, {names[0]!r}, must be the root (parent -1), "
+                f"not a child of {parents[0]}"
             )
         for number in range(1, count):
             if not 0 <= parents[number] < number:

@@ -86,7 +86,8 @@ class BapSolver:
         count = len(self.skeleton)
         if array.ndim not in (3, 4) or array.shape[-3:] != (count, 4, 4):
             raise ValueError(
-                f"BapSolver.solve: matrices must have shape ({count}, 4, 4) or (T, {count}, 4, 4), not {array.shape}"
+                f"BapSolver.solve: matrices must have shape ({count}, 4, 4) or "
+                f"(T, {count}, 4, 4), not {array.shape}"
             )
         if not np.isfinite(array).all():
             raise ValueError("BapSolver.solve: matrices must be finite")

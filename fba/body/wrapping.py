@@ -28,9 +28,11 @@ def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> npt.NDArray[np.int
     result = array.astype(np.int32)
     for column in columns:
         angles = array[:, column].astype(np.int64)
-        if not len(angles) or (low := int(angles.min())) >= -limit and int(angles.max()) <= limit:
+        low, high = int(angles.min(initial=0)), int(angles.max(initial=0))
+        if -limit <= low and high <= limit:
             continue
-        angles = angles - _turns((low + int(angles.max())) / 2)
+        low, high = int(angles.min()), int(angles.max())
+        angles = angles - _turns((low + high) / 2)
         if int(np.abs(angles).max()) > limit:
             angles = angles - _turns(angles.astype(np.float64))
         result[:, column] = angles

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.compiled import compiled
+
+Float = npt.NDArray[np.float64]
 
 WINDINGS = 1
 """Twists are followed as far as so many whole turns to either side of the usual one."""
@@ -14,7 +17,16 @@ TURN = 2.0 * math.pi
 
 
 @compiled
-def choose(twists, wrong, firm, usual, period, clear, patience, chosen):  # type: ignore[no-untyped-def]
+def choose(
+    twists: Float,
+    wrong: Float,
+    firm: Float,
+    usual: Float,
+    period: float,
+    clear: float,
+    patience: float,
+    chosen: npt.NDArray[np.int64],
+) -> None:
     """Fills chosen, int64 (T,): which of the two possible twists to take in each frame.
 
     twists: float64 (T, 2), radians. wrong: (T, 2), angle by which the hinge then bends the unnatural way.

@@ -20,9 +20,9 @@ FEWEST = 5
 def families() -> dict[str, dict[str, str]]:
     """Per family: simplified source name -> joint of the standard."""
     result: dict[str, dict[str, str]] = {}
-    with (files(__package__) / "joint_names.csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            result.setdefault(row["family"], {})[simplified(row["source"])] = row["joint"]
+    text = (files(__package__) / "joint_names.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        result.setdefault(row["family"], {})[simplified(row["source"])] = row["joint"]
     return result
 
 

@@ -96,7 +96,7 @@ class SkeletonMotion:
         at = np.arange(count) * float(ratio)
         before = np.minimum(at.astype(np.intp), len(self) - 1)
         after = np.minimum(before + 1, len(self) - 1)
-        weight = at - before
+        weight = (at - before).astype(np.float64)
         positions = self.positions[before] * (1 - weight[:, None]) + self.positions[after] * weight[:, None]
         turned = rotations.interpolate(self.rotations, before, after, weight)
         return replace(self, rate=rate, rotations=turned, positions=positions)

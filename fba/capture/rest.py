@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -33,26 +34,26 @@ class Bone:
 
     base: joint from whose alignment the smallest further rotation is taken, or "facing". aims: joints
     at the bone's other end, the first that is mapped counts. tip: the default posture's joint that a
-    source bone without a next joint points to.
+    source bone without a next joint points to. via: "down" where the smallest rotation goes by way of a limb
+    that hangs straight down, so that T, A and standing rest poses twist alike.
     """
 
     joint: str
     base: str
     aims: tuple[str, ...]
     tip: str
+    via: str
 
 
 @cache
 def bones() -> tuple[Bone, ...]:
     """Bones of the limbs, parents first, left then right."""
-    with (files(__package__) / "bones.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    text = (files(__package__) / "bones.csv").read_text(encoding="utf-8")
     return tuple(
-        Bone(*(row[key].replace("?", side) for key in ("joint", "base")),
-             tuple(row["aims"].replace("?", side).split()), row["tip"].replace("?", side))
+        Bone(row["joint"], row["base"], tuple(row["aims"].split()), row["tip"], row["via"])
         for side in "lr"
-        for row in rows
-    )  # fmt: skip
+        for row in csv.DictReader(text.replace("?", side).splitlines())
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,20 +79,25 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     short = SHORT * size
 
     def default(joint: str) -> Float:
-        return skeleton.centres[skeleton.number(joint)]
+        place: Float = skeleton.centres[skeleton.number(joint)]
+        return place
 
     corrections: dict[str, Float] = {}
     aims: dict[str, str] = {}
 
-    def aligned(joint: str, aim: str, start: Float) -> Float:
+    def aligned(joint: str, aim: str, start: Float, via: str = "") -> Float:
         source = rest[mapped[aim]] - rest[mapped[joint]]
         if np.linalg.norm(source) <= short:
             return start
         aims[joint] = aim
-        return rotations.between(start @ (default(aim) - default(joint)), source) @ start
+        bone = start @ (default(aim) - default(joint))
+        if via:
+            down = np.array([0.0, -1.0, 0.0])
+            return rotations.between(down, source) @ rotations.between(bone, down) @ start
+        return rotations.between(bone, source) @ start
 
     spine = [joint for joint in spine_joints(skeleton) if joint in mapped]
-    for joint, above in zip(spine, spine[1:], strict=False):
+    for joint, above in pairwise(spine):
         corrections[joint] = aligned(joint, above, facing)
     if spine:
         corrections[spine[-1]] = facing
@@ -103,7 +109,7 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
         start = corrections.get(bone.base, facing)
         aim = next((aim for aim in bone.aims if aim in mapped), None)
         if aim is not None:
-            corrections[bone.joint] = aligned(bone.joint, aim, start)
+            corrections[bone.joint] = aligned(bone.joint, aim, start, bone.via)
             continue
         corrections[bone.joint] = start
         at_joint = ends[motion.end_parents == mapped[bone.joint]]

@@ -52,7 +52,8 @@ def turn(axis: Float, angle: Float) -> Float:
     )
     s = np.sin(angle)[..., None, None]
     c = np.cos(angle)[..., None, None]
-    return np.eye(3) + s * cross + (1 - c) * (cross @ cross)
+    result: Float = np.eye(3) + s * cross + (1 - c) * (cross @ cross)
+    return result
 
 
 def between(start: Float, end: Float) -> Float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ Float = npt.NDArray[np.float64]
 CHUNK = 2048
 """Frames solved at a time: joint matrices of a long capture would not fit into memory."""
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
+ORIGINS = ("source", "start", "middle")
 LOOSE = 1e-3
 """Weight of a free preference against a bone's direction."""
 
@@ -32,6 +34,7 @@ def from_skeleton(
     *,
     joints: Mapping[str, str] | None = None,
     scale: float | None = None,
+    origin: str = "source",
     solver: BapSolver | None = None,
 ) -> Animation:
     """BAPs of a captured motion: a body track whose mask holds the BAPs of the joints that were found.
@@ -39,7 +42,9 @@ def from_skeleton(
     rate: frames a second; the motion's own where None, else resampled (slerp). joints: source joint
     name -> joint of the standard, in place of the built-in families of names. scale: metres of the body
     for one unit of the source's root translation; by default the ratio of leg lengths, so the source's
-    unit does not matter and feet do not slide. solver: skeleton and axes; the default body where None.
+    unit does not matter and feet do not slide. origin: what stands at the default place: "source", the
+    source's own origin; "start", the first frame; "middle", the middle of the path, which keeps long walks
+    within what a stream can carry. solver: skeleton and axes; the default body where None.
 
     Bones point where the source's bones point; the spine's parts turn the vertebrae that carry them;
     where the source turns about an axis that a joint lacks, the joint before or after it turns instead.
@@ -56,8 +61,10 @@ def from_skeleton(
         motion = motion.resample(rate)
     if not len(motion):
         raise ModelError("the motion has no frames")
+    if origin not in ORIGINS:
+        raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
     retarget = _Retarget(motion, mapped, solver, scale)
-    values = retarget.values()
+    values = retarget.values(origin)
     moved = np.zeros(BAP_COUNT, dtype=bool)
     turned = {*retarget.wanted, solver.skeleton.names[0]}
     moved[[b.number - 1 for b in baps() if b.joint in turned]] = True
@@ -105,12 +112,15 @@ class _Retarget:
         if not (np.isfinite(self.scale) and self.scale > 0):
             raise ValueError(f"scale must be a positive number, not {scale}")
 
-    def values(self) -> npt.NDArray[np.int32]:
+    def values(self, origin: str) -> npt.NDArray[np.int32]:
         """int32 (T, 296): the BAPs that reach the wanted rotations and places."""
         count = len(self.motion)
         numbers = {joint: self.skeleton.number(joint) for joint in self.wanted}
         result = np.zeros((count, BAP_COUNT), dtype=np.int32)
         root = self._root_places()
+        if origin != "source":
+            place = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
+            root[:, [0, 2]] -= (place - self.skeleton.centres[0])[[0, 2]]
         previous = None
         for begin in range(0, count, CHUNK):
             end = min(begin + CHUNK, count)
@@ -225,7 +235,7 @@ class _Retarget:
                 names = [f"{side}_{part}" for part in chain]
                 if not all(name in self.mapped for name in names):
                     continue
-                for a, b in zip(names, names[1:], strict=False):
+                for a, b in pairwise(names):
                     numbers = self.skeleton.number(a), self.skeleton.number(b)
                     ours += float(
                         np.linalg.norm(self.skeleton.centres[numbers[1]] - self.skeleton.centres[numbers[0]])
@@ -252,7 +262,8 @@ class _Retarget:
             pelvis = centres[number("sacroiliac")]
             own = centres[[number(j) for j in hips]].mean(axis=0)
             lower = self.wanted["sacroiliac"] @ (own - pelvis)
-            return middle - lower - self.wanted["HumanoidRoot"] @ (pelvis - centres[0])
+            place: Float = middle - lower - self.wanted["HumanoidRoot"] @ (pelvis - centres[0])
+            return place
         start: Float = self.places[:, self.mapped["HumanoidRoot"]] * self.scale
         return start
 

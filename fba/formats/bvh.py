@@ -212,7 +212,9 @@ def _numbers(
         even = even and len(words) == channels
         total += len(words)
         rows.append((number, words))
-    lost = total % channels
+    frames, lost = divmod(total, channels)
+    if not frames:
+        raise FormatError("there is no frame of motion after 'Frame Time'", path=path, line=first + 1)
     if not even:
         bad = next(n for n, (_, words) in enumerate(rows) if len(words) != channels)
         wrapped = claimed is not None and total == claimed * channels
@@ -229,9 +231,6 @@ def _numbers(
                 FbaWarning,
                 stacklevel=4,
             )
-    frames = total // channels
-    if not frames:
-        raise FormatError("there is no frame of motion after 'Frame Time'", path=path, line=first + 1)
     if claimed is not None and claimed != frames:
         warnings.warn(
             f"{path or 'BVH'}: the header says {claimed} frames, the file has {frames}; those are used",
