@@ -1,1 +1,64 @@
+"""The player: animations in a window, as pictures, and as films.
 
+    player.play(fba.read("talk.fba"))                       # opens a window
+    player.render(fba.read("talk.fba"), "talk.mp4")         # needs no display
+    with player.Offscreen(fba.read("talk.fba")) as view:
+        pixels = view.frame(1.5)                            # uint8 (720, 1280, 4)
+
+Importing this costs next to nothing; OpenGL is loaded where a picture is made.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from player.camera import Camera, Subject
+    from player.offscreen import Offscreen
+    from player.recording import record, render
+    from player.renderer import Renderer
+    from player.scene import Scene, default_camera
+    from player.timeline import Timeline
+    from player.transport import Transport
+    from player.window import play
+
+_PLACES = {
+    "Camera": "player.camera",
+    "Offscreen": "player.offscreen",
+    "Renderer": "player.renderer",
+    "Scene": "player.scene",
+    "Subject": "player.camera",
+    "Timeline": "player.timeline",
+    "Transport": "player.transport",
+    "default_camera": "player.scene",
+    "play": "player.window",
+    "record": "player.recording",
+    "render": "player.recording",
+}
+
+__all__ = [
+    "Camera",
+    "Offscreen",
+    "Renderer",
+    "Scene",
+    "Subject",
+    "Timeline",
+    "Transport",
+    "default_camera",
+    "play",
+    "record",
+    "render",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'player' has no attribute {name!r}")
+    value = getattr(import_module(_PLACES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

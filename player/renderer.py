@@ -28,15 +28,27 @@ class Renderer:
         self._gl = context
         self._programs = {name: self._program(name) for name in ("mesh", "capsule", "eye")}
         self._programs["studio"] = self._program("studio")
+        self._programs["shadow"] = self._program("shadow")
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
+        square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
         self._studio_buffer = context.buffer(corners.tobytes())
-        self._studio = context.vertex_array(self._programs["studio"], [(self._studio_buffer, "2f", "in_corner")])
+        self._square = context.buffer(square.tobytes())
+        self._blobs = context.buffer(reserve=MOST_BLOBS * 16, dynamic=True)
+        self._shadow = context.vertex_array(
+            self._programs["shadow"], [(self._square, "2f", "in_corner"), (self._blobs, "4f/i", "in_blob")]
+        )
+        self._backdrop: tuple[tuple[object, ...], Any, Any] | None = None
+        self._studio = context.vertex_array(
+            self._programs["studio"], [(self._studio_buffer, "2f", "in_corner")]
+        )
         self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
         self._capsule_parts = self._uploaded(*capsule_mesh())
         self._capsules = self._capsule_array()
         self._eye_parts = self._uploaded(*sphere_mesh())
         self._eye = context.vertex_array(
-            self._programs["eye"], [(self._eye_parts[0], "3f", "in_position")], index_buffer=self._eye_parts[1]
+            self._programs["eye"],
+            [(self._eye_parts[0], "3f", "in_position")],
+            index_buffer=self._eye_parts[1],
         )
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
 
@@ -51,7 +63,7 @@ class Renderer:
         for program in self._programs.values():
             _set(program, "eye", eye)
             _set(program, "camera", _bytes(matrix))
-        self._draw_studio(view, camera, matrix)
+        self._draw_studio(view, matrix, size)
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
             self._draw_mesh(mesh)
@@ -66,6 +78,7 @@ class Renderer:
                 part.release()
         self._shapes.clear()
         for part in (
+            *(self._backdrop[:0:-1] if self._backdrop else ()), self._shadow, self._square, self._blobs,
             self._studio, self._studio_buffer, self._capsules, self._instances, *self._capsule_parts,
             self._eye, *self._eye_parts, *self._programs.values(),
         ):  # fmt: skip
@@ -84,7 +97,9 @@ class Renderer:
             )
         return self._gl.program(**sources)
 
-    def _uploaded(self, vertices: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]) -> tuple[Any, Any]:
+    def _uploaded(
+        self, vertices: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]
+    ) -> tuple[Any, Any]:
         return self._gl.buffer(vertices.tobytes()), self._gl.buffer(triangles.tobytes())
 
     def _capsule_array(self) -> Any:
@@ -97,19 +112,41 @@ class Renderer:
             index_buffer=self._capsule_parts[1],
         )
 
-    def _draw_studio(self, view: View, camera: Camera, matrix: npt.NDArray[np.float64]) -> None:
-        program = self._programs["studio"]
-        blobs = view.blobs[:MOST_BLOBS]
-        padded = np.zeros((MOST_BLOBS, 4), dtype="f4")
-        padded[: len(blobs)] = blobs
-        _set(program, "unproject", _bytes(np.linalg.inv(matrix)))
-        _set(program, "ground", 1.0 if view.ground else 0.0)
-        _set(program, "blob_count", len(blobs))
-        _set(program, "blobs", padded.tobytes())
-        at = padded[: len(blobs), :2].mean(axis=0) if len(blobs) else np.zeros(2)
-        _set(program, "centre", (float(at[0]), float(at[1])))
-        self._gl.enable_only(self._gl.NOTHING)
-        self._studio.render()
+    def _draw_studio(self, view: View, matrix: npt.NDArray[np.float64], size: tuple[int, int]) -> None:
+        """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs."""
+        gl = self._gl
+        target = gl.fbo
+        blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
+        middle = np.round(blobs[:, :2].mean(axis=0), 1) if len(blobs) else np.zeros(2)
+        key = (size, view.ground, matrix.tobytes(), *middle)
+        if self._backdrop is None or self._backdrop[0] != key:
+            texture, kept = self._kept_backdrop(size)
+            self._backdrop = (key, texture, kept)
+            program = self._programs["studio"]
+            _set(program, "unproject", _bytes(np.linalg.inv(matrix)))
+            _set(program, "ground", 1.0 if view.ground else 0.0)
+            _set(program, "centre", (float(middle[0]), float(middle[1])))
+            kept.use()
+            gl.viewport = (0, 0, *size)
+            gl.enable_only(gl.NOTHING)
+            self._studio.render()
+        gl.copy_framebuffer(target, self._backdrop[2])
+        target.use()
+        gl.viewport = (0, 0, *size)
+        if view.ground and len(blobs):
+            self._blobs.write(blobs)
+            gl.enable_only(gl.BLEND)
+            gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+            self._shadow.render(gl.TRIANGLE_STRIP, instances=len(blobs))
+
+    def _kept_backdrop(self, size: tuple[int, int]) -> tuple[Any, Any]:
+        if self._backdrop is not None:
+            if self._backdrop[0][0] == size:
+                return self._backdrop[1], self._backdrop[2]
+            self._backdrop[2].release()
+            self._backdrop[1].release()
+        buffer = self._gl.renderbuffer(size, 4)
+        return buffer, self._gl.framebuffer([buffer])
 
     def _draw_mesh(self, mesh: Mesh) -> None:
         positions, normals, array = self._shape_parts(mesh)

@@ -80,7 +80,9 @@ class Normals:
         self._triangles = triangles
         flat = triangles.ravel()
         rows = np.repeat(np.arange(len(triangles)), 3)
-        self._gather = csr_matrix((np.ones(len(flat), dtype=np.float32), (flat, rows)), (vertices, len(triangles)))
+        self._gather = csr_matrix(
+            (np.ones(len(flat), dtype=np.float32), (flat, rows)), (vertices, len(triangles))
+        )
 
     def __call__(self, positions: Float32) -> Float32:
         """(V, 3) positions -> (V, 3) unit normals, weighted by area."""

@@ -7,6 +7,7 @@ with a mesh of its own takes its place behind the same two calls, `meshes` and `
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,8 +40,7 @@ class Head:
     def __init__(self, face: FeaturePointFace | None = None) -> None:
         self.face = face or FeaturePointFace()
         self._surface = surface = build(self.face)
-        self._moved = np.flatnonzero(np.abs(surface.weights).sum(axis=0) > 0)
-        self._weights = surface.weights[:, self._moved].astype(np.float32)
+        self._weights = _sparse(surface.weights)
         coloured, neutral = _painted(surface, self.face)
         self._neutral = neutral.astype(np.float32)
         self._skin = MeshShape(surface.triangles, coloured.astype(np.float32))
@@ -49,11 +49,15 @@ class Head:
         pieces += [parts.teeth(self.face, upper=upper) for upper in (True, False)]
         pieces += [parts.tongue(self.face), parts.hollow(self.face)]
         self._rest = _joined(pieces)
-        self._rest_shape = MeshShape(self._rest.triangles, self._rest.colours.astype(np.float32), two_sided=True)
+        self._rest_shape = MeshShape(
+            self._rest.triangles, self._rest.colours.astype(np.float32), two_sided=True
+        )
         self._rest_normals = Normals(self._rest.triangles, len(self._rest.vertices))
-        self._rest_weights = self._rest.weights.astype(np.float32)
+        self._rest_weights = _sparse(self._rest.weights)
         self._hair = _joined_hair(parts.brows_and_lashes(surface))
-        self._hair_shape = MeshShape(self._hair.triangles, self._hair.colours.astype(np.float32), two_sided=True)
+        self._hair_shape = MeshShape(
+            self._hair.triangles, self._hair.colours.astype(np.float32), two_sided=True
+        )
         self._hair_normals = Normals(self._hair.triangles, len(self._hair.offsets))
         bust = parts.neck()
         bust_normals = Normals(bust.triangles, len(bust.vertices))(bust.vertices.astype(np.float32))
@@ -65,7 +69,9 @@ class Head:
         self._mouth_height = float(self.face.points[row_of()["2.2"], 1])
         self._lips = [surface.parts[f"lip inner {which}"] for which in ("upper", "lower")]
         self._eye_region = [
-            np.flatnonzero(np.linalg.norm(surface.vertices - centre, axis=1) < self.face.eyeball_radius + 0.007)
+            np.flatnonzero(
+                np.linalg.norm(surface.vertices - centre, axis=1) < self.face.eyeball_radius + 0.007
+            )
             for centre in self.face.eyeball_centres
         ]
         margins = np.concatenate([rows for name, rows in surface.parts.items() if "margin" in name])
@@ -86,7 +92,7 @@ class Head:
         bust: matrix for neck and shoulders, where they are to be shown.
         """
         moved = (self.face.local(faps) - self.face.points).astype(np.float32)
-        skin = self._neutral + self._weights @ moved[self._moved]
+        skin = self._neutral + self._weights @ moved
         self._close_lips(skin)
         self._clear_teeth(skin)
         self._clear_eyes(skin, faps)
@@ -176,6 +182,13 @@ def _joined_hair(pieces: list[parts.Attached]) -> parts.Attached:
     )
 
 
+def _sparse(weights: Float64) -> Any:
+    """A sparse product also keeps BLAS out: its waiting threads would starve software OpenGL."""
+    from scipy.sparse import csr_matrix
+
+    return csr_matrix(weights.astype(np.float32))
+
+
 def _step(value: Float64, low: float, high: float) -> Float64:
     t = np.clip((value - low) / (high - low), 0, 1)
     result: Float64 = t * t * (3 - 2 * t)
@@ -189,8 +202,16 @@ def _painted(surface: Surface, face: FeaturePointFace) -> tuple[Float64, Float64
     places = surface.vertices
     base = np.array(parts.SKIN)
     colour = np.tile(base, (len(places), 1))
-    point = {name: face.points[row_of()[name]] for name in ("5.3", "5.4", "9.3", "9.1", "9.2", "9.5", "9.4", "2.10")}
-    for name, wide, strength in (("5.3", 0.024, 0.32), ("5.4", 0.024, 0.32), ("9.3", 0.014, 0.25), ("2.10", 0.02, 0.12)):
+    point = {
+        name: face.points[row_of()[name]]
+        for name in ("5.3", "5.4", "9.3", "9.1", "9.2", "9.5", "9.4", "2.10")
+    }
+    for name, wide, strength in (
+        ("5.3", 0.024, 0.32),
+        ("5.4", 0.024, 0.32),
+        ("9.3", 0.014, 0.25),
+        ("2.10", 0.02, 0.12),
+    ):
         away = np.linalg.norm(places - point[name], axis=1)
         blush = (strength * np.exp(-((away / wide) ** 2)))[:, None]
         colour = colour * (1 - blush) + np.array([0.62, 0.235, 0.165]) * blush
@@ -199,7 +220,7 @@ def _painted(surface: Surface, face: FeaturePointFace) -> tuple[Float64, Float64
     gloss = 0.30 + 0.18 * surface.lip
     for side in (1.0, -1.0):
         nostril = np.array([side * 0.0068, -0.0442, 0.0215])
-        hole = np.exp(-(np.linalg.norm((places - nostril) * (1.0, 1.25, 0.75), axis=1) / 0.0036) ** 4)
+        hole = np.exp(-((np.linalg.norm((places - nostril) * (1.0, 1.25, 0.75), axis=1) / 0.0036) ** 4))
         colour *= (1 - 0.90 * hole)[:, None]
     offset = places - (0.0, 0.0, -0.085)
     around = np.degrees(np.arctan2(np.abs(offset[:, 0]), offset[:, 2]))
@@ -208,6 +229,8 @@ def _painted(surface: Surface, face: FeaturePointFace) -> tuple[Float64, Float64
     hair = (_step(above, -0.002, 0.004) * (places[:, 1] > -0.07))[:, None]
     colour = colour * (1 - hair) + np.array(parts.HAIR) * hair
     gloss = gloss * (1 - hair[:, 0]) + 0.22 * hair[:, 0]
-    thickness = HAIR_THICKNESS * _step(above, -0.003, 0.018 + 0.03 * _step(around, 90, 150)) * (places[:, 1] > -0.07)
+    thickness = (
+        HAIR_THICKNESS * _step(above, -0.003, 0.018 + 0.03 * _step(around, 90, 150)) * (places[:, 1] > -0.07)
+    )
     outward = offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-9)
     return np.concatenate([colour, gloss[:, None]], axis=1), places + outward * thickness[:, None]

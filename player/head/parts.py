@@ -106,7 +106,9 @@ def ear(face: FeaturePointFace, side: str) -> Part:
     shell = bowl + (outline - bowl)[None] * rings[:, None, None]
     shell += outward * (lift[:, None] * backward)[..., None]
     root = points["10.9"] * 0.5 + points["10.7"] * 0.5 + (-0.006, 0.0, -0.012)
-    behind = [root + (outline - root) * t - outward * d for t, d in ((0.95, 0.0035), (0.6, 0.008), (0.35, 0.014))]
+    behind = [
+        root + (outline - root) * t - outward * d for t, d in ((0.95, 0.0035), (0.6, 0.008), (0.35, 0.014))
+    ]
     vertices = np.concatenate([shell, np.array(behind)]).reshape(-1, 3)
     triangles = tube_mesh(len(rings) + len(behind), count)
     away = np.linalg.norm(vertices[:, None] - np.array(list(points.values())), axis=2)
@@ -181,7 +183,9 @@ def hollow(face: FeaturePointFace) -> Part:
     colours = np.tile([0.055, 0.012, 0.010, 0.0], (rings, around, 1))
     colours[..., :3] *= (0.25 + 0.75 * np.cos(inward))[..., None]
     count = rings * around
-    return Part(vertices.reshape(-1, 3), tube_mesh(rings, around), weights.reshape(count, -1), colours.reshape(-1, 4))
+    return Part(
+        vertices.reshape(-1, 3), tube_mesh(rings, around), weights.reshape(count, -1), colours.reshape(-1, 4)
+    )
 
 
 def tongue(face: FeaturePointFace) -> Part:
@@ -235,7 +239,9 @@ def neck() -> Part:
     vertices[..., 1] = y[:, None] - 16 * slope * np.cos(turn)
     share = np.clip(shirt, 0, 1)[:, None, None]
     share = np.repeat(np.where(share > 0.5, 1.0, 0.0), around, axis=1)
-    colours = np.concatenate([np.array(SKIN) * 0.96 * (1 - share) + np.array(SHIRT) * share, 0.28 * (1 - share)], axis=2)
+    colours = np.concatenate(
+        [np.array(SKIN) * 0.96 * (1 - share) + np.array(SHIRT) * share, 0.28 * (1 - share)], axis=2
+    )
     count = len(fine) * around
     return Part(
         vertices.reshape(-1, 3) / 1000,

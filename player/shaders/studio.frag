@@ -1,9 +1,6 @@
 #version 330 core
 //include lighting.glsl
-const int MOST_BLOBS = 8;
 uniform float ground;          // 1 where there is a ground
-uniform int blob_count;
-uniform vec4 blobs[MOST_BLOBS];
 uniform vec2 centre;           // where the ground is brightest, x and z
 in vec2 corner;
 in vec3 near_;
@@ -31,10 +28,6 @@ void main() {
         float lines = max(line(at.x * 2.0, 1.0), line(at.y * 2.0, 1.0)) * 0.35;
         lines = max(lines, max(line(at.x * 0.5, 1.2), line(at.y * 0.5, 1.2)) * 0.6);
         floor_ = mix(floor_, vec3(0.50, 0.52, 0.55), lines * 0.55);
-        for (int i = 0; i < blob_count; ++i) {
-            vec2 off = (at - blobs[i].xy) / blobs[i].z;
-            floor_ *= 1.0 - blobs[i].w * exp(-dot(off, off) * 2.2);
-        }
         colour = mix(colour, floor_, seen);
     }
     // Half a step of noise hides the bands of a slow gradient in 8 bits.

@@ -1,0 +1,110 @@
+"""Pictures without a window: an animation at any time as an array of pixels."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from player.camera import Camera
+from player.context import offscreen_context
+from player.renderer import Renderer
+from player.scene import Scene
+from player.target import Target
+
+UInt8 = npt.NDArray[np.uint8]
+
+SAMPLES = 0
+"""Samples a pixel; 0: one, and edges smoothed afterwards."""
+
+
+class Offscreen:
+    """Renders a scene into memory; needs no display.
+
+    subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a
+    `Camera`, the name of a preset, or None for the one that suits the content. samples: samples a pixel
+    against jagged edges, 0 for one and a pass that smooths edges. Use it as a context manager, or `close` it. One thread only.
+
+    Raises DisplayError where OpenGL is missing or cannot draw this size; the text says what to install.
+    ValueError for a size below 1 or an unknown preset.
+    """
+
+    def __init__(
+        self,
+        subject: Animation | Scene,
+        size: tuple[int, int] = (1280, 720),
+        camera: Camera | str | None = None,
+        *,
+        samples: int = SAMPLES,
+    ) -> None:
+        width, height = (int(v) for v in size)
+        if width < 1 or height < 1:
+            raise ValueError(f"a picture must have at least 1x1 pixels, not {width}x{height}")
+        self.scene = subject if isinstance(subject, Scene) else Scene(subject)
+        self.size = (width, height)
+        aspect = width / height
+        self.camera = camera if isinstance(camera, Camera) else self.scene.camera(camera, aspect)
+        self._gl: Any = offscreen_context()
+        self._target: Target | None = None
+        self._renderer: Renderer | None = None
+        try:
+            self._target = Target(self._gl, self.size, samples)
+            self._renderer = Renderer(self._gl)
+        except Exception:
+            self.close()
+            raise
+        self._buffer = bytearray(width * height * 4)
+
+    def frame(self, time: float) -> UInt8:
+        """The picture at a time in seconds: uint8 (H, W, 4), sRGB and opaque, top row first.
+
+        The same time gives the same picture. Raises ValueError for a time that is not finite, or after
+        `close`.
+        """
+        return self.draw(time).copy()
+
+    def draw(self, time: float) -> UInt8:
+        """Like `frame`, into memory that the next call overwrites."""
+        if self._target is None or self._renderer is None:
+            raise ValueError("this Offscreen is closed")
+        view = self.scene.at(time)
+        camera = following(self.camera, self.scene, time)
+        self._target.begin()
+        self._renderer.draw(view, camera, self.size)
+        self._target.finish().read_into(self._buffer, components=4)
+        width, height = self.size
+        return np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)[::-1]
+
+    def close(self) -> None:
+        """Give everything back; safe to call twice."""
+        if self._gl is None:
+            return
+        if self._renderer is not None:
+            self._renderer.close()
+        if self._target is not None:
+            self._target.close()
+        self._renderer = self._target = None
+        self._gl.release()
+        self._gl = None
+
+    def __enter__(self) -> Offscreen:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def following(camera: Camera, scene: Scene, time: float) -> Camera:
+    """The camera, moved along with a performance that walks away."""
+    moved = scene.travel(time)
+    if not any(moved):
+        return camera
+    from dataclasses import replace
+
+    x, y, z = (a + b for a, b in zip(camera.target, moved, strict=True))
+    return replace(camera, target=(x, y, z))

@@ -1,0 +1,214 @@
+"""What is shown at time t: an animation, its face, its body, and where a camera should look."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from player.camera import Camera, Subject
+from player.shapes import View, translation
+from player.timeline import Timeline
+
+if TYPE_CHECKING:
+    from player.head import Head
+    from player.mannequin import Mannequin
+
+Float64 = npt.NDArray[np.float64]
+
+HEAD_ON_BODY = np.array([0.0, 1.628, 0.077])
+"""Where the point between the pupils lies in the default posture of the default skeleton."""
+FACE_SUBJECT = Subject((0.0, -0.012, -0.070), 0.165, 0.14)
+BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
+SAMPLES = 48
+"""Moments at which the extent of a moving body is looked up to fit the camera."""
+MOST_TRAVEL = 4.0
+"""A performance that moves further than this (m) is followed by the camera instead of fitted whole."""
+
+
+class Scene:
+    """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
+
+    animation: at least one frame, else ValueError. axes: name of the body's axis convention
+    (`fba.body.convention_names()`). Nothing is worked out before it is asked for.
+    """
+
+    def __init__(self, animation: Animation, *, axes: str = "iso") -> None:
+        if not len(animation):
+            raise ValueError("nothing to show: the animation has no frames")
+        self.animation = animation
+        self.timeline = Timeline(animation)
+        self._axes = axes
+        self._head: Head | None = None
+        self._mannequin: Mannequin | None = None
+        self._subject: Subject | None = None
+        self._follow = False
+        if animation.body is not None:
+            from fba.body import BapSolver, Skeleton
+            from player.mannequin import Mannequin
+            from player.torso import Torso
+
+            self._skeleton = Skeleton.default()
+            self._solver = BapSolver(self._skeleton, axes)
+            self._mannequin = Mannequin(self._skeleton)
+            self._torso = Torso(self._skeleton)
+            self._skull = list(self._skeleton.names).index("skullbase")
+            self._skull_centre = np.asarray(self._skeleton.centres, dtype=np.float64)[self._skull]
+
+    @property
+    def head(self) -> Head:
+        """The head that is shown; built on first use."""
+        if self._head is None:
+            from player.head import Head
+
+            self._head = Head.default()
+        return self._head
+
+    @property
+    def has_body(self) -> bool:
+        """Whether a body is shown."""
+        return self._mannequin is not None
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames a second of the animation."""
+        return self.timeline.rate
+
+    @property
+    def start(self) -> Fraction:
+        """Time of the first frame, seconds."""
+        return self.timeline.start
+
+    @property
+    def duration(self) -> Fraction:
+        """Seconds from the first frame to the end of the last."""
+        return self.timeline.duration
+
+    @property
+    def subject(self) -> Subject:
+        """What a camera is to have in view over the whole performance."""
+        if self._subject is None:
+            self._subject = self._extent() if self.has_body else FACE_SUBJECT
+        return self._subject
+
+    @property
+    def face_subject(self) -> Subject:
+        """The head alone, where the performance begins."""
+        if not self.has_body:
+            return FACE_SUBJECT
+        matrix = self._head_matrix(*self._posed(float(self.start)))
+        x, y, z = (matrix @ np.array([*FACE_SUBJECT.centre, 1.0]))[:3]
+        return Subject((float(x), float(y), float(z)), FACE_SUBJECT.half_height, FACE_SUBJECT.half_width)
+
+    def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
+        """A camera that has everything in view: the named preset, or the one that suits the content.
+
+        "body" fits the whole body; the other presets look at the face, from the front, at three quarters
+        or in profile, also where there is a body. ValueError for another name.
+        """
+        if preset is None:
+            return default_camera(self, aspect)
+        whole = self.has_body and preset == "body"
+        return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
+
+    def at(self, time: float) -> View:
+        """Everything to be drawn at a time in seconds; before the start or after the end, its frames.
+
+        Raises ValueError for a time that is not finite.
+        """
+        faps, joints = self._posed(time)
+        if joints is None:
+            matrix = self._head_matrix(faps, None)
+            return View(
+                meshes=self.head.meshes(faps, matrix, bust=np.eye(4)), eyes=self.head.eyes(faps, matrix)
+            )
+        assert self._mannequin is not None
+        matrix = self._head_matrix(faps, joints)
+        capsules = self._mannequin.capsules(joints)
+        return View(
+            meshes=[*self.head.meshes(faps, matrix), self._torso.mesh(joints)],
+            capsules=capsules,
+            eyes=self.head.eyes(faps, matrix),
+            blobs=_shadows(joints, self._skeleton.names),
+            ground=True,
+        )
+
+    def travel(self, time: float) -> tuple[float, float, float]:
+        """How far a following camera has gone at a time: (x, y, z), metres; zeros where it stands still."""
+        self.subject  # noqa: B018 - decides whether the camera follows
+        if not self._follow:
+            return (0.0, 0.0, 0.0)
+        joints = self._posed(time)[1]
+        assert joints is not None
+        centre = self.subject.centre
+        return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
+
+    def _posed(self, time: float) -> tuple[npt.NDArray[np.float32], Float64 | None]:
+        faps = self.timeline.faps(time)
+        if not self.has_body:
+            return faps, None
+        return faps, self._solver.pose(self.timeline.baps(time))
+
+    def _head_matrix(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> Float64:
+        """Frame of the head (origin between the pupils) into the world."""
+        face = self.head.face
+        turn = np.eye(4)
+        turn[:3, :3] = face.head_rotation(faps)
+        own: Float64 = translation(face.head_centre) @ turn @ translation(-face.head_centre)
+        if joints is None:
+            return own
+        on_body: Float64 = joints[self._skull] @ translation(HEAD_ON_BODY - self._skull_centre) @ own
+        return on_body
+
+    def _extent(self) -> Subject:
+        frames = self.timeline.frames
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for frame in np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int)):
+            joints = self._posed(float(self.timeline.time_of(int(frame))))[1]
+            assert joints is not None
+            low, high = np.minimum(low, joints[:, :3, 3].min(0)), np.maximum(high, joints[:, :3, 3].max(0))
+            if frame == 0:
+                first = joints[0, :3, 3]
+        if not np.isfinite(high - low).all() or (high - low).max() > MOST_TRAVEL:
+            self._follow = True
+            x, y, z = (float(v) for v in first)
+            return Subject((x, y - 0.09, z), BODY_SUBJECT.half_height, BODY_SUBJECT.half_width)
+        low, high = low - (0.10, 0.06, 0.10), high + (0.10, 0.14, 0.10)
+        low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + _aside(low, high))
+        x, y, z = (float(v) for v in (low + high) / 2)
+        wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
+        return Subject(
+            (x, y, z), max(float(high[1] - low[1]) / 2 * 1.06, 0.9), max(wide, BODY_SUBJECT.half_width)
+        )
+
+
+def _aside(low: Float64, high: Float64) -> Float64:
+    """Shift that keeps the floor below a body that stands elsewhere than at the origin."""
+    middle = (low + high) / 2
+    return np.array([middle[0], 0.0, middle[2]])
+
+
+def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:
+    """The view that suits the content: a body whole, a face alone from slightly aside."""
+    if scene.has_body:
+        return Camera.preset("body", scene.subject, aspect)
+    return Camera(yaw=14.0, pitch=2.0).fit(scene.subject, aspect)
+
+
+def _shadows(joints: Float64, names: tuple[str, ...]) -> npt.NDArray[np.float32]:
+    """Soft blobs under the hips and both feet, fainter the higher these are."""
+    found = []
+    for name, radius, darkness, rest in (
+        ("HumanoidRoot", 0.55, 0.42, 0.97),
+        ("l_midtarsal", 0.20, 0.55, 0.03),
+        ("r_midtarsal", 0.20, 0.55, 0.03),
+        ("l_subtalar", 0.16, 0.40, 0.04),
+        ("r_subtalar", 0.16, 0.40, 0.04),
+    ):
+        x, y, z = joints[list(names).index(name), :3, 3]
+        height = max(float(y) - rest, 0.0)
+        found.append((x, z, radius * (1 + height), darkness / (1 + 4 * height)))
+    return np.array(found, dtype=np.float32)

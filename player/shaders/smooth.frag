@@ -1,0 +1,41 @@
+#version 330 core
+// Smooths the steps of edges in a finished picture: where neighbours differ in brightness, it blends
+// along the edge's direction, further the shallower the edge. Cheap enough for software OpenGL.
+uniform sampler2D picture;
+out vec4 pixel;
+
+const vec3 BRIGHTNESS = vec3(0.299, 0.587, 0.114);
+const float LEAST = 0.035;     // steps fainter than this stay
+const float REACH = 6.0;       // pixels along the edge
+
+float brightness(ivec2 at, ivec2 most) {
+    return dot(texelFetch(picture, clamp(at, ivec2(0), most), 0).rgb, BRIGHTNESS);
+}
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    ivec2 most = textureSize(picture, 0) - 1;
+    vec3 centre = texelFetch(picture, at, 0).rgb;
+    float m = dot(centre, BRIGHTNESS);
+    float nw = brightness(at + ivec2(-1, 1), most);
+    float ne = brightness(at + ivec2(1, 1), most);
+    float sw = brightness(at + ivec2(-1, -1), most);
+    float se = brightness(at + ivec2(1, -1), most);
+    float low = min(m, min(min(nw, ne), min(sw, se)));
+    float high = max(m, max(max(nw, ne), max(sw, se)));
+    if (high - low < max(LEAST, high * 0.06)) {
+        pixel = vec4(centre, 1.0);
+        return;
+    }
+    vec2 along = vec2(sw + se - nw - ne, nw + sw - ne - se);
+    along = vec2(along.x, along.y);
+    float damping = max((nw + ne + sw + se) * 0.03, 1.0 / 128.0);
+    along = clamp(along / (min(abs(along.x), abs(along.y)) + damping), -REACH, REACH);
+    vec2 size = vec2(textureSize(picture, 0));
+    vec2 here = gl_FragCoord.xy / size;
+    vec2 by = along / size;
+    vec3 near_ = 0.5 * (texture(picture, here - by / 6.0).rgb + texture(picture, here + by / 6.0).rgb);
+    vec3 wide = 0.5 * near_ + 0.25 * (texture(picture, here - by * 0.5).rgb + texture(picture, here + by * 0.5).rgb);
+    float far_ = dot(wide, BRIGHTNESS);
+    pixel = vec4(far_ < low || far_ > high ? near_ : wide, 1.0);
+}

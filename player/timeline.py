@@ -1,0 +1,136 @@
+"""An animation by time: which FAPs and BAPs are shown at t seconds, with unsent values kept.
+
+What is shown at a frame depends on everything sent before it, so frames are worked out in blocks, and
+the state at the start of each block is remembered: memory does not grow with the length of what has
+been shown, and times may be asked for in any order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.face.resolve import Resolver, hold
+from fba.parameters import BAP_COUNT
+
+Float64 = npt.NDArray[np.float64]
+
+BLOCK = 2048
+KEPT_BLOCKS = 4
+
+
+class Timeline:
+    """What an animation shows at any time.
+
+    start: time of the first frame, seconds, exact. duration: from there to one frame period after the
+    last, exact. A time before or after shows the first or last frame; between two frames, values are
+    interpolated, over skipped frames too.
+    """
+
+    def __init__(self, animation: Animation, model: object = None) -> None:
+        self.animation = animation
+        self.rate: Fraction = animation.rate
+        self.frames = len(animation)
+        self.start = Fraction(int(animation.index[0])) / self.rate if self.frames else Fraction(0)
+        self.duration: Fraction = animation.duration
+        self._resolvers: list[Resolver] = [Resolver(model)]
+        self._bodies: list[npt.NDArray[np.int32]] = [np.zeros(BAP_COUNT, dtype=np.int32)]
+        self._faces_shown: OrderedDict[int, npt.NDArray[np.float32]] = OrderedDict()
+        self._bodies_shown: OrderedDict[int, npt.NDArray[np.int32]] = OrderedDict()
+
+    @property
+    def end(self) -> Fraction:
+        """One frame period after the last frame."""
+        return self.start + self.duration
+
+    def position(self, time: float) -> tuple[int, int, float]:
+        """(frame, next frame, share of the next), positions in the animation, at a time in seconds.
+
+        Raises ValueError for a time that is not finite, or an animation without frames.
+        """
+        if not math.isfinite(time):
+            raise ValueError(f"the time must be a finite number of seconds, not {time}")
+        if not self.frames:
+            raise ValueError("the animation has no frames")
+        index = self.animation.index
+        at = time * self.rate.numerator / self.rate.denominator
+        nearest = round(at)
+        if abs(at - nearest) < 1e-6:
+            at = float(nearest)  # a frame's own time shows that frame, whatever the rounding
+        before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), self.frames - 1)
+        after = min(before + 1, self.frames - 1)
+        gap = int(index[after]) - int(index[before])
+        share = min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
+        return before, after, share
+
+    def time_of(self, frame: int) -> Fraction:
+        """Exact time of a frame, by its position in the animation."""
+        return Fraction(int(self.animation.index[frame])) / self.rate
+
+    def faps(self, time: float) -> npt.NDArray[np.float32]:
+        """(68,) FAPs shown; zeros where the animation has no face."""
+        if self.animation.face is None:
+            return np.zeros(68, dtype=np.float32)
+        before, after, share = self.position(time)
+        first = self._face(before)
+        if share == 0.0:
+            return first
+        shown: npt.NDArray[np.float32] = first + (self._face(after) - first) * np.float32(share)
+        return shown
+
+    def baps(self, time: float) -> Float64:
+        """(296,) BAPs shown; zeros where the animation has no body."""
+        if self.animation.body is None:
+            return np.zeros(BAP_COUNT)
+        before, after, share = self.position(time)
+        first = self._body(before).astype(np.float64)
+        if share == 0.0:
+            return first
+        shown: Float64 = first + (self._body(after) - first) * share
+        return shown
+
+    def _face(self, frame: int) -> npt.NDArray[np.float32]:
+        block, row = divmod(frame, BLOCK)
+        track = self.animation.face
+        assert track is not None
+        if block not in self._faces_shown:
+            while len(self._resolvers) <= block:
+                resolver = self._resolvers[-1].copy()
+                number = len(self._resolvers) - 1
+                resolver.push(track[number * BLOCK : (number + 1) * BLOCK])
+                self._resolvers.append(resolver)
+            shown = self._resolvers[block].copy().push(track[block * BLOCK : (block + 1) * BLOCK])
+            _keep(self._faces_shown, block, shown)
+        return self._faces_shown[block][row]
+
+    def _body(self, frame: int) -> npt.NDArray[np.int32]:
+        block, row = divmod(frame, BLOCK)
+        track = self.animation.body
+        assert track is not None
+        if block not in self._bodies_shown:
+            while len(self._bodies) <= block:
+                self._bodies.append(self._held_body(len(self._bodies) - 1)[-1].copy())
+            _keep(self._bodies_shown, block, self._held_body(block))
+        return self._bodies_shown[block][row]
+
+    def _held_body(self, block: int) -> npt.NDArray[np.int32]:
+        track = self.animation.body
+        assert track is not None
+        rows = slice(block * BLOCK, (block + 1) * BLOCK)
+        if track.mask[rows].all():
+            return track.values[rows]
+        held: npt.NDArray[np.int32] = hold(track.values[rows], track.mask[rows], self._bodies[block])
+        return held
+
+
+def _keep(
+    shown: OrderedDict[int, npt.NDArray[np.generic]], block: int, values: npt.NDArray[np.generic]
+) -> None:  # type: ignore[type-arg]
+    shown[block] = values
+    while len(shown) > KEPT_BLOCKS:
+        shown.popitem(last=False)
