@@ -58,7 +58,7 @@ class Mannequin:
 
 @cache
 def _rows() -> list[dict[str, str]]:
-    with (files(__package__) / "mannequin.csv").open(encoding="utf-8", newline="") as file:
+    with (files(__package__) / "mannequin.csv").open(encoding="utf-8") as file:
         left = list(csv.DictReader(file))
     rows = []
     for row in left:

@@ -26,7 +26,8 @@ class Offscreen:
 
     subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a
     `Camera`, the name of a preset, or None for the one that suits the content. samples: samples a pixel
-    against jagged edges, 0 for one and a pass that smooths edges. Use it as a context manager, or `close` it. One thread only.
+    against jagged edges, 0 for one and a pass that smooths edges. Use it as a context manager, or
+    `close` it. One thread only.
 
     Raises DisplayError where OpenGL is missing or cannot draw this size; the text says what to install.
     ValueError for a size below 1 or an unknown preset.

@@ -57,7 +57,7 @@ def render(
     suffix = target.suffix.lower()
     if suffix not in SUFFIXES:
         raise UnsupportedError(
-            f"{target}: pictures are written as .png and films as .mp4, not as {suffix or 'a file without suffix'}",
+            f"{target}: pictures are written as .png and films as .mp4, not as {suffix or 'a bare name'}",
             what=f"rendering to {suffix or 'no suffix'}",
         )
     scene = animation if isinstance(animation, Scene) else Scene(animation)

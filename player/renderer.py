@@ -218,5 +218,5 @@ def _set(program: Any, name: str, value: Any) -> None:
         member.value = value
 
 
-def _bytes(matrix: npt.NDArray[np.float64]) -> bytes:
+def _bytes(matrix: npt.NDArray[Any]) -> bytes:
     return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()

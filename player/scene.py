@@ -176,7 +176,7 @@ class Scene:
             self._follow = True
             x, y, z = (float(v) for v in first)
             return Subject((x, y - 0.09, z), BODY_SUBJECT.half_height, BODY_SUBJECT.half_width)
-        low, high = low - (0.10, 0.06, 0.10), high + (0.10, 0.14, 0.10)
+        low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, 0.14, 0.10])
         low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + _aside(low, high))
         x, y, z = (float(v) for v in (low + high) / 2)
         wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2

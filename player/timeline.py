@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -106,7 +107,8 @@ class Timeline:
                 self._resolvers.append(resolver)
             shown = self._resolvers[block].copy().push(track[block * BLOCK : (block + 1) * BLOCK])
             _keep(self._faces_shown, block, shown)
-        return self._faces_shown[block][row]
+        face: npt.NDArray[np.float32] = self._faces_shown[block][row]
+        return face
 
     def _body(self, frame: int) -> npt.NDArray[np.int32]:
         block, row = divmod(frame, BLOCK)
@@ -116,7 +118,8 @@ class Timeline:
             while len(self._bodies) <= block:
                 self._bodies.append(self._held_body(len(self._bodies) - 1)[-1].copy())
             _keep(self._bodies_shown, block, self._held_body(block))
-        return self._bodies_shown[block][row]
+        body: npt.NDArray[np.int32] = self._bodies_shown[block][row]
+        return body
 
     def _held_body(self, block: int) -> npt.NDArray[np.int32]:
         track = self.animation.body
@@ -128,9 +131,7 @@ class Timeline:
         return held
 
 
-def _keep(
-    shown: OrderedDict[int, npt.NDArray[np.generic]], block: int, values: npt.NDArray[np.generic]
-) -> None:  # type: ignore[type-arg]
+def _keep(shown: OrderedDict[int, npt.NDArray[Any]], block: int, values: npt.NDArray[Any]) -> None:
     shown[block] = values
     while len(shown) > KEPT_BLOCKS:
         shown.popitem(last=False)

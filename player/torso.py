@@ -26,7 +26,7 @@ class Torso:
     """Trunk and neck of a body in any pose. skeleton: gives names and default centres of the joints."""
 
     def __init__(self, skeleton: Skeleton) -> None:
-        with (files(__package__) / "torso.csv").open(encoding="utf-8", newline="") as file:
+        with (files(__package__) / "torso.csv").open(encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         number = {name: i for i, name in enumerate(skeleton.names)}
         centres = np.asarray(skeleton.centres, dtype=np.float64)

@@ -177,7 +177,8 @@ class Window:
         if not self._window:
             raise DisplayError(
                 f"no window with OpenGL 3.3 can be opened: {self._reason('the display refused')}. "
-                f"Install a driver (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri). {HOW_WITHOUT}"
+                "Install a driver (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri). "
+                + HOW_WITHOUT
             )
         glfw.make_context_current(self._window)
         glfw.swap_interval(1)
@@ -263,8 +264,10 @@ class Window:
     def _on_button(self, window: Any, button: int, action: int, modifiers: int) -> None:
         glfw = self._glfw
         names = {
-            glfw.MOUSE_BUTTON_LEFT: "left", glfw.MOUSE_BUTTON_RIGHT: "right", glfw.MOUSE_BUTTON_MIDDLE: "middle",
-        }  # fmt: skip
+            glfw.MOUSE_BUTTON_LEFT: "left",
+            glfw.MOUSE_BUTTON_RIGHT: "right",
+            glfw.MOUSE_BUTTON_MIDDLE: "middle",
+        }
         if action == glfw.PRESS and button in names:
             x, y = self._pixels(*glfw.get_cursor_pos(window))
             self._act(lambda: self.controls.press(names[button], x, y))

@@ -79,7 +79,7 @@ def _default() -> Definitions:
         "expression": np.zeros((EXPRESSION_SELECT_MAX + 1, FAP_COUNT), dtype=np.float32),
     }
     given = {kind: np.zeros(table.shape, dtype=bool) for kind, table in tables.items()}
-    with (files(__package__) / "definitions.csv").open(encoding="utf-8", newline="") as file:
+    with (files(__package__) / "definitions.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             place = (int(row["select"]), fap_numbers()[row["fap"]] - 1)
             tables[row["kind"]][place] = float(row["value"])

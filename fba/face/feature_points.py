@@ -47,7 +47,7 @@ def row_of() -> dict[str, int]:
 def neutral_points() -> Points:
     """(84, 3) float64, metres; read-only."""
     points = np.full((len(names()), 3), np.nan)
-    with (files(__package__) / "neutral.csv").open(encoding="utf-8", newline="") as file:
+    with (files(__package__) / "neutral.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             place = np.array([float(row["x"]), float(row["y"]), float(row["z"])]) / 1000.0
             points[row_of()[row["point"]]] = place

@@ -47,7 +47,7 @@ EYEBALL_PER_IRIS = 1.03
 
 @cache
 def _followers() -> tuple[tuple[int, int, Float64], ...]:
-    with (files(__package__) / "followers.csv").open(encoding="utf-8", newline="") as file:
+    with (files(__package__) / "followers.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     found = []
     for row in rows:

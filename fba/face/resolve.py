@@ -64,18 +64,16 @@ class Resolver:
         return shown
 
     def _visemes_shown(self, track: FaceTrack, fields: npt.NDArray[np.int16]) -> Float32:
-        blend = np.clip(fields[:, 2], 0, INTENSITY_MAX).astype(np.float32)[:, None] / INTENSITY_MAX
+        blend = _share(fields[:, 2])
         defined = track.mask[:, 0] & (track.viseme[:, 3] == 1)
         table = _Redefined(self._visemes, defined, fields[:, 0], track, mouth_only=True)
         if not fields[:, :2].any():
             return np.zeros((len(track), FAP_COUNT), dtype=np.float32)
-        return table.look_up(fields[:, 0]) * blend + table.look_up(fields[:, 1]) * (1 - blend)
+        shown: Float32 = table.look_up(fields[:, 0]) * blend + table.look_up(fields[:, 1]) * (1 - blend)
+        return shown
 
     def _expressions_shown(self, track: FaceTrack, fields: npt.NDArray[np.int16]) -> Float32:
-        first, second = (
-            np.clip(fields[:, column], 0, INTENSITY_MAX).astype(np.float32)[:, None] / INTENSITY_MAX
-            for column in (1, 3)
-        )
+        first, second = (_share(fields[:, column]) for column in (1, 3))
         # The same expression in both places is still one expression: never more than all of it.
         same = (fields[:, 0] == fields[:, 2])[:, None]
         second = np.where(same, np.minimum(second, 1 - first), second)
@@ -83,7 +81,8 @@ class Resolver:
         table = _Redefined(self._expressions, defined, fields[:, 0], track, mouth_only=False)
         if not fields[:, [0, 2]].any():
             return np.zeros((len(track), FAP_COUNT), dtype=np.float32)
-        return table.look_up(fields[:, 0]) * first + table.look_up(fields[:, 2]) * second
+        shown: Float32 = table.look_up(fields[:, 0]) * first + table.look_up(fields[:, 2]) * second
+        return shown
 
 
 def resolve(track: FaceTrack, model: Any = None) -> Float32:
@@ -118,11 +117,11 @@ class _Held:
     def low_level(self, track: FaceTrack) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]:
         mask = track.mask.copy()
         mask[:, :2] = False
-        if mask.all(axis=0)[2:].all():
+        if mask[:, 2:].all():
             values, sent = track.values, mask
         else:
             values = hold(track.values, mask, self.values)
-            sent = np.logical_or.accumulate(mask, axis=0) | self.sent
+            sent = np.asarray(np.logical_or.accumulate(mask, axis=0)) | self.sent
         self.values, self.sent = values[-1].copy(), sent[-1].copy()
         return values, sent
 
@@ -131,6 +130,14 @@ class _Held:
         expression = hold(track.expression, track.mask[:, 1:2], self.expression)
         self.viseme, self.expression = viseme[-1].copy(), expression[-1].copy()
         return viseme, expression
+
+
+def _share(amounts: npt.NDArray[np.int16]) -> Float32:
+    """(T, 1) blend or intensity as a share of its largest; quantised ones may lie a little outside."""
+    share: Float32 = np.clip(amounts, 0, INTENSITY_MAX).astype(np.float32)[:, None] / np.float32(
+        INTENSITY_MAX
+    )
+    return share
 
 
 def hold(values: npt.NDArray[Any], mask: npt.NDArray[np.bool_], before: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -25,8 +25,8 @@ IRIS_SHARE = 0.49
 """Radius of the iris by radius of the eyeball."""
 HAIRLINE = np.array([
     # degrees from the front about the vertical axis, height in mm
-    (0, 67), (22, 69), (40, 63), (56, 50), (68, 30), (78, 4), (86, -4), (94, 16), (108, 14), (122, -8), (140, -36),
-    (160, -50), (180, -54),
+    (0, 67), (22, 69), (40, 63), (56, 50), (68, 30), (78, 4), (86, -4), (94, 16), (108, 14), (122, -8),
+    (140, -36), (160, -50), (180, -54),
 ])  # fmt: skip
 HAIR_THICKNESS = 0.008
 
@@ -189,7 +189,7 @@ def _sparse(weights: Float64) -> Any:
     return csr_matrix(weights.astype(np.float32))
 
 
-def _step(value: Float64, low: float, high: float) -> Float64:
+def _step(value: Float64, low: float, high: float | Float64) -> Float64:
     t = np.clip((value - low) / (high - low), 0, 1)
     result: Float64 = t * t * (3 - 2 * t)
     return result

@@ -26,6 +26,8 @@ TONGUE = srgb("#b5605c")
 SHIRT = srgb("#3f6276")
 ARCH = 0.026
 """Half the width of the arch of the upper teeth, metres."""
+TEETH = 14
+"""Teeth in a row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +136,7 @@ def teeth(face: FeaturePointFace, *, upper: bool) -> Part:
     a, b = (face.points[row_of()[name]] for name in (root, edge))
     columns, rows = 99, 7
     x = np.linspace(-1, 1, columns)
-    per_tooth = 14 if upper else 14
-    phase = np.abs(np.sin(np.pi * x * per_tooth / 2))
+    phase = np.abs(np.sin(np.pi * x * TEETH / 2))
     fall = np.linspace(0, 1, rows)
     arch = ARCH if upper else ARCH * 0.95
     bulge = 0.0011 * phase**0.5
@@ -193,7 +194,7 @@ def tongue(face: FeaturePointFace) -> Part:
     tip, body, border = (face.points[row_of()[name]] for name in ("6.1", "6.2", "6.3"))
     rings, around = 13, 16
     v = np.linspace(0, 1, rings)
-    back = body + (0.0, -0.012, -0.022)
+    back = body + np.array([0.0, -0.012, -0.022])
     spine = spline_basis(np.array([0.0, 0.5, 1.0]), v) @ np.array([back, body, tip])
     wide = border[0] * np.sqrt(np.clip(1 - ((v - 0.42) / 0.58) ** 4, 0, None))
     thick = 0.0065 * np.sqrt(np.clip(1 - np.clip((v - 0.3) / 0.7, 0, None) ** 3, 0, None)) + 0.0002
@@ -222,8 +223,9 @@ def neck() -> Part:
         # y, centre z, half width, half depth (mm), share of shirt
         (-55, -108, 40, 36, 0), (-85, -100, 50, 46, 0), (-105, -98, 54, 51, 0), (-125, -101, 55, 52, 0),
         (-140, -104, 58, 54, 0), (-152, -107, 65, 57, 0), (-161, -109, 78, 61, 0), (-166, -110, 92, 64, 1),
-        (-172, -111, 112, 68, 1), (-180, -112, 136, 74, 1), (-192, -112, 163, 80, 1), (-210, -112, 184, 88, 1),
-        (-235, -110, 197, 97, 1), (-270, -108, 204, 106, 1), (-330, -106, 206, 112, 1), (-420, -104, 205, 116, 1),
+        (-172, -111, 112, 68, 1), (-180, -112, 136, 74, 1), (-192, -112, 163, 80, 1),
+        (-210, -112, 184, 88, 1), (-235, -110, 197, 97, 1), (-270, -108, 204, 106, 1),
+        (-330, -106, 206, 112, 1), (-420, -104, 205, 116, 1),
     ], dtype=float)  # fmt: skip
     fine = np.linspace(0, len(rows) - 1, 48)
     from scipy.interpolate import PchipInterpolator

@@ -13,6 +13,7 @@ import csv
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -55,7 +56,8 @@ def to_chart(places: Float64) -> Float64:
     d = d / np.linalg.norm(d, axis=1, keepdims=True)
     angle = np.arctan2(np.hypot(d[:, 0], d[:, 1]), d[:, 2])
     length = np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-12)
-    return d[:, :2] / length[:, None] * angle[:, None]
+    chart: Float64 = d[:, :2] / length[:, None] * angle[:, None]
+    return chart
 
 
 def from_chart(chart: Float64) -> Float64:
@@ -77,7 +79,7 @@ class Skin:
     def __init__(self, face: FeaturePointFace) -> None:
         from scipy.interpolate import RBFInterpolator
 
-        with (files(__package__) / "landmarks.csv").open(encoding="utf-8", newline="") as file:
+        with (files(__package__) / "landmarks.csv").open(encoding="utf-8") as file:
             extra = [[float(row[axis]) / 1000 for axis in "xyz"] for row in csv.DictReader(file)]
         on_skin = face.points[[row_of()[name] for name in skin_points()]]
         places = np.concatenate([mirrored(np.array(extra)), on_skin])
@@ -309,7 +311,7 @@ def _weights(vertices: Float64, triangles: Int32, mesh: _Parts) -> Float64:
     return weights
 
 
-def _laplacian(vertices: Float64, triangles: Int32) -> tuple[object, Float64]:
+def _laplacian(vertices: Float64, triangles: Int32) -> tuple[Any, Float64]:
     """Cotangent Laplacian (positive semidefinite) and the area that belongs to each vertex."""
     from scipy.sparse import coo_matrix
 
