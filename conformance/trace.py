@@ -123,14 +123,22 @@ class Walker:
         return True
 
     def _read_object_start(self) -> None:
+        """The object's start code; visual object sequence and visual object headers may stand before it."""
         reader = self.reader
-        code = int.from_bytes(reader.data[:4], "big")
-        if len(reader.data) < 4 or code not in OBJECT_START_CODES:
+        found = min(
+            (at for code in OBJECT_START_CODES if (at := reader.data.find(code.to_bytes(4, "big"))) >= 0),
+            default=-1,
+        )
+        if found < 0 or not reader.data.startswith(START_CODE_PREFIX):
             raise reader.error(
                 f"an FBA object starts with {' or '.join(f'{c:08x}' for c in OBJECT_START_CODES)}, "
                 f"found {reader.data[:4].hex() or 'nothing'}; is this an FBA stream?",
                 bit=0,
             )
+        if found:
+            reader.stream.pos = 8 * found
+            shown = reader.data[: min(found, TRAILING_BYTES_SHOWN)].hex()
+            reader.note(0, "headers before the object", shown, "object")
         reader.start_code(0)
 
     def _read_rest(self) -> None:

@@ -99,7 +99,10 @@ class FaceTrack:
         return len(self.values)
 
     def __getitem__(self, frames: slice) -> FaceTrack:
-        return FaceTrack(self.values[frames], self.mask[frames], self.viseme[frames], self.expression[frames])
+        part = object.__new__(FaceTrack)  # a part of what was checked needs no check
+        names = ("values", "mask", "viseme", "expression")
+        _freeze(part, **{name: getattr(self, name)[frames] for name in names})
+        return part
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FaceTrack):
@@ -149,7 +152,9 @@ class BodyTrack:
         return len(self.values)
 
     def __getitem__(self, frames: slice) -> BodyTrack:
-        return BodyTrack(self.values[frames], self.mask[frames])
+        part = object.__new__(BodyTrack)  # a part of what was checked needs no check
+        _freeze(part, values=self.values[frames], mask=self.mask[frames])
+        return part
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, BodyTrack):

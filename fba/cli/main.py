@@ -65,7 +65,7 @@ def main(arguments: list[str] | None = None) -> None:
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
     warnings.simplefilter("always", FbaWarning)
-    warnings.showwarning = _show_warning  # type: ignore[assignment]
+    warnings.showwarning = _show_warning
     try:
         result = group.main(arguments, prog_name="fba", standalone_mode=False)
     except click.exceptions.Exit as stop:

@@ -47,7 +47,7 @@ OUT_OF_DATA = 1
 BAD_GUARD = 2
 """A 0 where the 1 after 22 zeros must stand."""
 BAD_FLUSH = 3
-"""The two closing bits lie outside the final interval: no encoder writes that."""
+"""The two closing bits are not those that the final interval asks for."""
 
 UInt8 = npt.NDArray[np.uint8]
 UInt16 = npt.NDArray[np.uint16]
@@ -150,8 +150,7 @@ def decode_segment(
     after = bit - 14 - (1 if guard_at >= used else 0)
     if after > end:
         return OUT_OF_DATA, end
-    quarter = (code >> 14) * QUARTER
-    if quarter < low or quarter + QUARTER - 1 > high:
+    if code >> 14 != (1 if low < QUARTER else 2):
         # With bits missing, this is no damage yet: they may still change what was decoded.
         return (OUT_OF_DATA, end) if bit > end else (BAD_FLUSH, after - 2)
     return OK, after

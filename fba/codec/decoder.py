@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal
 
@@ -68,17 +68,13 @@ class Block:
         for position, index in enumerate(self.index.tolist()):
             one = slice(position, position + 1)
             bit, after = int(self.borders[position]), int(self.borders[position + 1])
-            settings = self.settings
-            if not settings.intra:
-                settings = PlaneSettings(
-                    intra=False,
-                    face_frame=None if settings.face is None else self.number + position,
-                    body_frame=None if settings.body is None else self.number + position,
-                    face=settings.face,
-                    body=settings.body,
-                    skip=int(self.skips[position]),
-                    start_code=settings.start_code and position == 0,
-                )
+            settings = replace(
+                self.settings,
+                face_frame=None if self.settings.face is None else index,
+                body_frame=None if self.settings.body is None else index,
+                skip=int(self.skips[position]),
+                start_code=self.settings.start_code and position == 0,
+            )
             yield Frame(
                 index,
                 self.rate,
@@ -132,7 +128,7 @@ class Decoder:
         self._models = Models(bap_steps)
         self._settings: dict[int, PartSettings] = {}
         self._layouts: dict[int, Layout] = {}
-        self._start_code_seen = False
+        self._code_bit: int | None = None  # where the start code before the next plane begins
 
     # ---- what users call
 
@@ -228,7 +224,7 @@ class Decoder:
         end = 8 * buffer.length
         if buffer.length < self._retry_at and not final:
             return None
-        code, after = plane.find_start_code(buffer.data, self._bit, end)
+        code, after = plane.find_start_code(buffer.data, self._bit, end, self._code_bit is not None)
         if code == plane.UNDECIDED:
             if final and end - self._bit >= 32:
                 self._warn("the stream ends inside a start code; no plane is lost")
@@ -237,8 +233,11 @@ class Decoder:
                 self._step = self._find_object
             return None
         if code != plane.NO_START_CODE:
-            self._bit = after
-            self._start_code_seen = code in syntax.PLANE_CODES
+            start, self._bit = self._bit, after
+            if code not in syntax.PLANE_CODES:
+                self._code_bit = None
+            elif self._code_bit is None:
+                self._code_bit = self._absolute(start)
             if code in syntax.OBJECT_CODES:
                 self._begin_object()
             elif code not in syntax.PLANE_CODES:
@@ -298,18 +297,18 @@ class Decoder:
         for part, name in _PARTS:
             if not mask & part:
                 continue
-            header = reader.bit
             try:
                 one = syntax.read_part(reader, part, number)
             except BitstreamError as error:
                 raise self._located(error) from None
             if one.coding_type == syntax.DCT:
+                here = self._absolute(reader.bit - 1)
                 raise UnsupportedError(
-                    f"plane {number}, bit {self._absolute(header)}: {name} are coded as DCT segments "
+                    f"plane {number}, bit {here}: {name} are coded as DCT segments "
                     "(object_coding_type 1), whose code tables are in no public source",
                     what="DCT segments (object_coding_type 1)",
                     plane=number,
-                    bit=self._absolute(header),
+                    bit=here,
                 )
             models.begin_intra(part, one)
             undefined = models.undefined(one, part)
@@ -350,14 +349,12 @@ class Decoder:
         face, body = settings.get(slots.FACE_BIT), settings.get(slots.BODY_BIT)
         plane_settings = PlaneSettings(
             intra=True,
-            face_frame=None if face is None else number,
-            body_frame=None if body is None else number,
             face=face,
             body=body,
             frame_rate=frame_rate,
             time_code=time_code,
             skip=skip,
-            start_code=self._start_code_seen,
+            start_code=self._code_bit is not None,
         )
         borders = np.array([start, reader.bit], dtype=np.int64)
         return [self._block(row, borders, np.array([skip], dtype=np.int64), plane_settings)]
@@ -386,13 +383,13 @@ class Decoder:
             width = slots.row_width(body=body is not None)
             self._rows = np.zeros((_RUN, width), dtype=np.int32)  # what this layout does not code stays 0
         count, status, _, place = plane.decode_run(
-            self._buffer.data, self._bit, end, mask, layout, self._models.predicted,
-            self._rows, self._skips, self._borders,
+            self._buffer.data, self._bit, end, self._code_bit is not None, mask, layout,
+            self._models.predicted, self._rows, self._skips, self._borders,
         )  # fmt: skip
         if count == 0:
             self._check(status, place)
             return []
-        settings = PlaneSettings(intra=False, face=face, body=body, start_code=self._start_code_seen)
+        settings = PlaneSettings(intra=False, face=face, body=body, start_code=self._code_bit is not None)
         block = self._block(self._rows[:count], self._borders[: count + 1], self._skips[:count], settings)
         return [block]
 
@@ -405,6 +402,9 @@ class Decoder:
     ) -> Block:
         count = len(rows)
         assert self._rate is not None
+        absolute = borders + 8 * self._buffer.offset
+        if self._code_bit is not None:
+            absolute[0] = self._code_bit
         steps = np.cumsum(skips) + np.arange(1, count + 1)
         index = self._index + np.concatenate([[0], steps[:-1]])
         block = Block(
@@ -414,14 +414,14 @@ class Decoder:
             face=slots.face_track(rows, settings.face.mask) if settings.face is not None else None,
             body=slots.body_track(rows, settings.body.mask) if settings.body is not None else None,
             number=self.planes,
-            borders=borders + 8 * self._buffer.offset,
+            borders=absolute,
             skips=skips.copy(),
             settings=settings,
         )
         self.planes += count
         self._index += int(steps[-1])
         self._bit = int(borders[-1])
-        self._start_code_seen = False
+        self._code_bit = None
         return block
 
     def _read_object_mask(self, reader: BitReader) -> int:
@@ -475,7 +475,7 @@ class Decoder:
         self._objects += 1
         self._settings.clear()
         self._layouts.clear()
-        self._start_code_seen = False
+        self._code_bit = None
 
     def _end_object(self, code: int) -> None:
         if self._salvage and code != syntax.END_CODE:

@@ -70,18 +70,18 @@ def read_bit(data: UInt8, bit: int) -> int:
 
 
 @compiled
-def find_start_code(data: UInt8, bit: int, end: int) -> tuple[int, int]:
+def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[int, int]:
     """Look for alignment and a start code between planes: (last byte of the code, bit after it).
 
     The alignment is a 0 and then 1s up to the byte border (a whole byte where already there), or zeros;
-    no plane starts like either before 00 00 01. NO_START_CODE: a plane begins here. UNDECIDED: all of
-    the bits up to `end` fit a start code, but it is not complete.
+    behind a start code (after_code) there is none. NO_START_CODE: a plane begins here. UNDECIDED: all
+    of the bits up to `end` fit a start code, but it is not complete.
     """
     here = bit & 7
     if here == 0:
         if bit + 8 > end:
             return UNDECIDED, bit
-        aligned = bit + 8 if data[bit >> 3] == 0x7F else bit
+        aligned = bit + 8 if data[bit >> 3] == 0x7F and not after_code else bit
     else:
         aligned = bit + 8 - here
         if aligned > end:  # `end` is a byte border
@@ -98,6 +98,18 @@ def find_start_code(data: UInt8, bit: int, end: int) -> tuple[int, int]:
         if value != (1 if position == 2 else 0):
             return NO_START_CODE, bit
     return NO_START_CODE, bit
+
+
+@compiled
+def imitates_start_code(data: UInt8, bit: int, end: int) -> bool:
+    """Whether a P plane at bit..end would be taken for alignment and a start code.
+
+    Its first bits can look like alignment, and the inserted 1 after 22 zeros completes 00 00 01: the
+    guard watches over segments, not over the header before them.
+    """
+    code, _ = find_start_code(data, bit, end, False)
+    prefix = bit + (8 - (bit & 7) if bit & 7 or data[bit >> 3] == 0x7F else 0) + 24
+    return code != NO_START_CODE and prefix <= end
 
 
 @compiled
@@ -154,6 +166,7 @@ def decode_run(
     data: UInt8,
     bit: int,
     end: int,
+    after_code: bool,
     object_mask: int,
     layout: Layout,
     coding: Coding,
@@ -162,6 +175,8 @@ def decode_run(
     borders: Int64,
 ) -> tuple[int, int, int, int]:
     """Decode P planes from `bit` on, until something else comes: (planes, status, bit, place).
+
+    after_code: a start code ends at `bit`.
 
     Fills rows[t] (columns: see `slots`; only those coded are written), skips[t], borders[t] (first
     bit) and borders[t + 1]. `bit`: after the last whole plane. status: OK where rows are full, else why
@@ -175,7 +190,7 @@ def decode_run(
     count = 0
     borders[0] = bit
     while count < len(rows):
-        code, _ = find_start_code(data, bit, end)
+        code, _ = find_start_code(data, bit, end, after_code and count == 0)
         if code != NO_START_CODE:
             return count, OUT_OF_DATA if code == UNDECIDED else START_CODE, bit, bit
         if bit + 4 > end:
@@ -273,9 +288,49 @@ def _write_nibble(data: UInt8, bit: int, value: int) -> int:
 
 
 @compiled
+def room_for(skip: int, layout: Layout) -> int:
+    """More bits than a P plane can take, with a start code before it."""
+    return 112 + 4 * (skip // 15) + 20 * len(layout.segments) + 17 * len(layout.order)
+
+
+@compiled
+def _write_start_code(data: UInt8, bit: int) -> int:
+    """Alignment and fba_object_plane_start_code; the bit after them."""
+    bit += 1
+    while bit & 7:
+        data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+        bit += 1
+    data[(bit >> 3) + 2] = 0x01
+    data[(bit >> 3) + 3] = 0xBB
+    return bit + 32
+
+
+@compiled
+def _write_plane(
+    data: UInt8,
+    bit: int,
+    object_mask: int,
+    skip: int,
+    layout: Layout,
+    coding: Coding,
+    symbols: Int64,
+    flags: Int64,
+) -> int:
+    """One P plane; the bit after it."""
+    header = 2 * object_mask + (1 if skip > 0 else 0)  # is_intra 0, fba_object_mask, skip_frames
+    bit = _write_nibble(data, bit, header)
+    while skip >= 0 and header & 1:
+        word = min(skip, 15)
+        bit = _write_nibble(data, bit, word)
+        skip = skip - 15 if word == 15 else -1
+    return encode_values(data, bit, layout, coding, True, symbols, flags)
+
+
+@compiled
 def encode_run(
     data: UInt8,
     bit: int,
+    after_code: bool,
     object_mask: int,
     layout: Layout,
     coding: Coding,
@@ -285,6 +340,7 @@ def encode_run(
 ) -> tuple[int, int, int, int]:
     """Encode rows[t] as P planes at `bit`: (planes, status, bit, slot).
 
+    after_code: a start code ends at `bit`. A plane that a reader would take for a start code gets one.
     OUT_OF_RANGE: a difference in the next plane, that of `slot`, does not fit its range; nothing of that
     plane was written. OUT_OF_DATA: `data` has no room for another. borders: first bit of each, and the
     bit after the last.
@@ -296,7 +352,7 @@ def encode_run(
     borders[0] = bit
     for count in range(len(rows)):
         skip = int(skips[count])
-        if bit + 64 + 4 * (skip // 15) + 20 * len(layout.segments) + 17 * len(order) > room:
+        if bit + room_for(skip, layout) > room:
             return count, OUT_OF_DATA, bit, -1
         for position in range(len(order)):
             slot = int(order[position])
@@ -306,13 +362,13 @@ def encode_run(
             symbols[position] = symbol
         for flag in range(3):
             flags[flag] = rows[count, FIRST_FLAG + flag]
-        header = 2 * object_mask + (1 if skip > 0 else 0)  # is_intra 0, fba_object_mask, skip_frames
-        bit = _write_nibble(data, bit, header)
-        while skip >= 0 and header & 1:
-            word = min(skip, 15)
-            bit = _write_nibble(data, bit, word)
-            skip = skip - 15 if word == 15 else -1
-        bit = encode_values(data, bit, layout, coding, True, symbols, flags)
+        start = bit
+        bit = _write_plane(data, start, object_mask, skip, layout, coding, symbols, flags)
+        if not (after_code and count == 0) and imitates_start_code(data, start, bit):
+            data[(start >> 3) + 1 : (bit >> 3) + 1] = 0
+            data[start >> 3] &= np.uint8(0xFF00 >> (start & 7) & 0xFF)
+            bit = _write_start_code(data, start)
+            bit = _write_plane(data, bit, object_mask, skip, layout, coding, symbols, flags)
         learn(order, symbols, coding.models)
         for position in range(len(order)):
             slot = int(order[position])

@@ -121,10 +121,10 @@ class PlaneWriter:
         self.planes += 1
         return clamped
 
-    def predicted(self, mask: int, rows: slots.Int32, skips: Int64, borders: Int64 | None = None) -> None:
+    def predicted(self, mask: int, rows: slots.Int32, skips: Int64, *, start_code: bool = False) -> None:
         """Write P planes with fba_object_mask `mask` and the values of rows (T, columns).
 
-        borders: int64 (T + 1,) to be filled with bit positions. Raises DoesNotFitError at the first that
+        start_code: with a plane start code before the first. Raises DoesNotFitError at the first that
         does not fit its ranges, with those before it written and nothing of it.
         """
         if mask not in self._layouts:
@@ -133,14 +133,16 @@ class PlaneWriter:
             self._layouts[mask] = Layout(*slots.coding_order(face, body))
         layout = self._layouts[mask]
         models, writer = self.models, self._writer
-        if borders is None:
-            borders = np.zeros(len(rows) + 1, dtype=np.int64)
+        borders = np.zeros(len(rows) + 1, dtype=np.int64)
+        if start_code:
+            writer.align()
+            self._start_code(syntax.PLANE_CODES[0])
         done = 0
         while done < len(rows):
-            offset = 8 * self._taken
             count, status, bit, slot = plane.encode_run(
                 writer.data,
                 writer.bit,
+                start_code and done == 0,
                 mask,
                 layout,
                 models.predicted,
@@ -148,7 +150,6 @@ class PlaneWriter:
                 skips[done:],
                 borders[done:],
             )
-            borders[done : done + count + 1] += offset
             writer.bit = bit
             done += count
             self.planes += count
@@ -156,12 +157,7 @@ class PlaneWriter:
                 difference = int(rows[done, slot]) - int(models.last[slot])
                 raise DoesNotFitError(slot, plane.quantise(difference, int(models.step[slot])), done)
             if status == OUT_OF_DATA:
-                need = (
-                    64
-                    + 4 * (int(skips[done]) // 15)
-                    + _SEGMENT_BITS * len(layout.segments)
-                    + 17 * len(layout.order)
-                )
+                need = plane.room_for(int(skips[done]), layout)
                 writer.reserve(max(need, 8 * len(writer.data)))
 
     def _start_code(self, code: int) -> None:

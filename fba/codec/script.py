@@ -44,7 +44,8 @@ def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_
                         raise ValueError(
                             f"encode_planes: plane {position} is a P plane before the first I plane"
                         )
-                writer.predicted(_object_mask(settings), rows[position : position + count], skips)
+                chosen = rows[position : position + count]
+                writer.predicted(_object_mask(settings), chosen, skips, start_code=settings.start_code)
         except DoesNotFitError as error:
             plane = position + error.position
             value = int(rows[plane, error.slot])
@@ -104,9 +105,11 @@ def _object_mask(settings: PlaneSettings) -> int:
 
 
 def _run_length(planes: Sequence[PlaneSettings], position: int) -> int:
-    """How many P planes from here on carry the same parts."""
-    first = planes[position]
+    """How many P planes from here on carry the same parts, without a start code between them."""
+    mask = _object_mask(planes[position])
     stop = position + 1
-    while stop < len(planes) and not planes[stop].intra and _object_mask(planes[stop]) == _object_mask(first):
+    while stop < len(planes) and not (planes[stop].intra or planes[stop].start_code):
+        if _object_mask(planes[stop]) != mask:
+            break
         stop += 1
     return stop - position

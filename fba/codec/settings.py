@@ -125,8 +125,8 @@ class PlaneSettings:
 class PlaneInfo:
     """Where and how one plane stood in a stream.
 
-    number: 0-based, in stream order. bit: where it starts (after any start code), from the start of the
-    stream. bits: its length, start code and alignment included.
+    number: 0-based, in stream order. bit: where it starts, from the start of the stream. bits: its
+    length; both with the alignment and start code before it.
     """
 
     number: int
