@@ -129,7 +129,7 @@ class Walker:
             (at for code in OBJECT_START_CODES if (at := reader.data.find(code.to_bytes(4, "big"))) >= 0),
             default=-1,
         )
-        if found < 0 or not reader.data.startswith(START_CODE_PREFIX):
+        if found < 0 or not reader.data.startswith(b"\0\0\1"):
             raise reader.error(
                 f"an FBA object starts with {' or '.join(f'{c:08x}' for c in OBJECT_START_CODES)}, "
                 f"found {reader.data[:4].hex() or 'nothing'}; is this an FBA stream?",

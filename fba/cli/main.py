@@ -85,6 +85,15 @@ def main(arguments: list[str] | None = None) -> None:
             raise
         click.echo(f"fba: error: {_one_line(error)}", err=True)
         sys.exit(BAD_DATA)
+    except Exception as error:
+        if debug:
+            raise
+        click.echo(
+            f"fba: internal error: {type(error).__name__}: {_one_line(error)}; this is a defect of fba: "
+            "please report it with what --debug prints",
+            err=True,
+        )
+        sys.exit(BAD_DATA)
     sys.exit(result if isinstance(result, int) else 0)
 
 
