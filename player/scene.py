@@ -25,6 +25,9 @@ FACE_SUBJECT = Subject((0.0, -0.012, -0.070), 0.165, 0.14)
 BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
 SAMPLES = 48
 """Moments at which the extent of a moving body is looked up to fit the camera."""
+HIPS = 0.78
+STANDING = 0.12
+"""Legs that move less than this (m) stand still."""
 MOST_TRAVEL = 4.0
 """A performance that moves further than this (m) is followed by the camera instead of fitted whole."""
 
@@ -46,6 +49,7 @@ class Scene:
         self._mannequin: Mannequin | None = None
         self._subject: Subject | None = None
         self._follow = False
+        self._legs_move = False
         if animation.body is not None:
             from fba.body import BapSolver, Skeleton
             from player.mannequin import Mannequin
@@ -93,6 +97,17 @@ class Scene:
         if self._subject is None:
             self._subject = self._extent() if self.has_body else FACE_SUBJECT
         return self._subject
+
+    @property
+    def gesture_subject(self) -> Subject | None:
+        """The body from the hips up, where the legs stand still and the face is animated; else None."""
+        whole = self.subject
+        if self._legs_move or self.animation.face is None:
+            return None
+        top = whole.centre[1] + whole.half_height
+        bottom = min(HIPS, top - 0.8)
+        x, _, z = whole.centre
+        return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, min(whole.half_width, 0.55))
 
     @property
     def face_subject(self) -> Subject:
@@ -166,12 +181,14 @@ class Scene:
     def _extent(self) -> Subject:
         frames = self.timeline.frames
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        legs = [self._skeleton.names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
         for frame in np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int)):
             joints = self._posed(float(self.timeline.time_of(int(frame))))[1]
             assert joints is not None
             low, high = np.minimum(low, joints[:, :3, 3].min(0)), np.maximum(high, joints[:, :3, 3].max(0))
             if frame == 0:
-                first = joints[0, :3, 3]
+                first, stand = joints[0, :3, 3], joints[legs, :3, 3]
+            self._legs_move |= bool(np.abs(joints[legs, :3, 3] - stand).max() > STANDING)
         if not np.isfinite(high - low).all() or (high - low).max() > MOST_TRAVEL:
             self._follow = True
             x, y, z = (float(v) for v in first)
@@ -192,9 +209,13 @@ def _aside(low: Float64, high: Float64) -> Float64:
 
 
 def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:
-    """The view that suits the content: a body whole, a face alone from slightly aside."""
+    """The view that suits the content.
+
+    A body whole; from the hips up where it has a face that moves and its legs stand still; a face alone
+    from slightly aside.
+    """
     if scene.has_body:
-        return Camera.preset("body", scene.subject, aspect)
+        return Camera.preset("body", scene.gesture_subject or scene.subject, aspect)
     return Camera(yaw=14.0, pitch=2.0).fit(scene.subject, aspect)
 
 
