@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from fractions import Fraction
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options
-from fba.errors import FormatError
+from fba.errors import FbaWarning, FormatError
 
 
 @click.command(
@@ -55,7 +56,10 @@ from fba.errors import FormatError
     help="suggested_gender.",
 )
 @click.option(
-    "--clamp", is_flag=True, help="Bring values that cannot be coded into range instead of failing."
+    "--clamp/--no-clamp",
+    default=None,
+    help="Bring values that cannot be coded as near as can be instead of failing; default: for motion "
+    "capture only.",
 )
 @click.option(
     "--epf", type=options.EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says."
@@ -75,20 +79,29 @@ def command(
     preset: str,
     unsent: str,
     gender: str,
-    clamp: bool,
+    clamp: bool | None,
     epf: Path | None,
     salvage: bool,
     as_json: bool,
 ) -> None:
     """Encode FAP, BAP or motion-capture files as an FBA stream.
 
-    A face file and a body file together become one stream. Ranges fit the data; a value that no range
-    can carry is an error, or clamped with --clamp.
+    A face file and a body file together become one stream. Ranges fit the data. A value that no range
+    can carry is an error, or with --clamp comes as near as it can.
     """
     from fba.codec import EncoderOptions, encode_planes, encode_with_statistics
 
     with options.progress("reading", len(inputs)) as step:
         animation = _joined(inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step)
+    if clamp is None:
+        clamp = any(_captured(path) for path in inputs)
+        if clamp and bap_steps == "iso" and bap_quant > 0:
+            warnings.warn(
+                "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
+                "--bap-steps visage has 2 mm and 3.16 rad (decode, play and render need the same option)",
+                FbaWarning,
+                stacklevel=1,
+            )
     if epf is not None:
         from fba.formats.epf import read_epf
 
@@ -135,6 +148,12 @@ def command(
     if clamped:
         text += f"; {clamped} values clamped"
     click.echo(text, err=str(output) == "-")
+
+
+def _captured(path: Path) -> bool:
+    from fba.formats import format_of
+
+    return str(path) != "-" and format_of(path).captured
 
 
 def _joined(

@@ -153,9 +153,17 @@ class Encoder:
                 position += error.position
                 part = slots.FACE_BIT if error.slot < slots.FAPS.stop else slots.BODY_BIT
                 ranges = self._ranges[part]
-                if ranges.fits(error.level):
-                    ranges.widen(error.slot, (0, 0, max(error.level, 0), max(-error.level, 0)))
-                    self._stale[part] = True
+                if (
+                    self.options.clamp
+                    and ranges.is_widest(error.slot)
+                    and not self._stale[part]
+                    and not self._carried_by_intra(rows[position], masks, present)
+                ):
+                    rows[position, error.slot] = self._writer.nearest(error.slot, error.level)
+                    self.statistics.clamped += 1
+                    continue
+                ranges.widen(error.slot, (0, 0, max(error.level, 0), max(-error.level, 0)))
+                self._stale[part] = True
             self._intra(frames, position, present, masks, rows, int(skips[position]))
             position += 1
 
@@ -195,6 +203,21 @@ class Encoder:
         self.statistics.intra_planes += 1
         self._last_intra = index
 
+    def _levels(self, part: int, mask: slots.Bool, row: slots.Int32) -> list[tuple[int, int]]:
+        """Slot and level of what an I plane codes of a part, viseme and expression left out."""
+        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        base = 0 if part == slots.FACE_BIT else place.start
+        step = quantiser.steps(part, self.options.quant(part), self.options.bap_steps)
+        coded = np.flatnonzero(mask[2:] if part == slots.FACE_BIT else mask) + place.start
+        return [(slot, quantise(int(row[slot]), int(step[slot - base]))) for slot in coded.tolist()]
+
+    def _carried_by_intra(self, row: slots.Int32, masks: dict[int, slots.Bool], present: list[int]) -> bool:
+        return all(
+            self._ranges[part].fits(level)
+            for part in present
+            for _, level in self._levels(part, masks[part], row)
+        )
+
     def _part_settings(self, part: int, mask: slots.Bool, row: slots.Int32, position: int) -> PartSettings:
         """Settings for an I plane, with ranges that hold its values. Raises RangeError where none do."""
         options = self.options
@@ -204,18 +227,15 @@ class Encoder:
         ranges = self._ranges[part]
         force = self._writer.mask_in_force(part)
         new_mask = force is None or not np.array_equal(force, mask)
-        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
-        order = np.flatnonzero(mask[2:] if part == slots.FACE_BIT else mask) + place.start
-        step = quantiser.steps(part, options.quant(part), options.bap_steps)
-        base = 0 if part == slots.FACE_BIT else place.start
-        for slot in order.tolist():
-            level = quantise(int(row[slot]), int(step[slot - base]))
-            if not ranges.fits(level) and not options.clamp:
-                raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
-            before = ranges.codes.copy() if level else None
+        before = ranges.codes.copy()
+        for slot, level in self._levels(part, mask, row):
+            if not ranges.fits(level):
+                if not options.clamp:
+                    raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
+                ranges.widen_to_catch_up(slot, level)
             ranges.widen(slot, (max(level, 0), max(-level, 0), 0, 0))
-            if before is not None and not np.array_equal(before, ranges.codes):
-                self._stale[part] = True
+        if not np.array_equal(before, ranges.codes):
+            self._stale[part] = True
         send = self._stale[part] or new_mask or options.start_codes
         self._stale[part] = False
         return PartSettings(

@@ -62,6 +62,13 @@ class PlaneWriter:
         settings = self._settings.get(part)
         return settings.mask if settings is not None else None
 
+    def nearest(self, slot: int, level: int) -> int:
+        """The value that a P plane can come to which wants a difference of this level in a slot."""
+        models = self.models
+        low = int(models.minimum[slot])
+        reached = min(max(level, low), low + int(models.size[slot]) - 1)
+        return int(models.last[slot]) + reached * int(models.step[slot])
+
     def quantised(self, row: slots.Int32, order: Int64) -> Int64:
         """Levels of an I plane for the slots in `order` under the steps in force."""
         values, step = row[order].astype(np.int64), self.models.step[order]

@@ -43,7 +43,8 @@ class EncoderOptions:
     unsent: what a FAP that is not sent means to the reader: "keep" its last value (mask type 1) or
         "interpolate" it from others (mask type 2).
     gender: suggested_gender, 1 male.
-    clamp: bring values that no range can carry to the nearest that it can, instead of a RangeError.
+    clamp: bring values that no range can carry as near as it can, instead of a RangeError: I planes
+        stop at the end of the widest range, and P planes after them catch up.
 
     Raises ValueError on anything else.
     """
@@ -105,6 +106,17 @@ class Ranges:
         for row, level in enumerate(levels):
             code = self._code(level)
             self.codes[row, column] = max(int(self.codes[row, column]), min(code, RANGE_CODE_MAX))
+
+    def widen_to_catch_up(self, slot: int, level: int) -> None:
+        """After an I plane that falls short of this level: let P planes make up for what is missing."""
+        missing = max(self._code(abs(level)) - RANGE_CODE_MAX, 0) + 1
+        column = slot - self._first
+        for row in (2, 3):
+            self.codes[row, column] = min(int(self.codes[row, column]) + missing, RANGE_CODE_MAX)
+
+    def is_widest(self, slot: int) -> bool:
+        """Whether differences of a slot have the widest range there is."""
+        return bool((self.codes[2:, slot - self._first] == RANGE_CODE_MAX).all())
 
     def fits(self, level: int) -> bool:
         """Whether any range can hold the level."""

@@ -54,6 +54,7 @@ class Format:
     name: as in `format=`. suffixes: lower case, with the dot, the first is the usual one. sniff: whether
     a file with this beginning (up to 64 KiB) and this lower-case suffix is one. read, write: file to
     Animation and back; write is None where there is no writer. carries: the parts that it can hold.
+    captured: motion capture, whose parameters are worked out when it is read.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Format:
     read: Callable[..., Animation]
     write: Callable[..., None] | None
     carries: tuple[str, ...] = ("face", "body")
+    captured: bool = False
 
     @property
     def read_options(self) -> tuple[str, ...]:
@@ -101,7 +103,7 @@ def formats() -> tuple[Format, ...]:
         ),
         Format(
             "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-            place("sniff", "bvh"), place("read", "bvh"), None, ("body",),
+            place("sniff", "bvh"), place("read", "bvh"), None, ("body",), captured=True,
         ),
     )  # fmt: skip
 
