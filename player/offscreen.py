@@ -52,8 +52,9 @@ class Offscreen:
         self._target: Target | None = None
         self._renderer: Renderer | None = None
         try:
-            self._target = Target(self._gl, self.size, samples)
-            self._renderer = Renderer(self._gl)
+            with self._gl:  # current only while it is used: other contexts of this thread go on working
+                self._target = Target(self._gl, self.size, samples)
+                self._renderer = Renderer(self._gl)
         except Exception:
             self.close()
             raise
@@ -73,9 +74,10 @@ class Offscreen:
             raise ValueError("this Offscreen is closed")
         view = self.scene.at(time)
         camera = following(self.camera, self.scene, time)
-        self._target.begin()
-        self._renderer.draw(view, camera, self.size)
-        self._target.finish().read_into(self._buffer, components=4)
+        with self._gl:
+            self._target.begin()
+            self._renderer.draw(view, camera, self.size)
+            self._target.finish().read_into(self._buffer, components=4)
         width, height = self.size
         return np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)[::-1]
 
@@ -83,10 +85,10 @@ class Offscreen:
         """Give everything back; safe to call twice."""
         if self._gl is None:
             return
-        if self._renderer is not None:
-            self._renderer.close()
-        if self._target is not None:
-            self._target.close()
+        with self._gl:
+            for part in (self._renderer, self._target):
+                if part is not None:
+                    part.close()
         self._renderer = self._target = None
         self._gl.release()
         self._gl = None

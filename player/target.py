@@ -73,11 +73,15 @@ class Target:
         self._drawn.use()
 
     def finish(self, into: Any = None) -> Any:
-        """The framebuffer that now holds the picture: `into`, or one of its own."""
-        result = self._result if into is None else into
+        """The framebuffer that now holds the picture: one of its own, or, with samples = 0, `into`.
+
+        `into` may be a window's framebuffer: its size is taken to be that of this target, as moderngl does
+        not notice that a window was resized.
+        """
         if self._pass is None:
-            self._gl.copy_framebuffer(result, self._drawn)
-            return result
+            self._gl.copy_framebuffer(self._result, self._drawn)
+            return self._result
+        result = self._result if into is None else into
         result.use()
         self._gl.viewport = (0, 0, *self.size)
         self._gl.enable_only(self._gl.NOTHING)

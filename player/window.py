@@ -11,7 +11,7 @@ from fba.errors import DisplayError
 from player.camera import Camera
 from player.context import import_moderngl
 from player.controls import Controls
-from player.offscreen import SAMPLES, following
+from player.offscreen import following
 from player.overlay import Overlay
 from player.renderer import Renderer
 from player.scene import Scene
@@ -69,7 +69,6 @@ class Window:
         size: tuple[int, int] = (1280, 720),
         camera: Camera | str | None = None,
         loop: bool = True,
-        samples: int = SAMPLES,
     ) -> None:
         if size[0] < 1 or size[1] < 1:
             raise ValueError(f"a window must have at least 1x1 pixels, not {size[0]}x{size[1]}")
@@ -77,7 +76,6 @@ class Window:
         self.scene = scene
         self.transport = Transport(scene.timeline, loop=loop)
         self.pictures = 0
-        self._samples = samples
         self._title = title or scene.animation.name or "fba"
         self._shown_title = ""
         self._target: Target | None = None
@@ -205,7 +203,7 @@ class Window:
         if self._target is None or self._target.size != size:
             if self._target is not None:
                 self._target.close()
-            self._target = Target(self._gl, size, self._samples)
+            self._target = Target(self._gl, size, samples=0)
         controls = self.controls
         controls.size = size
         controls.scale = max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5)
@@ -214,9 +212,8 @@ class Window:
         camera = following(controls.camera, self.scene, time)
         self._target.begin()
         self._renderer.draw(self.scene.at(time), camera, size)
-        screen = self._gl.screen
-        self._target.finish(screen)
-        screen.use()
+        self._target.finish(self._gl.screen)
+        self._gl.screen.use()
         self._gl.viewport = (0, 0, *size)
         self._overlay.draw(controls)
         self._show_title()

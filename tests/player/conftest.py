@@ -1,0 +1,47 @@
+"""OpenGL for tests: skips with a reason where there is none, except in CI where EGL is installed."""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+
+import numpy as np
+import pytest
+from player_tracks import body_track, face_track
+
+from fba.animation import Animation
+from fba.errors import DisplayError
+from player.context import offscreen_context
+
+
+@pytest.fixture(scope="session")
+def _egl() -> None:
+    try:
+        context = offscreen_context()
+        with context:
+            pass  # leaves no context current, which a window's would collide with
+        context.release()
+    except DisplayError as error:
+        if os.environ.get("CI") and ctypes.util.find_library("EGL"):
+            raise
+        pytest.skip(f"no OpenGL without a display: {error}")
+
+
+@pytest.fixture
+def opengl(_egl: None) -> None:
+    """OpenGL works without a display here."""
+
+
+@pytest.fixture(scope="session")
+def talking() -> Animation:
+    """A face that opens its mouth, ten frames at 25 a second."""
+    frames = [{3: 70 * t, 5: -60 * t, 31: 20 * t} for t in range(10)]
+    return Animation(25, np.arange(10), face=face_track(frames), name="talking")  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="session")
+def walking() -> Animation:
+    """A body with a face that lifts an arm and a knee, ten frames at 25 a second."""
+    bodies = [{32: 9000 * t, 8: 5000 * t, 11: -8000 * t} for t in range(10)]
+    faces = [{48: 2000 * t} for t in range(10)]
+    return Animation(25, np.arange(10), face_track(faces), body_track(bodies), "walking")  # type: ignore[arg-type]
