@@ -162,8 +162,8 @@ class Encoder:
                     rows[position, error.slot] = self._writer.nearest(error.slot, error.level)
                     self.statistics.clamped += 1
                     continue
-                ranges.widen(error.slot, (0, 0, max(error.level, 0), max(-error.level, 0)))
-                self._stale[part] = True
+                if ranges.widen(error.slot, (0, 0, max(error.level, 0), max(-error.level, 0))):
+                    self._stale[part] = True
             self._intra(frames, position, present, masks, rows, int(skips[position]))
             position += 1
 
@@ -227,15 +227,14 @@ class Encoder:
         ranges = self._ranges[part]
         force = self._writer.mask_in_force(part)
         new_mask = force is None or not np.array_equal(force, mask)
-        before = ranges.codes.copy()
         for slot, level in self._levels(part, mask, row):
+            wider = False
             if not ranges.fits(level):
                 if not options.clamp:
                     raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
-                ranges.widen_to_catch_up(slot, level)
-            ranges.widen(slot, (max(level, 0), max(-level, 0), 0, 0))
-        if not np.array_equal(before, ranges.codes):
-            self._stale[part] = True
+                wider = ranges.widen_to_catch_up(slot, level)
+            if ranges.widen(slot, (max(level, 0), max(-level, 0), 0, 0)) or wider:
+                self._stale[part] = True
         send = self._stale[part] or new_mask or options.start_codes
         self._stale[part] = False
         return PartSettings(

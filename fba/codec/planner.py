@@ -100,19 +100,25 @@ class Ranges:
                 limits = (one.i_limits[1], -one.i_limits[0], one.p_limits[1], -one.p_limits[0])
                 self.codes[:, column] = [-(-limit // RANGE_UNIT) for limit in limits]
 
-    def widen(self, slot: int, levels: tuple[int, int, int, int]) -> None:
-        """Hold these levels of a slot: I max, I min, P max, P min, the minima negated; at most 31."""
-        column = slot - self._first
-        for row, level in enumerate(levels):
-            code = self._code(level)
-            self.codes[row, column] = max(int(self.codes[row, column]), min(code, RANGE_CODE_MAX))
+    def widen(self, slot: int, levels: tuple[int, int, int, int]) -> bool:
+        """Hold these levels of a slot, as far as can be: I max, I min, P max, P min, the minima negated.
 
-    def widen_to_catch_up(self, slot: int, level: int) -> None:
+        Returns whether that took wider ranges.
+        """
+        column = self.codes[:, slot - self._first]
+        wanted = np.array([min(self._code(level), RANGE_CODE_MAX) for level in levels], dtype=np.uint8)
+        wider = bool((wanted > column).any())
+        np.maximum(column, wanted, out=column)
+        return wider
+
+    def widen_to_catch_up(self, slot: int, level: int) -> bool:
         """After an I plane that falls short of this level: let P planes make up for what is missing."""
         missing = max(self._code(abs(level)) - RANGE_CODE_MAX, 0) + 1
-        column = slot - self._first
-        for row in (2, 3):
-            self.codes[row, column] = min(int(self.codes[row, column]) + missing, RANGE_CODE_MAX)
+        column = self.codes[2:, slot - self._first]
+        wanted = np.minimum(column.astype(np.int64) + missing, RANGE_CODE_MAX)
+        wider = bool((wanted > column).any())
+        column[:] = wanted
+        return wider
 
     def is_widest(self, slot: int) -> bool:
         """Whether differences of a slot have the widest range there is."""

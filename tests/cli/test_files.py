@@ -1,0 +1,289 @@
+"""encode, decode, convert, info, stats, bench, conformance on files made here."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation, FaceTrack
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def face_file(tmp_path: Path, face: Animation) -> Path:
+    path = tmp_path / "face.fap"
+    fba.write(path, face)
+    return path
+
+
+@pytest.fixture
+def body_file(tmp_path: Path, body: Animation) -> Path:
+    path = tmp_path / "body.bap"
+    fba.write(path, body)
+    return path
+
+
+def test_encode_and_decode(run: Run, tmp_path: Path, face_file: Path, face: Animation) -> None:
+    stream, back = tmp_path / "face.fba", tmp_path / "back.fap"
+    code, out, err = run("encode", face_file, "-o", stream)
+    assert (code, err) == (0, "")
+    size = stream.stat().st_size
+    assert out == (
+        f"{stream}: 50 frames, 2.00 s at 25 frames/s, {size} bytes, {8 * size / 2000:.2f} kbit/s, 1 I plane\n"
+    )
+    code, out, err = run("decode", stream, "--fap", back)
+    assert (code, out, err) == (0, f"{stream}: 50 frames to {back}\n", "")
+    assert fba.read(back) == face
+
+
+def test_face_and_body_become_one_stream(
+    run: Run, tmp_path: Path, face_file: Path, body_file: Path, face: Animation, body: Animation
+) -> None:
+    stream = tmp_path / "both.fba"
+    assert run("encode", body_file, face_file, "-o", stream)[0] == 0
+    both = fba.read(stream)
+    assert both.face == face.face
+    assert both.body == body.body
+    code, _, _ = run("decode", stream, "--fap", tmp_path / "f.fap", "--bap", tmp_path / "b.bap")
+    assert code == 0
+    assert fba.read(tmp_path / "b.bap") == body
+
+
+def test_two_faces_are_bad_usage(run: Run, tmp_path: Path, face_file: Path) -> None:
+    code, _, err = run("encode", face_file, face_file, "-o", tmp_path / "x.fba")
+    assert code == 2
+    assert "second face file" in err
+    assert not (tmp_path / "x.fba").exists()
+
+
+def test_different_rates_need_fps(run: Run, tmp_path: Path, face_file: Path, body: Animation) -> None:
+    slow = tmp_path / "slow.bap"
+    fba.write(slow, body.resample(10))
+    code, _, err = run("encode", face_file, slow, "-o", tmp_path / "x.fba")
+    assert code == 2
+    assert "--fps" in err
+    assert run("encode", face_file, slow, "-o", tmp_path / "x.fba", "--fps", "25")[0] == 0
+    assert fba.read(tmp_path / "x.fba").rate == 25
+
+
+def test_fps_resamples(run: Run, tmp_path: Path, face_file: Path) -> None:
+    assert run("encode", face_file, "-o", tmp_path / "x.fba", "--fps", "29.97")[0] == 0
+    assert fba.read(tmp_path / "x.fba").rate == Fraction(30000, 1001)
+
+
+def test_a_header_can_be_supplied(run: Run, tmp_path: Path, face_file: Path) -> None:
+    headless = tmp_path / "headless.fap"
+    lines = face_file.read_text().splitlines()
+    headless.write_text("\n".join(line for line in lines if not line.startswith(("2.2", "#"))) + "\n")
+    code, _, err = run("encode", headless, "-o", tmp_path / "x.fba")
+    assert code == 1
+    assert "--fps" in err
+    assert run("encode", headless, "-o", tmp_path / "x.fba", "--fps", "25")[0] == 0
+
+
+def test_what_does_not_fit_is_named_or_clamped(run: Run, tmp_path: Path) -> None:
+    values = np.zeros((2, 68), dtype=np.int32)
+    values[:, 13] = 2000, 2100  # FAP 14 thrust_jaw: step 1, so 1860 at most
+    mask = np.zeros((2, 68), dtype=bool)
+    mask[:, 13] = True
+    path, stream = tmp_path / "wild.fap", tmp_path / "wild.fba"
+    fba.write(path, Animation(25, np.arange(2), FaceTrack(values, mask)))
+    code, _, err = run("encode", path, "-o", stream)
+    assert code == 1
+    assert "frame 0, FAP 14 thrust_jaw: the value 2000 cannot be carried" in err
+    assert "--clamp" in err
+    assert not stream.exists()
+    code, out, _ = run("encode", path, "-o", stream, "--clamp")
+    assert code == 0
+    assert "1 values clamped" in out
+    assert fba.read(stream).face.values[:, 13].tolist() == [1860, 2100]  # type: ignore[union-attr]
+
+
+def test_epf_makes_the_same_bytes_again(run: Run, tmp_path: Path, face_file: Path) -> None:
+    stream, again = tmp_path / "a.fba", tmp_path / "b.fba"
+    run("encode", face_file, "-o", stream, "--quant", 3, "--intra-period", "0.4")
+    run("decode", stream, "--fap", tmp_path / "a.fap", "--epf", tmp_path / "a.epf")
+    assert run("encode", tmp_path / "a.fap", "-o", again, "--epf", tmp_path / "a.epf")[0] == 0
+    assert again.read_bytes() == stream.read_bytes()
+
+
+def test_several_streams_need_a_folder(run: Run, tmp_path: Path, face: Animation) -> None:
+    for name in ("a", "b"):
+        fba.write(tmp_path / f"{name}.fba", face)
+    code, _, err = run("decode", tmp_path / "a.fba", tmp_path / "b.fba", "--fap", tmp_path / "x.fap")
+    assert code == 2
+    assert "folder" in err
+    (tmp_path / "out").mkdir()
+    assert run("decode", tmp_path / "a.fba", tmp_path / "b.fba", "--fap", tmp_path / "out")[0] == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.fap", "b.fap"]
+
+
+def test_decode_says_what_to_write(run: Run, tmp_path: Path, face: Animation) -> None:
+    fba.write(tmp_path / "a.fba", face)
+    code, _, err = run("decode", tmp_path / "a.fba")
+    assert code == 2
+    assert "--fap" in err
+    code, _, err = run("decode", tmp_path / "a.fba", "--bap", tmp_path / "a.bap")
+    assert code == 2
+    assert "carries no BAPs" in err
+
+
+def test_salvage(run: Run, tmp_path: Path, face: Animation) -> None:
+    data = bytearray(fba.encode(face, fba.EncoderOptions(intra_period=1, start_codes=True)))
+    second = data.index(b"\x00\x00\x01\xbb")
+    data[second - 8] ^= 0xFF
+    path, out_file = tmp_path / "d.fba", tmp_path / "d.fap"
+    path.write_bytes(data)
+    assert run("decode", path, "--fap", out_file)[0] == 1
+    code, _, err = run("decode", path, "--fap", out_file, "--salvage")
+    assert code == 0
+    assert "were lost" in err
+    rescued = fba.read(out_file)
+    assert 25 <= len(rescued) < 50
+    assert np.array_equal(rescued.face.values[-25:], face.face.values[-25:])  # type: ignore[union-attr]
+
+
+def test_motion_capture(run: Run, tmp_path: Path, bvh: Path) -> None:
+    stream = tmp_path / "walk.fba"
+    code, _, err = run("encode", bvh, "-o", stream)
+    assert code == 0
+    assert "--bap-steps visage" in err
+    code, _, err = run("encode", bvh, "-o", stream, "--bap-steps", "visage")
+    assert (code, err) == (0, "")
+    decoded = fba.read(stream, bap_steps="visage")
+    assert decoded.rate == 10
+    knee = decoded.body.values[:, 10 - 1]  # type: ignore[union-attr]  # BAP 10 l_knee_flexion
+    # Knees bend by negative flexion, from where the default posture, not quite straight, has them.
+    bent = np.radians([0, -5, -10]) * 1e5
+    assert np.abs(knee - knee[0] - bent).max() <= 170
+
+
+def test_standard_input_and_output(
+    run: Run, tmp_path: Path, face_file: Path, face: Animation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Pipe(io.StringIO):
+        buffer = io.BytesIO(face_file.read_bytes())
+
+    monkeypatch.setattr(sys, "stdin", Pipe())
+    stream = tmp_path / "x.fba"
+    assert run("encode", "-", "-o", stream)[0] == 0
+    assert fba.read(stream) == face
+
+
+def test_convert(run: Run, tmp_path: Path, face_file: Path, face: Animation) -> None:
+    assert run("convert", face_file, tmp_path / "x.fba")[0] == 0
+    assert run("convert", tmp_path / "x.fba", tmp_path / "y.fap")[0] == 0
+    assert fba.read(tmp_path / "y.fap") == face
+    assert run("convert", face_file, tmp_path / "noname", "--to", "fap")[0] == 0
+    code, _, err = run("convert", face_file, tmp_path / "x.xyz")
+    assert code == 1
+    assert ".fba" in err
+    code, _, err = run("convert", face_file, tmp_path / "x.bvh")
+    assert code == 1
+    assert "read only" in err
+    code, _, err = run("convert", face_file, tmp_path / "x.bap")
+    assert code == 1
+    assert not (tmp_path / "x.bap").exists()
+
+
+def test_info(run: Run, tmp_path: Path, face_file: Path, face: Animation) -> None:
+    stream = tmp_path / "face.fba"
+    fba.write(stream, face, intra_period=1)
+    code, out, _ = run("info", stream, face_file)
+    assert code == 0
+    assert f"{stream}: FBA, {stream.stat().st_size} bytes" in out
+    assert "50 frames, 2.00 s at 25 frames/s" in out
+    assert "2 I, 48 P" in out
+    assert "2 FAPs: 3, 48; quantiser 1" in out
+    assert f"{face_file}: FAP" in out
+    report = json.loads(run("info", "--json", stream)[1])
+    assert report["frames"] == 50
+    assert report["intra_planes"] == 2
+    assert report["face"]["parameters"] == [3, 48]
+    assert len(json.loads(run("info", "--json", stream, face_file)[1])) == 2
+
+
+def test_info_goes_on_after_a_bad_file(run: Run, tmp_path: Path, face_file: Path) -> None:
+    bad = tmp_path / "bad.fba"
+    bad.write_bytes(b"nothing of the kind")
+    code, out, err = run("info", bad, face_file)
+    assert code == 1
+    assert "bad.fba" in err
+    assert "50 frames" in out
+
+
+def test_trace(run: Run, tmp_path: Path, face: Animation) -> None:
+    stream = tmp_path / "face.fba"
+    fba.write(stream, face[:2])
+    code, out, _ = run("info", "--trace", stream)
+    assert code == 0
+    lines = [line.split() for line in out.splitlines()[1:]]
+    assert lines[0] == ["0", "32", "fba_object_start_code", "=", "0x000001ba"]
+    assert ["32", "1", "0", "is_intra", "=", "1"] in lines
+    elements = [json.loads(line) for line in run("info", "--trace", "--json", stream)[1].splitlines()]
+    assert sum(element["bits"] for element in elements) == 8 * stream.stat().st_size
+
+
+def test_stats(run: Run, tmp_path: Path, face: Animation) -> None:
+    stream = tmp_path / "face.fba"
+    fba.write(stream, face, intra_period=1)
+    code, out, _ = run("stats", stream)
+    assert code == 0
+    assert "kbit/s" in out
+    report = json.loads(run("stats", "--json", stream)[1])
+    assert report["intra_planes"] == 2
+    bits = 2 * report["intra_bits_mean"] + 48 * report["predicted_bits_mean"]
+    assert 1 <= 8 * report["size"] - bits - 32 - 32 <= 8  # all but object start code, end code, alignment
+    assert report["peak_bits_per_second"] >= report["bits_per_second"] / 2
+
+
+def test_bench(run: Run, tmp_path: Path, face: Animation) -> None:
+    stream = tmp_path / "face.fba"
+    fba.write(stream, face)
+    report = json.loads(run("bench", stream, "--rounds", 1, "--json")[1])
+    assert report["symbols"] == 100
+    assert report["decode"]["symbols_per_second"] > 0
+
+
+def test_conformance(run: Run, tmp_path: Path) -> None:
+    code, out, _ = run("conformance")
+    assert code == 0
+    assert "41 of 41 vectors pass" in out
+    code, _, err = run("conformance", tmp_path)
+    assert code == 1
+    assert "index.json" in err
+    from conformance.runner import OWN
+
+    entries = [
+        entry for entry in json.loads((OWN / "index.json").read_text()) if entry["stream"] == "skips.fba"
+    ]
+    (tmp_path / "skips.fba").write_bytes((OWN / "skips.fba").read_bytes())
+    entries[0]["values"] = "0" * 64
+    (tmp_path / "index.json").write_text(json.dumps(entries))
+    code, out, _ = run("conformance", tmp_path)
+    assert code == 1
+    assert "skips.fba: decoded WRONG" in out
+
+
+def test_an_interrupted_write_leaves_the_old_file(
+    run: Run, tmp_path: Path, face_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = tmp_path / "x.fba"
+    stream.write_bytes(b"old")
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fba.codec.encode_with_statistics", interrupted)
+    assert run("encode", face_file, "-o", stream)[0] == 130
+    assert stream.read_bytes() == b"old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["face.fap", "x.fba"]

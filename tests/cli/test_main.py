@@ -1,0 +1,91 @@
+"""Exit codes, one-line errors, help."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import fba
+from fba import Animation
+from fba.cli.main import _COMMANDS
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def test_help_lists_every_command_with_examples(run: Run) -> None:
+    code, out, _ = run("--help")
+    assert code == 0
+    assert "Examples:" in out
+    for name in _COMMANDS:
+        assert f"\n  {name} " in out
+
+
+@pytest.mark.parametrize("name", _COMMANDS)
+def test_help_of_every_command(run: Run, name: str) -> None:
+    code, out, _ = run(name, "--help")
+    assert code == 0
+    assert out.startswith(f"Usage: fba {name}")
+    assert f"fba {name}" in out.split("Examples:")[1]
+    assert "--debug" in out
+
+
+def test_version(run: Run) -> None:
+    assert run("--version") == (0, f"fba, version {fba.__version__}\n", "")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["nonsense"],
+        ["encode"],
+        ["info", "/no/such/file"],
+        ["encode", "x", "--quant", "32"],
+        ["info", "--nonsense"],
+    ],
+)
+def test_bad_usage_exits_with_2(run: Run, arguments: list[str]) -> None:
+    code, out, err = run(*arguments)
+    assert code == 2
+    assert out == ""
+    assert "Error" in err
+
+
+def test_bad_data_is_one_line_and_exit_1(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "broken.fba"
+    path.write_bytes(b"\x00\x00\x01\xba\xff")
+    code, _, err = run("decode", path, "--fap", tmp_path / "out.fap")
+    assert code == 1
+    assert err.startswith("fba: error: ")
+    assert err.count("\n") == 1
+    assert "ends inside this plane" in err
+    assert not (tmp_path / "out.fap").exists()
+
+
+def test_debug_shows_the_traceback(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "broken.fba"
+    path.write_bytes(b"\x00\x00\x01\xba\xff")
+    program = [sys.executable, "-m", "fba", "decode", str(path), "--fap", str(tmp_path / "o.fap"), "--debug"]
+    result = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+    assert "Traceback" in result.stderr
+
+
+def test_a_directory_is_no_file(run: Run, tmp_path: Path) -> None:
+    code, _, err = run("info", tmp_path)
+    assert code == 2
+    assert "directory" in err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of a POSIX shell")
+def test_a_reader_that_has_seen_enough_is_no_error(tmp_path: Path, face: Animation) -> None:
+    path = tmp_path / "face.fba"
+    fba.write(path, face)
+    shell = f"'{sys.executable}' -m fba info --trace '{path}' | head -n 1"
+    result = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
+    assert result.stdout.splitlines() == ["      bit   bits  plane  element"]
+    assert result.stderr == ""
