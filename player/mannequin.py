@@ -6,6 +6,7 @@ A stand-in for a skinned body: joint matrices in, capsules out.
 from __future__ import annotations
 
 import csv
+import re
 from functools import cache
 from importlib.resources import files
 
@@ -33,12 +34,14 @@ class Mannequin:
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
-        rows = [row for row in _rows() if row["joint"] in set(skeleton.names)]
         number = {name: i for i, name in enumerate(skeleton.names)}
+        rows = [row for row in _rows() if row["joint"] in number and row["end_joint"] in number]
+        centres = np.asarray(skeleton.centres, dtype=np.float64)
         self._joint = np.array([number[row["joint"]] for row in rows], dtype=np.intp)
-        centres = np.asarray(skeleton.centres, dtype=np.float64)[self._joint]
-        self._start = np.array([[float(row[f"{axis}0"]) for axis in "xyz"] for row in rows]) - centres
-        self._finish = np.array([[float(row[f"{axis}1"]) for axis in "xyz"] for row in rows]) - centres
+        self._end_joint = np.array([number[row["end_joint"]] for row in rows], dtype=np.intp)
+        start, finish = ([[float(row[f"{axis}{end}"]) for axis in "xyz"] for row in rows] for end in (0, 1))
+        self._start = np.array(start) - centres[self._joint]
+        self._finish = np.array(finish) - centres[self._end_joint]
         self._fixed = np.zeros((len(rows), CAPSULE_FLOATS), dtype=np.float32)
         self._fixed[:, 3] = [float(row["r0"]) for row in rows]
         self._fixed[:, 7] = [float(row["r1"]) for row in rows]
@@ -47,12 +50,11 @@ class Mannequin:
 
     def capsules(self, matrices: Float64) -> Float32:
         """(N, 16) capsules, as `View` takes them, for joint matrices (J, 4, 4)."""
-        chosen = matrices[self._joint]
-        turn, place = chosen[:, :3, :3], chosen[:, :3, 3]
+        first, last = matrices[self._joint], matrices[self._end_joint]
         result = self._fixed.copy()
-        result[:, 0:3] = np.einsum("nij,nj->ni", turn, self._start) + place
-        result[:, 4:7] = np.einsum("nij,nj->ni", turn, self._finish) + place
-        result[:, 8:11] = turn[:, :, 2]
+        result[:, 0:3] = np.einsum("nij,nj->ni", first[:, :3, :3], self._start) + first[:, :3, 3]
+        result[:, 4:7] = np.einsum("nij,nj->ni", last[:, :3, :3], self._finish) + last[:, :3, 3]
+        result[:, 8:11] = first[:, :3, 2]
         return result
 
 
@@ -63,8 +65,9 @@ def _rows() -> list[dict[str, str]]:
     rows = []
     for row in left:
         rows.append(row)
-        if row["joint"].startswith("l_"):
-            other = dict(row, joint="r_" + row["joint"][2:])
+        if row["end_joint"].startswith("l_"):
+            other = dict(row, joint=re.sub("^l_", "r_", row["joint"]))
+            other["end_joint"] = re.sub("^l_", "r_", row["end_joint"])
             for column in ("x0", "x1"):
                 other[column] = str(-float(row[column]))
             rows.append(other)

@@ -24,8 +24,10 @@ IVORY = srgb("#e9e2d2")
 GUM = srgb("#a5524f")
 TONGUE = srgb("#b5605c")
 SHIRT = srgb("#3f6276")
-ARCH = 0.026
+ARCH = 0.028
 """Half the width of the arch of the upper teeth, metres."""
+HOLLOW = 0.036
+"""Half the width of the hollow behind them, metres: as wide as lips can stretch."""
 TEETH = 14
 """Teeth in a row."""
 
@@ -174,11 +176,11 @@ def hollow(face: FeaturePointFace) -> Part:
     inward = np.linspace(0, np.pi / 2, rings)[:, None]
     turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
     middle, half = (top[1] + bottom[1]) / 2, (top[1] - bottom[1]) / 2 + 0.003
-    x = 0.026 * np.cos(inward) * np.cos(turn)
+    x = HOLLOW * np.cos(inward) * np.cos(turn)
     vertices = np.empty((rings, around, 3))
     vertices[..., 0] = x
     vertices[..., 1] = middle + half * np.cos(inward) * np.sin(turn)
-    vertices[..., 2] = top[2] - 0.004 - 0.020 * (x / 0.026) ** 2 - 0.045 * np.sin(inward)
+    vertices[..., 2] = top[2] - 0.004 - 0.032 * (x / HOLLOW) ** 2 - 0.045 * np.sin(inward)
     weights = np.zeros((rings, around, len(names())))
     weights[..., row_of()["9.9"]] = np.clip(0.5 - 0.5 * np.sin(turn) * 1.4 * np.cos(inward), 0, 1)
     colours = np.tile([0.055, 0.012, 0.010, 0.0], (rings, around, 1))

@@ -13,7 +13,6 @@ import csv
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +20,7 @@ import numpy.typing as npt
 from fba.face.feature_points import names, row_of
 from fba.face.points import FeaturePointFace
 from player.head.loops import LIP_STEPS, Curve, brow, lid, lip
+from player.head.spreading import spread
 
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
@@ -268,7 +268,10 @@ def _finish(mesh: _Parts, skin: Skin, holes: list[Float64]) -> Surface:
     in_hole = np.zeros(len(triangles), dtype=bool)
     for hole in holes:
         in_hole |= _inside(centroids, hole)
-    triangles = triangles[~in_hole]
+    edge = np.zeros(len(vertices), dtype=bool)
+    for name, rows in mesh.names.items():
+        edge[rows] = "margin" in name or "inner" in name
+    triangles = triangles[~(in_hole & edge[triangles].all(axis=1))]
     a, b, c = (chart[triangles[:, i]] for i in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     triangles = np.where((area < 0)[:, None], triangles[:, ::-1], triangles)[np.abs(area) > 1e-9]
@@ -278,7 +281,8 @@ def _finish(mesh: _Parts, skin: Skin, holes: list[Float64]) -> Surface:
     triangles = np.concatenate([triangles, fan])
     vertices = np.concatenate([vertices, pole])
     chart = np.concatenate([chart, [[0.0, -np.pi]]])
-    weights = _weights(vertices, triangles, mesh)
+    given, known = _given_weights(vertices, mesh)
+    weights = spread(vertices, triangles, given, known)
     lip_share = np.zeros(len(vertices))
     for name, rows in mesh.names.items():
         if name.startswith("lip"):
@@ -286,11 +290,8 @@ def _finish(mesh: _Parts, skin: Skin, holes: list[Float64]) -> Surface:
     return Surface(vertices, triangles.astype(np.int32), weights, chart, dict(mesh.names), lip_share)
 
 
-def _weights(vertices: Float64, triangles: Int32, mesh: _Parts) -> Float64:
-    """Biharmonic interpolation of the known weights over the mesh."""
-    from scipy.sparse import diags
-    from scipy.sparse.linalg import splu
-
+def _given_weights(vertices: Float64, mesh: _Parts) -> tuple[Float64, npt.NDArray[np.bool_]]:
+    """Weights of the curves and points, none for what lies behind and below, and which these are."""
     known = np.zeros(len(vertices), dtype=bool)
     weights = np.zeros((len(vertices), len(names())))
     for rows, given in zip(mesh.names.values(), mesh.weights, strict=True):
@@ -299,37 +300,4 @@ def _weights(vertices: Float64, triangles: Int32, mesh: _Parts) -> Float64:
             weights[rows] = given
     still = (vertices[:, 2] < -0.085) | (vertices[:, 1] > 0.062)
     still |= (vertices[:, 1] < -0.104) & (vertices[:, 2] < -0.045)
-    known |= still & ~known
-    laplacian, mass = _laplacian(vertices, triangles)
-    bending = (laplacian.T @ diags(1 / mass) @ laplacian).tocsc()
-    free = np.flatnonzero(~known)
-    fixed = np.flatnonzero(known)
-    active = np.flatnonzero(np.abs(weights).sum(axis=0) > 0)
-    solver = splu(bending[free][:, free].tocsc())
-    weights[np.ix_(free, active)] = solver.solve(-(bending[free][:, fixed] @ weights[np.ix_(fixed, active)]))
-    weights[np.abs(weights) < 1e-3] = 0.0
-    return weights
-
-
-def _laplacian(vertices: Float64, triangles: Int32) -> tuple[Any, Float64]:
-    """Cotangent Laplacian (positive semidefinite) and the area that belongs to each vertex."""
-    from scipy.sparse import coo_matrix
-
-    count = len(vertices)
-    rows, columns, values = [], [], []
-    mass = np.zeros(count)
-    for i in range(3):
-        a, b, c = triangles[:, i], triangles[:, (i + 1) % 3], triangles[:, (i + 2) % 3]
-        u, v = vertices[a] - vertices[c], vertices[b] - vertices[c]
-        cross = np.linalg.norm(np.cross(u, v), axis=1)
-        cotangent = np.clip((u * v).sum(axis=1) / np.maximum(cross, 1e-12), 0.02, 20.0) / 2
-        rows += [a, b]
-        columns += [b, a]
-        values += [-cotangent, -cotangent]
-        mass += np.bincount(a, cross / 6, minlength=count)
-    flat = np.concatenate(values)
-    matrix = coo_matrix((flat, (np.concatenate(rows), np.concatenate(columns))), shape=(count, count)).tocsr()
-    degree = np.asarray(matrix.sum(axis=1)).ravel()
-    from scipy.sparse import diags
-
-    return matrix - diags(degree), np.maximum(mass, 1e-9)
+    return weights, known | still
