@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -99,10 +99,8 @@ class FaceTrack:
         return len(self.values)
 
     def __getitem__(self, frames: slice) -> FaceTrack:
-        part = object.__new__(FaceTrack)  # a part of what was checked needs no check
         names = ("values", "mask", "viseme", "expression")
-        _freeze(part, **{name: getattr(self, name)[frames] for name in names})
-        return part
+        return trusted(FaceTrack, **{name: getattr(self, name)[frames] for name in names})
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FaceTrack):
@@ -152,9 +150,7 @@ class BodyTrack:
         return len(self.values)
 
     def __getitem__(self, frames: slice) -> BodyTrack:
-        part = object.__new__(BodyTrack)  # a part of what was checked needs no check
-        _freeze(part, values=self.values[frames], mask=self.mask[frames])
-        return part
+        return trusted(BodyTrack, values=self.values[frames], mask=self.mask[frames])
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, BodyTrack):
@@ -368,6 +364,16 @@ class Animation:
             both = mask & self.body.mask[after]
             body = BodyTrack(_between(self.body.values, before, after, weight, both), mask)
         return Animation(rate, index, face, body, self.name)
+
+
+Track = TypeVar("Track", FaceTrack, BodyTrack)
+
+
+def trusted(kind: type[Track], **arrays: npt.NDArray[Any]) -> Track:
+    """A track of arrays that are known to be right, such as parts of another's, without any check."""
+    track: Track = object.__new__(kind)
+    _freeze(track, **arrays)
+    return track
 
 
 def _checked_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:

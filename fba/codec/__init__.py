@@ -1,6 +1,8 @@
 """The FBA codec: numbers to bits and back (ISO/IEC 14496-2, FBA object; predictive mode)."""
 
-from fba.codec.decoder import Block, Damage, Decoder, animation_of, decode
+from fba.codec.assembly import Assembly
+from fba.codec.block import Block
+from fba.codec.decoder import Damage, Decoder, decode
 from fba.codec.encoder import Encoder, EncoderStatistics, encode, encode_with_statistics
 from fba.codec.planner import EncoderOptions
 from fba.codec.script import encode_planes
@@ -8,6 +10,7 @@ from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings
 from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
 
 __all__ = [
+    "Assembly",
     "Block",
     "Damage",
     "Decoder",
@@ -22,7 +25,6 @@ __all__ = [
     "RangeLists",
     "StreamInfo",
     "TimeCode",
-    "animation_of",
     "decode",
     "encode",
     "encode_planes",

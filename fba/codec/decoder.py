@@ -5,30 +5,33 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.animation import Animation, BodyTrack, FaceTrack, Frame
+from fba.animation import Animation, Frame
 from fba.codec import plane, slots, syntax
 from fba.codec.arithmetic import OK, OUT_OF_DATA
+from fba.codec.assembly import Assembly
 from fba.codec.bits import BitReader, OutOfDataError
+from fba.codec.block import Block
 from fba.codec.buffer import Buffer
 from fba.codec.models import Models
 from fba.codec.plane import Layout
-from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, TimeCode
+from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, TimeCode
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
 
 DEFAULT_RATE = Fraction(25)
 _RUN = 512
 """Planes that one call of the compiled loop decodes at most."""
+_CHUNK = 1 << 16
+"""Bytes that `decode` hands over at a time, so that blocks do not pile up."""
 _LARGE_PLANE = 4096
 """Bytes beyond which a plane that is still incomplete is not tried again for every byte that comes."""
-_COMMON_RATE_MAX = 1_000_000
 
 _PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
 
@@ -44,44 +47,6 @@ class Damage:
     error: FbaError
     start: int
     stop: int
-
-
-@dataclass(frozen=True)
-class Block:
-    """Consecutive planes that share their settings.
-
-    index: int64 (T,), frame t is shown at start + (index[t] - index[0]) / rate. borders: int64 (T + 1,),
-    absolute bit positions. skips: int64 (T,).
-    """
-
-    index: npt.NDArray[np.int64]
-    start: Fraction
-    rate: Fraction
-    face: FaceTrack | None
-    body: BodyTrack | None
-    number: int
-    borders: npt.NDArray[np.int64]
-    skips: npt.NDArray[np.int64]
-    settings: PlaneSettings
-
-    def frames(self) -> Iterator[Frame]:
-        for position, index in enumerate(self.index.tolist()):
-            one = slice(position, position + 1)
-            bit, after = int(self.borders[position]), int(self.borders[position + 1])
-            settings = replace(
-                self.settings,
-                face_frame=None if self.settings.face is None else index,
-                body_frame=None if self.settings.body is None else index,
-                skip=int(self.skips[position]),
-                start_code=self.settings.start_code and position == 0,
-            )
-            yield Frame(
-                index,
-                self.rate,
-                self.face[one] if self.face is not None else None,
-                self.body[one] if self.body is not None else None,
-                PlaneInfo(self.number + position, bit, after - bit, settings),
-            )
 
 
 class Decoder:
@@ -550,45 +515,19 @@ def decode(
     Raises BitstreamError, UnsupportedError.
     """
     decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
-    blocks = decoder.push_blocks(data)
-    blocks += decoder.finish_blocks()
+    assembly = Assembly()
+    view = memoryview(data)
+    for start in range(0, len(view), _CHUNK):
+        for block in decoder.push_blocks(view[start : start + _CHUNK]):
+            assembly.add(block)
+    for block in decoder.finish_blocks():
+        assembly.add(block)
     decoder.finish_blocks()  # raises what stopped the decoding, where it was not salvaged
     for damage in decoder.damage:
         warnings.warn(
             f"bytes {damage.start}..{damage.stop} were lost: {damage.error}", FbaWarning, stacklevel=2
         )
-    if not blocks:
+    if not assembly.frames:
         error = decoder.damage[0].error if decoder.damage else None
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error
-    return animation_of(blocks)
-
-
-def animation_of(blocks: list[Block]) -> Animation:
-    """The animation that consecutive blocks make."""
-    rates = {block.rate for block in blocks}
-    rate = blocks[0].rate
-    if len(rates) == 1:
-        index = np.concatenate([block.index for block in blocks])
-    else:
-        parts = rates | {1 / block.start for block in blocks if block.start}
-        rate = Fraction(
-            math.lcm(*(part.numerator for part in parts)), math.gcd(*(part.denominator for part in parts))
-        )
-        if rate > _COMMON_RATE_MAX:
-            rate = max(rates)
-        pieces = []
-        following = 0
-        for block in blocks:
-            step = rate / block.rate
-            offset = block.index - block.index[0]
-            first = max(math.floor(block.start * rate + Fraction(1, 2)), following)
-            piece = first + offset * step.numerator // step.denominator
-            following = int(piece[-1]) + 1
-            pieces.append(piece)
-        index = np.concatenate(pieces)
-    return Animation(
-        rate,
-        index,
-        FaceTrack.join([(block.face, len(block.index)) for block in blocks]),
-        BodyTrack.join([(block.body, len(block.index)) for block in blocks]),
-    )
+    return assembly.animation()

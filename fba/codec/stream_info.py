@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.codec import syntax
-from fba.codec.decoder import Block, Damage, Decoder
+from fba.codec.block import Block
+from fba.codec.decoder import Damage, Decoder
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError
 

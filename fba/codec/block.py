@@ -1,0 +1,51 @@
+"""Decoded planes that share their settings, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import BodyTrack, FaceTrack, Frame
+from fba.codec.settings import PlaneInfo, PlaneSettings
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive planes that share their settings.
+
+    index: int64 (T,), frame t is shown at start + (index[t] - index[0]) / rate. borders: int64 (T + 1,),
+    absolute bit positions. skips: int64 (T,).
+    """
+
+    index: npt.NDArray[np.int64]
+    start: Fraction
+    rate: Fraction
+    face: FaceTrack | None
+    body: BodyTrack | None
+    number: int
+    borders: npt.NDArray[np.int64]
+    skips: npt.NDArray[np.int64]
+    settings: PlaneSettings
+
+    def frames(self) -> Iterator[Frame]:
+        for position, index in enumerate(self.index.tolist()):
+            one = slice(position, position + 1)
+            bit, after = int(self.borders[position]), int(self.borders[position + 1])
+            settings = replace(
+                self.settings,
+                face_frame=None if self.settings.face is None else index,
+                body_frame=None if self.settings.body is None else index,
+                skip=int(self.skips[position]),
+                start_code=self.settings.start_code and position == 0,
+            )
+            yield Frame(
+                index,
+                self.rate,
+                self.face[one] if self.face is not None else None,
+                self.body[one] if self.body is not None else None,
+                PlaneInfo(self.number + position, bit, after - bit, settings),
+            )
