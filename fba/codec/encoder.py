@@ -11,14 +11,16 @@ import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack, Frame
 from fba.codec import planner, quantiser, slots
-from fba.codec.plane import SKIP_MAX, quantise
+from fba.codec.plane import SKIP_MAX
 from fba.codec.plane_writer import DoesNotFitError, PlaneWriter
 from fba.codec.planner import EncoderOptions, Ranges
 from fba.codec.settings import PartSettings, PlaneSettings, RangeLists
 from fba.errors import RangeError
 
-_CHUNK = 1024
+_CHUNK = 4096
 """Frames that `encode` hands over at a time: what bounds its memory."""
+Int64 = npt.NDArray[np.int64]
+
 _PARTS = (slots.FACE_BIT, slots.BODY_BIT)
 
 
@@ -162,7 +164,8 @@ class Encoder:
                     rows[position, error.slot] = self._writer.nearest(error.slot, error.level)
                     self.statistics.clamped += 1
                     continue
-                if ranges.widen(error.slot, (0, 0, max(error.level, 0), max(-error.level, 0))):
+                wanted = np.array([[0], [0], [error.level], [-error.level]])
+                if ranges.widen(np.array([error.slot]), wanted):
                     self._stale[part] = True
             self._intra(frames, position, present, masks, rows, int(skips[position]))
             position += 1
@@ -203,19 +206,17 @@ class Encoder:
         self.statistics.intra_planes += 1
         self._last_intra = index
 
-    def _levels(self, part: int, mask: slots.Bool, row: slots.Int32) -> list[tuple[int, int]]:
-        """Slot and level of what an I plane codes of a part, viseme and expression left out."""
+    def _levels(self, part: int, mask: slots.Bool, row: slots.Int32) -> tuple[Int64, Int64]:
+        """Slots (K,) and levels (K,) of what an I plane codes of a part, without viseme and expression."""
         place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
         base = 0 if part == slots.FACE_BIT else place.start
-        step = quantiser.steps(part, self.options.quant(part), self.options.bap_steps)
         coded = np.flatnonzero(mask[2:] if part == slots.FACE_BIT else mask) + place.start
-        return [(slot, quantise(int(row[slot]), int(step[slot - base]))) for slot in coded.tolist()]
+        step = quantiser.steps(part, self.options.quant(part), self.options.bap_steps)[coded - base]
+        return coded, quantiser.levels(row[coded], step)
 
     def _carried_by_intra(self, row: slots.Int32, masks: dict[int, slots.Bool], present: list[int]) -> bool:
         return all(
-            self._ranges[part].fits(level)
-            for part in present
-            for _, level in self._levels(part, masks[part], row)
+            bool(self._ranges[part].fits(self._levels(part, masks[part], row)[1]).all()) for part in present
         )
 
     def _part_settings(self, part: int, mask: slots.Bool, row: slots.Int32, position: int) -> PartSettings:
@@ -227,14 +228,17 @@ class Encoder:
         ranges = self._ranges[part]
         force = self._writer.mask_in_force(part)
         new_mask = force is None or not np.array_equal(force, mask)
-        for slot, level in self._levels(part, mask, row):
-            wider = False
-            if not ranges.fits(level):
-                if not options.clamp:
-                    raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
-                wider = ranges.widen_to_catch_up(slot, level)
-            if ranges.widen(slot, (max(level, 0), max(-level, 0), 0, 0)) or wider:
-                self._stale[part] = True
+        coded, levels = self._levels(part, mask, row)
+        beyond = ~ranges.fits(levels)
+        if beyond.any():
+            slot = int(coded[beyond][0])
+            if not options.clamp:
+                raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
+            ranges.widen_to_catch_up(coded[beyond], levels[beyond])
+            self._stale[part] = True
+        none = np.zeros_like(levels)
+        if ranges.widen(coded, np.stack([levels, -levels, none, none])):
+            self._stale[part] = True
         send = self._stale[part] or new_mask or options.start_codes
         self._stale[part] = False
         return PartSettings(

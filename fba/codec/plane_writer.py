@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba.codec import plane, slots, syntax
+from fba.codec import plane, quantiser, slots, syntax
 from fba.codec.arithmetic import OUT_OF_DATA
 from fba.codec.bits import BitWriter
 from fba.codec.models import Models
@@ -69,12 +69,6 @@ class PlaneWriter:
         reached = min(max(level, low), low + int(models.size[slot]) - 1)
         return int(models.last[slot]) + reached * int(models.step[slot])
 
-    def quantised(self, row: slots.Int32, order: Int64) -> Int64:
-        """Levels of an I plane for the slots in `order` under the steps in force."""
-        values, step = row[order].astype(np.int64), self.models.step[order]
-        size, half = np.abs(values), step // 2
-        return np.sign(values) * np.where(size <= half, 0, (size + half) // step)
-
     def intra(self, settings: PlaneSettings, row: slots.Int32, *, clamp: bool = False) -> int:
         """Write an I plane with the values of row (columns,); how many values were clamped to their range.
 
@@ -93,7 +87,7 @@ class PlaneWriter:
             order, segments = slots.coding_order(
                 one.mask if part == slots.FACE_BIT else None, one.mask if part == slots.BODY_BIT else None
             )
-            levels = self.quantised(row, order)
+            levels = quantiser.levels(row[order], models.step[order])
             low = models.i_minimum[order]
             fitting = np.clip(levels, low, low + models.i_size[order] - 1)
             wrong = np.flatnonzero(fitting != levels)

@@ -21,6 +21,7 @@ from fba.codec.settings import (
     TimeCode,
     UInt8,
 )
+from fba.codec.slots import Int64
 from fba.compiled import compiled
 from fba.errors import FbaWarning, RangeError
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, Bap, Fap, baps, faps
@@ -100,42 +101,43 @@ class Ranges:
                 limits = (one.i_limits[1], -one.i_limits[0], one.p_limits[1], -one.p_limits[0])
                 self.codes[:, column] = [-(-limit // RANGE_UNIT) for limit in limits]
 
-    def widen(self, slot: int, levels: tuple[int, int, int, int]) -> bool:
-        """Hold these levels of a slot, as far as can be: I max, I min, P max, P min, the minima negated.
+    def widen(self, slots_: Int64, levels: Int64) -> bool:
+        """Hold these levels of slots (K,), as far as can be; whether that took wider ranges.
 
-        Returns whether that took wider ranges.
+        levels: (4, K): I max, I min, P max, P min, the minima negated.
         """
-        column = self.codes[:, slot - self._first]
-        wanted = np.array([min(self._code(level), RANGE_CODE_MAX) for level in levels], dtype=np.uint8)
-        wider = bool((wanted > column).any())
-        np.maximum(column, wanted, out=column)
+        columns = slots_ - self._first
+        wanted = np.minimum(self._codes(np.maximum(levels, 0)), RANGE_CODE_MAX)
+        held = self.codes[:, columns]
+        wider = bool((wanted > held).any())
+        if wider:
+            self.codes[:, columns] = np.maximum(held, wanted)
         return wider
 
-    def widen_to_catch_up(self, slot: int, level: int) -> bool:
-        """After an I plane that falls short of this level: let P planes make up for what is missing."""
-        missing = max(self._code(abs(level)) - RANGE_CODE_MAX, 0) + 1
-        column = self.codes[2:, slot - self._first]
-        wanted = np.minimum(column.astype(np.int64) + missing, RANGE_CODE_MAX)
-        wider = bool((wanted > column).any())
-        column[:] = wanted
-        return wider
+    def widen_to_catch_up(self, slots_: Int64, levels: Int64) -> None:
+        """After an I plane that falls short of these levels: let P planes make up for what is missing."""
+        columns = slots_ - self._first
+        missing = np.maximum(self._codes(np.abs(levels)) - RANGE_CODE_MAX, 0) + 1
+        self.codes[2:, columns] = np.minimum(self.codes[2:, columns] + missing, RANGE_CODE_MAX)
 
     def is_widest(self, slot: int) -> bool:
         """Whether differences of a slot have the widest range there is."""
         return bool((self.codes[2:, slot - self._first] == RANGE_CODE_MAX).all())
 
-    def fits(self, level: int) -> bool:
-        """Whether any range can hold the level."""
-        return self._code(abs(level)) <= RANGE_CODE_MAX
+    def fits(self, levels: Int64) -> npt.NDArray[np.bool_]:
+        """Which of the levels any range can hold."""
+        fitting: npt.NDArray[np.bool_] = self._codes(np.abs(levels)) <= RANGE_CODE_MAX
+        return fitting
 
     def lists(self) -> RangeLists:
         """All four lists, as they are now."""
         copies: list[UInt8] = [row.copy() for row in self.codes]
         return RangeLists(*copies)
 
-    def _code(self, level: int) -> int:
-        """Smallest code whose limit, 60 x code / scale rounded down, reaches the level."""
-        return -(-level * self._scale // RANGE_UNIT) if level > 0 else 0
+    def _codes(self, levels: Int64) -> Int64:
+        """Smallest codes whose limits, 60 x code / scale rounded down, reach the levels (0 and up)."""
+        codes: Int64 = -(-levels * self._scale // RANGE_UNIT)
+        return codes
 
 
 def mask_types(part: int, mask: slots.Bool, unsent: str) -> tuple[int, ...]:
@@ -192,9 +194,7 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
         extremes = np.zeros((4, track.values.shape[1] - skipped), dtype=np.int64)
         _extremes(track.values[:, skipped:], track.mask[:, skipped:], step, extremes)
         first = slots.FAPS.start if part == slots.FACE_BIT else slots.BAPS.start
-        for column in np.flatnonzero(extremes.any(axis=0)).tolist():
-            i_max, i_min, p_max, p_min = extremes[:, column].tolist()
-            ranges.widen(first + column, (i_max, i_min, p_max, p_min))
+        ranges.widen(np.arange(extremes.shape[1]) + first, extremes)
         result[part] = ranges
     return result
 

@@ -31,3 +31,10 @@ def steps(part: int, quant: int, bap_table: str) -> npt.NDArray[np.int64]:
         result[slots.FAPS] = fap_steps()[2:] * quant
         result[[2, 4, 6]] = quant  # blend and intensities; selects are never quantised
     return result
+
+
+def levels(values: npt.NDArray[np.integer], step: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Levels of values: the nearest multiple of the step, halves away from zero, but 0 up to step // 2."""
+    size, half = np.abs(values.astype(np.int64)), step // 2
+    quantised: npt.NDArray[np.int64] = np.sign(values) * np.where(size <= half, 0, (size + half) // step)
+    return quantised
