@@ -86,7 +86,6 @@ def check(vector: Vector) -> Result:
             data = stream.read_bytes()
             decoder = Decoder(bap_steps=vector.bap_steps)
             frames = decoder.push(data) + decoder.finish()
-            decoder.finish()
             wrong = (
                 _wrong_digest(vector, frames) if "values" in vector.entry else _wrong_files(vector, frames)
             )

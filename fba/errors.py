@@ -16,6 +16,7 @@ Something read with doubts, but read, is an `FbaWarning`.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -32,7 +33,10 @@ class BitstreamError(FbaError, ValueError):
 
     plane: number of the plane (0-based, in stream order) in which it was found.
     bit: position of the offending bit, counted from the start of the stream.
+    blocks: what `Decoder.finish` decoded before it, of what no earlier call had returned.
     """
+
+    blocks: Sequence[Any] = ()
 
     def __init__(self, message: str, *, plane: int | None = None, bit: int | None = None) -> None:
         self.plane = plane
@@ -101,6 +105,7 @@ class UnsupportedError(FbaError, NotImplementedError):
     """Correct input that this implementation does not handle; `what` names the feature."""
 
     def __init__(self, message: str, *, what: str | None = None, **details: Any) -> None:
+        self.blocks: Sequence[Any] = ()
         self.what = what if what is not None else message
         self.plane: int | None = details.get("plane")
         self.bit: int | None = details.get("bit")

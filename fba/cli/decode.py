@@ -74,7 +74,6 @@ def _decode(path: Path, targets: dict[str, Path | None], *, bap_steps: str, salv
     if targets[".epf"] is not None:
         decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
         frames = decoder.push(data) + decoder.finish()
-        decoder.finish()
         if not frames:
             raise BitstreamError("the stream holds no plane that can be decoded", plane=0)
         settings = [frame.plane.settings for frame in frames if frame.plane is not None]

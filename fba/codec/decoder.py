@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Literal
 
 import numpy as np
@@ -19,13 +17,13 @@ from fba.codec.assembly import Assembly
 from fba.codec.bits import BitReader, OutOfDataError
 from fba.codec.block import Block
 from fba.codec.buffer import Buffer
+from fba.codec.clock import StreamClock
 from fba.codec.models import Models
 from fba.codec.plane import Layout
-from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, TimeCode
+from fba.codec.settings import FrameRate, PartSettings, PlaneSettings
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
 
-DEFAULT_RATE = Fraction(25)
 _RUN = 512
 """Planes that one call of the compiled loop decodes at most."""
 _CHUNK = 1 << 16
@@ -78,13 +76,12 @@ class Decoder:
         self._scanned = 0  # byte up to which no start code was found, while looking for one
         self._retry_at = 0  # bytes that must be there before an incomplete plane is tried again
         self._step: Callable[[bool], Iterator[Block] | None] = self._find_object
-        self._error: FbaError | None = None
+        self._error: BitstreamError | UnsupportedError | None = None
         self._finished = False
         self._objects = 0
-        self._rate: Fraction | None = None
-        self._anchor = Fraction(0)  # time of the plane that had index `_anchor_index`
-        self._anchor_index = 0
-        self._index = 0  # of the next plane
+        self._object_end = 0  # byte of the stream at which the last object was over
+        self._models_used = False
+        self._clock = StreamClock()
         self._lost_from = 0
         self._rows = np.zeros((0, 0), dtype=np.int32)
         self._rows_layout: Layout | None = None
@@ -112,6 +109,8 @@ class Decoder:
         self._raise_pending()
         self._buffer.append(chunk)
         blocks = self._advance(final=False)
+        if not blocks:
+            self._raise_pending()
         dropped = self._buffer.drop(min(self._bit >> 3, self._scanned or self._bit >> 3))
         self._bit -= 8 * dropped
         self._scanned = max(self._scanned - dropped, 0)
@@ -124,10 +123,10 @@ class Decoder:
         if self._finished:
             return []
         blocks = self._advance(final=True)
-        if not (self._error and blocks):
-            self._finished = True
-        if self._error and not blocks:
-            self._raise_pending()
+        self._finished = True
+        if self._error is not None:
+            self._error.blocks = blocks  # there is no later call that could raise it
+            raise self._error
         return blocks
 
     # ---- the states: each decodes what it can, or returns None where it needs more bytes
@@ -141,13 +140,11 @@ class Decoder:
                 if step is None:
                     break
                 blocks.extend(step)
-            except FbaError as error:
+            except (BitstreamError, UnsupportedError) as error:
                 if not self._salvage:
                     self._error = error
                 else:
                     self._lose(error)
-        if self._error and not blocks:
-            self._raise_pending()
         return blocks
 
     def _find_object(self, final: bool) -> Iterator[Block] | None:
@@ -166,6 +163,11 @@ class Decoder:
                 )
         while (found_code := buffer.find_start_code(self._scanned)) is not None:
             position, code = found_code
+            if self._salvage and self._objects == 0 and code in syntax.PLANE_CODES:
+                if position + 4 >= buffer.length and not final:
+                    break  # the first bit of the plane is not here yet
+                if position + 4 < buffer.length and buffer.data[position + 4] & 0x80:
+                    return self._join(position)
             self._scanned = position + 4
             if code in syntax.OBJECT_CODES:
                 self._bit = 8 * self._scanned
@@ -173,16 +175,27 @@ class Decoder:
                 self._begin_object()
                 self._step = self._decode_planes
                 return iter(())
-        self._scanned = max(self._scanned, buffer.length - 3)
+        else:
+            self._scanned = max(self._scanned, buffer.length - 3)
         if final:
             if self._objects == 0:
                 raise BitstreamError("no FBA object start code (00 00 01 ba) in the stream", plane=0, bit=0)
-            rest = buffer.length - (self._bit >> 3)
+            rest = buffer.offset + buffer.length - self._object_end
             if rest > 0:
                 self._warn(f"{rest} bytes follow the end of the FBA object; they were not read")
         else:
-            self._bit = max(self._bit, 8 * self._scanned) if self._objects == 0 else self._bit
+            self._bit = max(self._bit, 8 * self._scanned)
         return None
+
+    def _join(self, position: int) -> Iterator[Block]:
+        """Start at an I plane in the middle of an object whose start is missing or damaged."""
+        error = BitstreamError("the object start code 00 00 01 ba is missing", plane=0, bit=0)
+        self._begin_object()
+        self.damage.append(Damage(error, 0, self._buffer.offset + position))
+        self._bit = 8 * position
+        self._scanned = 0
+        self._step = self._decode_planes
+        return iter(())
 
     def _decode_planes(self, final: bool) -> Iterator[Block] | None:
         buffer = self._buffer
@@ -195,6 +208,7 @@ class Decoder:
                 self._warn("the stream ends inside a start code; no plane is lost")
             if final:
                 self._bit = end
+                self._object_end = buffer.offset + buffer.length
                 self._step = self._find_object
             return None
         if code != plane.NO_START_CODE:
@@ -254,7 +268,10 @@ class Decoder:
         mask = self._read_object_mask(reader)
         frame_rate = self._read_frame_rate(reader)
         time_code = syntax.read_time_code(reader) if reader.read(1) else None
-        skip = syntax.read_skip(reader, number)
+        try:
+            skip = syntax.read_skip(reader, number)
+        except BitstreamError as error:
+            raise self._located(error) from None
         row = np.zeros((1, slots.row_width(body=bool(mask & slots.BODY_BIT))), dtype=np.int32)
         settings: dict[int, PartSettings] = {}
         values: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
@@ -275,6 +292,7 @@ class Decoder:
                     plane=number,
                     bit=here,
                 )
+            self._models_used = True
             models.begin_intra(part, one)
             undefined = models.undefined(one, part)
             if undefined is not None:
@@ -310,7 +328,8 @@ class Decoder:
             models.last[order] = decoded
         self._settings.update(settings)
         self._layouts.clear()
-        self._set_clock(frame_rate, time_code, start)
+        for odd in self._clock.begin_intra(frame_rate, time_code):
+            self._warn(f"plane {number}, bit {self._absolute(start)}: {odd}")
         face, body = settings.get(slots.FACE_BIT), settings.get(slots.BODY_BIT)
         plane_settings = PlaneSettings(
             intra=True,
@@ -366,16 +385,16 @@ class Decoder:
         settings: PlaneSettings,
     ) -> Block:
         count = len(rows)
-        assert self._rate is not None
+        clock = self._clock
+        assert clock.rate is not None
         absolute = borders + 8 * self._buffer.offset
         if self._code_bit is not None:
             absolute[0] = self._code_bit
-        steps = np.cumsum(skips) + np.arange(1, count + 1)
-        index = self._index + np.concatenate([[0], steps[:-1]])
+        start = clock.time
         block = Block(
-            index=index,
-            start=self._anchor + Fraction(self._index - self._anchor_index) / self._rate,
-            rate=self._rate,
+            index=clock.advance(skips),
+            start=start,
+            rate=clock.rate,
             face=slots.face_track(rows, settings.face.mask) if settings.face is not None else None,
             body=slots.body_track(rows, settings.body.mask) if settings.body is not None else None,
             number=self.planes,
@@ -384,7 +403,6 @@ class Decoder:
             settings=settings,
         )
         self.planes += count
-        self._index += int(steps[-1])
         self._bit = int(borders[-1])
         self._code_bit = None
         return block
@@ -407,36 +425,10 @@ class Decoder:
             )
         return rate
 
-    def _set_clock(self, frame_rate: FrameRate | None, time_code: TimeCode | None, bit: int) -> None:
-        rate = frame_rate.fraction if frame_rate is not None else self._rate
-        if rate is None:
-            self._warn(f"the first I plane says no frame rate; {DEFAULT_RATE} frames/s assumed")
-            rate = DEFAULT_RATE
-        now = self._anchor
-        if self._rate is not None:
-            now += Fraction(self._index - self._anchor_index) / self._rate
-        if self._rate is not None and rate != self._rate:
-            self._warn(f"plane {self.planes}: the frame rate changes from {self._rate} to {rate}")
-        if self._rate is None or rate != self._rate:
-            self._rate = rate
-            self._anchor, self._index = now, max(math.ceil(now * rate), self._index and 1)
-            self._anchor_index = self._index
-        if time_code is None:
-            return
-        where = f"plane {self.planes}, bit {self._absolute(bit)}"
-        said = f"{time_code.hours}:{time_code.minutes:02}:{time_code.seconds:02}"
-        if not time_code.marker:
-            self._warn(f"{where}: the marker bit of time code {said} is 0; that time code was not used")
-        elif self.planes and time_code.total_seconds < now:
-            self._warn(f"{where}: time code {said} lies before the previous plane; it was not used")
-        else:
-            self._anchor = Fraction(time_code.total_seconds)
-            nearest = math.floor(self._anchor * rate + Fraction(1, 2))
-            self._index = self._anchor_index = max(nearest, self._index)
-
     def _begin_object(self) -> None:
-        if self._objects:
+        if self._models_used:
             self._models = Models(self._bap_steps)
+            self._models_used = False
         self._objects += 1
         self._settings.clear()
         self._layouts.clear()
@@ -451,6 +443,7 @@ class Decoder:
                 bit=self._absolute(self._bit - 32),
             )
         self._scanned = self._bit >> 3
+        self._object_end = self._buffer.offset + self._scanned
         self._step = self._find_object
 
     # ---- damage
@@ -481,10 +474,14 @@ class Decoder:
 
     def _lose(self, error: FbaError) -> None:
         """Note damage in the plane at `_bit`, and go looking for the next place to start from."""
-        start = self._lost_from >> 3
+        start = self._lost_from >> 3 if self._objects else -self._buffer.offset
+        for kept in (error, error.__cause__):  # millions may be listed: without the frames they rose from
+            if kept is not None:
+                kept.__traceback__ = kept.__context__ = None
         self.damage.append(Damage(error, self._buffer.offset + start, self._buffer.offset + start))
         self._settings.clear()
-        self._scanned = start if self._objects == 0 else (self._bit >> 3) + 1
+        self._code_bit = None
+        self._scanned = (self._bit >> 3) + (1 if self._objects else 0)
         self._step = self._resynchronise
 
     def _close_damage(self, position: int) -> None:
@@ -522,7 +519,6 @@ def decode(
             assembly.add(block)
     for block in decoder.finish_blocks():
         assembly.add(block)
-    decoder.finish_blocks()  # raises what stopped the decoding, where it was not salvaged
     for damage in decoder.damage:
         warnings.warn(
             f"bytes {damage.start}..{damage.stop} were lost: {damage.error}", FbaWarning, stacklevel=2

@@ -16,6 +16,7 @@ from fba.codec.plane_writer import DoesNotFitError, PlaneWriter
 from fba.codec.planner import EncoderOptions, Ranges
 from fba.codec.settings import PartSettings, PlaneSettings, RangeLists
 from fba.errors import RangeError
+from fba.parameters import INTENSITY_MAX
 
 _CHUNK = 4096
 """Frames that `encode` hands over at a time: what bounds its memory."""
@@ -53,6 +54,7 @@ class Encoder:
         self._writer = PlaneWriter(self.options.bap_steps)
         self._ranges = dict(ranges or {})
         self._stale = dict.fromkeys(_PARTS, True)  # ranges that the reader does not know yet
+        self._joined: set[int] = set()  # parts that a reader who joined at the last start code knows
         self._held: Animation | None = None
         self._rate: Fraction | None = None
         self._last_intra = 0  # index of the last I plane
@@ -116,7 +118,7 @@ class Encoder:
         rows = np.zeros((count, slots.row_width(body=frames.body is not None)), dtype=np.int32)
         if frames.face is not None:
             slots.face_rows(frames.face[:count], rows)
-            planner.clip_amounts(rows)
+            self._clip_amounts(rows)
         if frames.body is not None:
             slots.body_rows(frames.body[:count], rows)
         skips = np.zeros(count, dtype=np.int64)
@@ -125,6 +127,21 @@ class Encoder:
         for start, stop in _runs(frames, count):
             self._encode_run(frames, start, stop, rows, skips)
         self._position += count
+
+    def _clip_amounts(self, rows: slots.Int32) -> None:
+        """Bring blends and intensities into 0..63. Raises RangeError for those that no quantiser makes."""
+        wrong = planner.clip_amounts(rows)
+        if len(wrong) and not self.options.clamp:
+            frame, slot, value = wrong[0]
+            raise RangeError(
+                f"the value {value} cannot be carried: it lies outside 0..{INTENSITY_MAX}; correct it, or "
+                "clamp it (--clamp)",
+                parameter=slots.label(slot),
+                value=value,
+                limits=(0, INTENSITY_MAX),
+                frame=self._position + frame,
+            )
+        self.statistics.clamped += len(wrong)
 
     def _encode_run(
         self, frames: Animation, start: int, stop: int, rows: slots.Int32, skips: npt.NDArray[np.int64]
@@ -135,7 +152,9 @@ class Encoder:
         first = self.statistics.planes == 0
         present = [part for part, mask in masks.items() if first or mask.any()] or [min(masks)]
         same = all(
-            (force := self._writer.mask_in_force(part)) is not None and np.array_equal(force, masks[part])
+            part in self._joined
+            and (force := self._writer.mask_in_force(part)) is not None
+            and np.array_equal(force, masks[part])
             for part in present
         )
         position = start
@@ -202,6 +221,7 @@ class Encoder:
             start_code=self.options.start_codes and not first,
         )
         self.statistics.clamped += self._writer.intra(plane, row, clamp=True)
+        self._joined = set(present) | (set() if self.options.start_codes else self._joined)
         self.statistics.planes += 1
         self.statistics.intra_planes += 1
         self._last_intra = index

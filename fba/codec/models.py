@@ -19,7 +19,6 @@ UNDEFINED = -1
 """Limit of a parameter that has neither a default range nor a sent one."""
 
 _SELECTS = (0, 1, 3, 5)
-_AMOUNTS = (2, 4, 6)
 _SELECT_LIMITS = np.array(
     [VISEME_SELECT_MAX] * 2 + [0] + [EXPRESSION_SELECT_MAX, 0, EXPRESSION_SELECT_MAX, 0]
 )
@@ -52,8 +51,8 @@ class Models:
         self.tree = np.zeros((count, STRIDE), dtype=np.uint16)
         self.lowest = np.full(count, _INT32.min, dtype=np.int64)
         self.highest = np.full(count, _INT32.max, dtype=np.int64)
-        self.lowest[list(_AMOUNTS)] = -2 * INTENSITY_MAX  # the quantiser may round them past 0..63
-        self.highest[list(_AMOUNTS)] = 2 * INTENSITY_MAX
+        self.lowest[slots.AMOUNTS] = -2 * INTENSITY_MAX  # the quantiser may round them past 0..63
+        self.highest[slots.AMOUNTS] = 2 * INTENSITY_MAX
         self.lowest[list(_SELECTS)] = 0
         self.highest[list(_SELECTS)] = _SELECT_LIMITS[list(_SELECTS)]
 
@@ -80,7 +79,7 @@ class Models:
         if part == slots.FACE_BIT:
             amount = (INTENSITY_MAX + settings.quant // 2) // scale if settings.quant else INTENSITY_MAX
             limit = _SELECT_LIMITS.copy()
-            limit[list(_AMOUNTS)] = amount
+            limit[slots.AMOUNTS] = amount
             self.i_size[: place.start] = limit + 1  # I: 0..limit
             self.minimum[: place.start], self.size[: place.start] = -limit, 2 * limit + 1
         self.total[span] = self.size[span]

@@ -70,6 +70,24 @@ def read_bit(data: UInt8, bit: int) -> int:
 
 
 @compiled
+def read_skip(data: UInt8, bit: int, end: int) -> tuple[int, int, int]:
+    """number_of_frames_to_skip at `bit`: (status, skip, bit after it or of the word that is too much)."""
+    skip = 0
+    word = 15
+    while word == 15:
+        if bit + 4 > end:
+            return OUT_OF_DATA, skip, end
+        word = 0
+        for _ in range(4):
+            word = 2 * word + read_bit(data, bit)
+            bit += 1
+        skip += word
+        if skip > SKIP_MAX:
+            return SKIP_TOO_LONG, skip, bit - 4
+    return OK, skip, bit
+
+
+@compiled
 def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[int, int]:
     """Look for alignment and a start code between planes: (last byte of the code, bit after it).
 
@@ -205,17 +223,9 @@ def decode_run(
         place = bit + 4
         skip = 0
         if read_bit(data, bit + 3):
-            word = 15
-            while word == 15:
-                if place + 4 > end:
-                    return count, OUT_OF_DATA, bit, end
-                word = 0
-                for _ in range(4):
-                    word = 2 * word + read_bit(data, place)
-                    place += 1
-                skip += word
-                if skip > SKIP_MAX:
-                    return count, SKIP_TOO_LONG, bit, place - 4
+            status, skip, place = read_skip(data, place, end)
+            if status != OK:
+                return count, status, bit, place
         status, place = decode_values(data, place, end, layout, coding, True, symbols, values, flags)
         if status != OK:
             return count, status, bit, place

@@ -28,6 +28,8 @@ from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX,
 
 PRESETS = ("reference",)
 _HOURS = 32
+_ROUNDED_AMOUNT_MAX = max((INTENSITY_MAX + quant // 2) // quant * quant for quant in range(1, QUANT_MAX + 1))
+"""Largest blend or intensity that any quantiser makes a decoder give: 75, by fap_quant 25."""
 
 
 @dataclass(frozen=True)
@@ -266,7 +268,12 @@ def _largest(part: int, column: int, quant: int, table: str) -> int:
     return limit * step + (step - 1) // 2
 
 
-def clip_amounts(rows: slots.Int32) -> None:
-    """Bring blends and intensities into 0..63: a coarse quantiser makes a decoder round them past it."""
-    for slot in (2, 4, 6):
-        np.clip(rows[:, slot], 0, INTENSITY_MAX, out=rows[:, slot])
+def clip_amounts(rows: slots.Int32) -> list[tuple[int, int, int]]:
+    """Bring blends and intensities into 0..63: a coarse quantiser makes a decoder round them past it.
+
+    Returns row, slot and value of those that are too far away for that, in order.
+    """
+    amounts = rows[:, slots.AMOUNTS]
+    wrong = np.argwhere((amounts < 0) | (amounts > _ROUNDED_AMOUNT_MAX)).tolist()
+    rows[:, slots.AMOUNTS] = np.clip(amounts, 0, INTENSITY_MAX)
+    return [(row, slots.AMOUNTS[column], int(amounts[row, column])) for row, column in wrong]

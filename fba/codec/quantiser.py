@@ -29,7 +29,7 @@ def steps(part: int, quant: int, bap_table: str) -> npt.NDArray[np.int64]:
     result = np.ones(slots.FAPS.stop, dtype=np.int64)
     if quant:
         result[slots.FAPS] = fap_steps()[2:] * quant
-        result[[2, 4, 6]] = quant  # blend and intensities; selects are never quantised
+        result[slots.AMOUNTS] = quant  # blend and intensities; selects are never quantised
     return result
 
 

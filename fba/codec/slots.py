@@ -17,6 +17,8 @@ from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELD
 
 VISEME = slice(0, 3)
 EXPRESSION = slice(3, 7)
+AMOUNTS = [2, 4, 6]
+"""Viseme blend and expression intensities."""
 FAPS = slice(7, 73)
 FLAGS = slice(73, 76)
 VISEME_DEF, INIT_FACE, EXPRESSION_DEF = 73, 74, 75

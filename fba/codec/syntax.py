@@ -19,8 +19,10 @@ from __future__ import annotations
 import numpy as np
 
 from fba.codec import slots
-from fba.codec.bits import BitReader, BitWriter
-from fba.codec.plane import SKIP_MAX
+from fba.codec.arithmetic import OK, OUT_OF_DATA
+from fba.codec.bits import BitReader, BitWriter, OutOfDataError
+from fba.codec.plane import STATUS_TEXT
+from fba.codec.plane import read_skip as read_skip_words
 from fba.codec.settings import RANGE_CODE_MAX, FrameRate, PartSettings, RangeLists, TimeCode
 from fba.errors import BitstreamError
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_groups, fap_groups
@@ -67,16 +69,13 @@ def write_time_code(writer: BitWriter, code: TimeCode) -> None:
 
 def read_skip(reader: BitReader, plane: int) -> int:
     """skip_frames and number_of_frames_to_skip."""
-    skip = 0
-    more = reader.read(1)
-    while more:
-        word = reader.read(4)
-        skip += word
-        more = word == 15
-        if skip > SKIP_MAX:
-            raise BitstreamError(
-                f"number_of_frames_to_skip exceeds {SKIP_MAX}", plane=plane, bit=reader.bit - 4
-            )
+    if not reader.read(1):
+        return 0
+    status, skip, reader.bit = read_skip_words(reader.data, reader.bit, reader.end)
+    if status == OUT_OF_DATA:
+        raise OutOfDataError
+    if status != OK:
+        raise BitstreamError(STATUS_TEXT[status], plane=plane, bit=reader.bit)
     return skip
 
 
