@@ -144,8 +144,14 @@ def test_fba_files(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:40])
     with pytest.raises(BitstreamError, match=r"dance\.fba: "):
         fba.read(path)
-    with pytest.raises(UnsupportedError, match="is a FAP file"):
-        fba.probe(file(tmp_path, "a.fap", *FAP))
+
+
+def test_probe_of_another_format(tmp_path: Path) -> None:
+    path = file(tmp_path, "a.fap", *FAP)
+    info, animation = fba.probe(path), fba.read(path)
+    assert (info.format, info.size, info.frames) == ("fap", path.stat().st_size, len(animation))
+    assert info.rate == animation.rate
+    assert info.intra_planes is None
 
 
 def test_merge_joins_by_frame_number() -> None:
