@@ -80,6 +80,7 @@ class Decoder:
         self._finished = False
         self._objects = 0
         self._object_end = 0  # byte of the stream at which the last object was over
+        self._no_head: BitstreamError | None = None  # why what the stream begins with is none
         self._models_used = False
         self._clock = StreamClock()
         self._lost_from = 0
@@ -150,7 +151,7 @@ class Decoder:
     def _find_object(self, final: bool) -> Iterator[Block] | None:
         """Look for the object start code; headers of the systems around it may stand before it."""
         buffer = self._buffer
-        if self._objects == 0 and self._scanned == 0 and not self._salvage:
+        if self._objects == 0 and self._scanned == 0 and self._no_head is None:
             head = buffer.data[: min(buffer.length, 3)].tobytes()
             if head != syntax.START_CODE_PREFIX[: len(head)] or (final and buffer.length < 4):
                 found = (
@@ -158,9 +159,11 @@ class Decoder:
                     if head
                     else "it is empty"
                 )
-                raise BitstreamError(
+                self._no_head = BitstreamError(
                     f"no FBA stream: expected the object start code 00 00 01 ba, but {found}", plane=0, bit=0
                 )
+                if not self._salvage:
+                    raise self._no_head
         while (found_code := buffer.find_start_code(self._scanned)) is not None:
             position, code = found_code
             if self._salvage and self._objects == 0 and code in syntax.PLANE_CODES:
@@ -170,6 +173,8 @@ class Decoder:
                     return self._join(position)
             self._scanned = position + 4
             if code in syntax.OBJECT_CODES:
+                if self._no_head is not None and self._objects == 0:
+                    self.damage.append(Damage(self._no_head, 0, buffer.offset + position))
                 self._bit = 8 * self._scanned
                 self._scanned = 0
                 self._begin_object()
@@ -189,7 +194,9 @@ class Decoder:
 
     def _join(self, position: int) -> Iterator[Block]:
         """Start at an I plane in the middle of an object whose start is missing or damaged."""
-        error = BitstreamError("the object start code 00 00 01 ba is missing", plane=0, bit=0)
+        error = self._no_head or BitstreamError(
+            "the object start code 00 00 01 ba is missing", plane=0, bit=0
+        )
         self._begin_object()
         self.damage.append(Damage(error, 0, self._buffer.offset + position))
         self._bit = 8 * position
