@@ -148,9 +148,7 @@ class Encoder:
     ) -> None:
         """Encode frames start..stop, which all send the same."""
         masks = _masks(frames, start)
-        # The first plane carries every track there is, even where it sends nothing yet.
-        first = self.statistics.planes == 0
-        present = [part for part, mask in masks.items() if first or mask.any()] or [min(masks)]
+        present = [part for part, mask in masks.items() if mask.any()] or [min(masks)]
         same = all(
             part in self._joined
             and (force := self._writer.mask_in_force(part)) is not None
@@ -159,7 +157,9 @@ class Encoder:
         )
         position = start
         if not same:
-            self._intra(frames, position, present, masks, rows, int(skips[position]))
+            # The first plane carries every track there is, even where it sends nothing yet.
+            carried = present if self.statistics.planes else list(masks)
+            self._intra(frames, position, carried, masks, rows, int(skips[position]))
             position += 1
         while position < stop:
             due = self._intra_due(frames, position, stop)
