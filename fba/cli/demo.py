@@ -1,4 +1,4 @@
-"""`fba demo`: the main job, from motion capture to a picture, on samples that come with fba."""
+"""`fba demo`: the main job, from motion capture to a picture, on the samples that come with fba."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ BAP_STEPS = "visage"
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for what is made; default: a new one.",
+    help="Folder for what is made; default: a new one among the temporary files.",
 )
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
 def command(out: Path | None, play: bool | None) -> None:
-    """Encode sample motion capture, print what came out, and play it.
+    """Encode a sample performance, say how small it became, and play it.
 
-    Without a display, render it to a video and a picture instead.
+    Without a display, make a video and a picture of it instead.
     """
     import player
     from fba.codec import EncoderOptions, encode, probe_stream
@@ -39,19 +39,20 @@ def command(out: Path | None, play: bool | None) -> None:
         captured = sum((samples / name).stat().st_size for name in ("hello.bvh", "hello.fap"))
     animation = merge(face, body.resample(face.rate))
     click.echo(
-        f"motion capture: {options.seconds(animation.duration)}, a body of {len(body)} frames and a face of "
-        f"{len(face)}, {captured} bytes"
+        f"sample: {options.seconds(animation.duration)}, body {options.rate_text(body.rate)} frames/s and face "
+        f"{options.rate_text(face.rate)} frames/s, {captured} bytes of text (BVH and FAP)"
     )
     stream = folder / "hello.fba"
     data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
     options.write_bytes(stream, data)
     info = probe_stream(data, bap_steps=BAP_STEPS)
     click.echo(
-        f"encoded: {stream}, {len(data)} bytes, {info.bits_per_second / 1000:.2f} kbit/s, "
+        f"encoded: {stream}: {len(data)} bytes, {info.bits_per_second / 1000:.2f} kbit/s, "
         f"{captured / len(data):.0f} times smaller"
     )
     decoded = read(stream, bap_steps=BAP_STEPS)
     click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")
+    click.echo(f"to see it again: fba play --bap-steps {BAP_STEPS} {stream}")
     if play is not False and _played(player, decoded, asked=play is True):
         return
     _render(player, decoded, folder)
@@ -64,7 +65,7 @@ def _played(player: object, animation: Animation, *, asked: bool) -> bool:
     except DisplayError as error:
         if asked:
             raise
-        click.echo(f"no window: {str(error).splitlines()[0]}")
+        click.echo(f"no window here, so it is rendered instead: {str(error).splitlines()[0]}")
         return False
     return True
 
