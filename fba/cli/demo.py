@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tempfile
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -39,7 +40,7 @@ def command(out: Path | None, play: bool | None) -> None:
         captured = sum((samples / name).stat().st_size for name in ("hello.bvh", "hello.fap"))
     animation = merge(face, body.resample(face.rate))
     click.echo(
-        f"sample: {options.seconds(animation.duration)}, body {options.rate_text(body.rate)} frames/s and face "
+        f"sample: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and face at "
         f"{options.rate_text(face.rate)} frames/s, {captured} bytes of text (BVH and FAP)"
     )
     stream = folder / "hello.fba"
@@ -52,7 +53,7 @@ def command(out: Path | None, play: bool | None) -> None:
     )
     decoded = read(stream, bap_steps=BAP_STEPS)
     click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")
-    click.echo(f"to see it again: fba play --bap-steps {BAP_STEPS} {stream}")
+    click.echo(f"to see it again: fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
     if play is not False and _played(player, decoded, asked=play is True):
         return
     _render(player, decoded, folder)
@@ -60,12 +61,12 @@ def command(out: Path | None, play: bool | None) -> None:
 
 def _played(player: object, animation: Animation, *, asked: bool) -> bool:
     try:
-        click.echo("playing it in a window; Esc closes it")
+        click.echo("opening a window; Esc closes it")
         player.play(animation, loop=True, title="fba demo")  # type: ignore[attr-defined]
     except DisplayError as error:
         if asked:
             raise
-        click.echo(f"no window here, so it is rendered instead: {str(error).splitlines()[0]}")
+        click.echo(f"{str(error).splitlines()[0].partition('. ')[0]}; making a film instead")
         return False
     return True
 
