@@ -30,6 +30,7 @@ HELP = (
     ("wheel", "nearer, further"),
     ("1 2 3 4", "front, three-quarter, profile, body"),
     ("R", "reset the view"),
+    ("P", "feature points and bones, or a figure"),
     ("F1", "this help"),
     ("Esc, Q", "close"),
 )
@@ -72,6 +73,7 @@ class Controls:
             "0": lambda: transport.set_speed(1.0),
             "l": transport.toggle_loop,
             "r": self.reset_view,
+            "p": self.toggle_points,
             "f1": self._toggle_help,
             "escape": self._close,
             "q": self._close,
@@ -117,6 +119,10 @@ class Controls:
     def reset_view(self) -> None:
         """The camera of the beginning."""
         self.camera = self._first if self._first is not None else self.scene.camera(None, self.aspect)
+
+    def toggle_points(self) -> None:
+        """Feature points and bones instead of the figure, or back."""
+        self.scene.view = "figure" if self.scene.view == "points" else "points"
 
     def bar(self) -> tuple[float, float]:
         """Where the timeline begins and ends, x in pixels."""

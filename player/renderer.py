@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib.resources import files
 from typing import Any
 
@@ -13,6 +14,12 @@ from player.primitives import capsule_mesh, sphere_mesh
 from player.shapes import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
 
 MOST_BLOBS = 8
+THROUGH = 0.16
+"""How much of a mark is seen through what hides it."""
+THINNEST = 0.9
+"""Radius in pixels that no mark falls below."""
+RAISED = 0.003
+"""Marks are drawn over what hides them by less than this (m)."""
 MOST_SHAPES = 32
 """Meshes remembered on the graphics card; the longest unused goes first."""
 
@@ -51,6 +58,7 @@ class Renderer:
             index_buffer=self._eye_parts[1],
         )
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
+        _set(self._programs["capsule"], "opacity", 1.0)
 
     def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> None:
         """Clear the bound framebuffer and draw the view; size: its width and height in pixels."""
@@ -59,15 +67,18 @@ class Renderer:
         matrix = camera.projection_matrix(aspect) @ camera.view_matrix()
         gl.viewport = (0, 0, *size)
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
+        pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
         eye = tuple(float(v) for v in camera.eye)
         for program in self._programs.values():
             _set(program, "eye", eye)
             _set(program, "camera", _bytes(matrix))
+            _set(program, "pixel", pixel)
         self._draw_studio(view, matrix, size)
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
             self._draw_mesh(mesh)
         self._draw_capsules(view.capsules)
+        self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
 
@@ -156,6 +167,7 @@ class Renderer:
         normals.write(np.ascontiguousarray(mesh.normals, dtype="f4"))
         _set(self._programs["mesh"], "world", _bytes(mesh.matrix))
         _set(self._programs["mesh"], "two_sided", 1.0 if mesh.shape.two_sided else 0.0)
+        _set(self._programs["mesh"], "raised", mesh.shape.raised)
         array.render()
 
     def _shape_parts(self, mesh: Mesh) -> tuple[Any, Any, Any]:
@@ -196,6 +208,27 @@ class Renderer:
         self._instances.orphan(max(self._instances.size, data.nbytes))
         self._instances.write(data)
         self._capsules.render(instances=len(data))
+
+    def _draw_marks(self, marks: npt.NDArray[np.float32]) -> None:
+        """Marks as capsules; those behind something faintly through it."""
+        if not len(marks):
+            return
+        gl = self._gl
+        _set(self._programs["capsule"], "thinnest", THINNEST)
+        _set(self._programs["capsule"], "raised", RAISED)
+        self._draw_capsules(marks)
+        gl.enable_only(gl.DEPTH_TEST | gl.BLEND | gl.CULL_FACE)
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+        gl.depth_func = ">"
+        gl.fbo.depth_mask = False
+        _set(self._programs["capsule"], "opacity", THROUGH)
+        self._capsules.render(instances=len(marks))
+        _set(self._programs["capsule"], "opacity", 1.0)
+        _set(self._programs["capsule"], "thinnest", 0.0)
+        _set(self._programs["capsule"], "raised", 0.0)
+        gl.fbo.depth_mask = True
+        gl.depth_func = "<"
+        gl.enable_only(gl.DEPTH_TEST)
 
     def _draw_eye(self, ball: Eye) -> None:
         program = self._programs["eye"]

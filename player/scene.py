@@ -15,6 +15,7 @@ from player.timeline import Timeline
 
 if TYPE_CHECKING:
     from player.head import Head
+    from player.head.drawing import Drawing
     from player.mannequin import Mannequin
 
 Float64 = npt.NDArray[np.float64]
@@ -30,28 +31,34 @@ STANDING = 0.12
 """Legs that move less than this (m) stand still."""
 MOST_TRAVEL = 4.0
 """A performance that moves further than this (m) is followed by the camera instead of fitted whole."""
+LOOKS = ("figure", "points")
+"""What a scene may be shown as: a person, or feature points and bones."""
 
 
 class Scene:
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
     animation: at least one frame, else ValueError. axes: name of the body's axis convention
-    (`fba.body.convention_names()`). Nothing is worked out before it is asked for.
+    (`fba.body.convention_names()`). view: "figure", a person, or "points", the face as its 84 feature
+    points with lines through them and the body as its bones; it may be set at any time, ValueError where
+    it is something else. Nothing is worked out before it is asked for.
     """
 
-    def __init__(self, animation: Animation, *, axes: str = "iso") -> None:
+    def __init__(self, animation: Animation, *, axes: str = "iso", view: str = "figure") -> None:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
         self.animation = animation
         self.timeline = Timeline(animation)
-        self._axes = axes
+        self.view = view
         self._head: Head | None = None
+        self._drawing: Drawing | None = None
         self._mannequin: Mannequin | None = None
         self._subject: Subject | None = None
         self._follow = False
         self._legs_move = False
         if animation.body is not None:
             from fba.body import BapSolver, Skeleton
+            from player.bones import Bones
             from player.mannequin import Mannequin
             from player.torso import Torso
 
@@ -59,8 +66,20 @@ class Scene:
             self._solver = BapSolver(self._skeleton, axes)
             self._mannequin = Mannequin(self._skeleton)
             self._torso = Torso(self._skeleton)
+            self._bones = Bones(self._skeleton)
             self._skull = list(self._skeleton.names).index("skullbase")
             self._skull_centre = np.asarray(self._skeleton.centres, dtype=np.float64)[self._skull]
+
+    @property
+    def view(self) -> str:
+        """What the scene is shown as: "figure" or "points"."""
+        return self._view
+
+    @view.setter
+    def view(self, name: str) -> None:
+        if name not in LOOKS:
+            raise ValueError(f"no view {name!r}; there are {', '.join(LOOKS)}")
+        self._view = name
 
     @property
     def head(self) -> Head:
@@ -135,6 +154,8 @@ class Scene:
         Raises ValueError for a time that is not finite.
         """
         faps, joints = self._posed(time)
+        if self._view == "points":
+            return self._points(faps, joints)
         if joints is None:
             matrix = self._head_matrix(faps, None)
             return View(
@@ -147,6 +168,24 @@ class Scene:
             meshes=[*self.head.meshes(faps, matrix), self._torso.mesh(joints)],
             capsules=capsules,
             eyes=self.head.eyes(faps, matrix),
+            blobs=_shadows(joints, self._skeleton.names),
+            ground=True,
+        )
+
+    def _points(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+        """The view as feature points and bones."""
+        if self._drawing is None:
+            from player.head.drawing import Drawing
+
+            self._drawing = Drawing(self.head)
+        drawing, matrix = self._drawing, self._head_matrix(faps, joints)
+        marks, eyeballs = drawing.marks(faps, matrix), drawing.eyeballs(faps, matrix)
+        if joints is None:
+            return View(drawing.meshes(faps, matrix, bust=np.eye(4)), eyeballs, marks)
+        return View(
+            drawing.meshes(faps, matrix),
+            np.concatenate([eyeballs, self._bones.capsules(joints)]),
+            marks,
             blobs=_shadows(joints, self._skeleton.names),
             ground=True,
         )

@@ -23,12 +23,15 @@ class MeshShape:
     """What does not change from frame to frame; keep the object, renderers remember it.
 
     triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light 0..1,
-    the fourth how glossy. two_sided: False where the inside is to look dark, as that of a mouth.
+    the fourth how glossy. two_sided: False where the inside is to look dark, as that of a mouth. raised:
+    above 0 for thin lines on another mesh: they are drawn over what hides them by less (m), and never
+    thinner than about a pixel.
     """
 
     triangles: npt.NDArray[np.int32]
     colours: Float32
     two_sided: bool = False
+    raised: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +63,29 @@ class Eye:
 class View:
     """Everything to be drawn at one moment.
 
-    capsules: float32 (N, 16), see `CAPSULE_FLOATS`. blobs: float32 (K, 4), soft shadows on the ground:
+    capsules: float32 (N, 16), see `CAPSULE_FLOATS`. marks: the same, but what hides them lets them shine
+    through a little. blobs: float32 (K, 4), soft shadows on the ground:
     x, z, radius, darkness. ground: whether there is a ground.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
     capsules: Float32 = field(default_factory=lambda: np.zeros((0, CAPSULE_FLOATS), dtype=np.float32))
+    marks: Float32 = field(default_factory=lambda: np.zeros((0, CAPSULE_FLOATS), dtype=np.float32))
     eyes: list[Eye] = field(default_factory=list)
     blobs: Float32 = field(default_factory=lambda: np.zeros((0, 4), dtype=np.float32))
     ground: bool = False
+
+
+def spheres(places: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:
+    """(N, 16) capsules that are spheres: places (N, 3) and radii (N,), metres; colour and gloss."""
+    centres = np.asarray(places, dtype=np.float32)
+    found = np.zeros((len(centres), CAPSULE_FLOATS), dtype=np.float32)
+    found[:, 0:3] = centres
+    found[:, 4:7] = centres + np.array([0.0, 2e-5, 0.0], dtype=np.float32)  # an axis needs some length
+    found[:, 3] = found[:, 7] = radii
+    found[:, 8:12] = (0.0, 0.0, 1.0, 1.0)
+    found[:, 12:16] = colour
+    return found
 
 
 class Normals:

@@ -86,6 +86,16 @@ def camera_option(command: Command) -> Command:
     )(command)
 
 
+def view_option(command: Command) -> Command:
+    return click.option(
+        "--view",
+        type=click.Choice(["figure", "points"]),
+        default="figure",
+        show_default=True,
+        help="A person, or the face as its feature points and the body as its bones.",
+    )(command)
+
+
 def axes_option(command: Command) -> Command:
     return click.option(
         "--axes",

@@ -25,6 +25,7 @@ from fba.cli import options
 @click.option("--loop", is_flag=True, help="Start again at the end.")
 @click.option("--size", type=options.SizeType(), default="1280x720", show_default=True, metavar="WxH")
 @options.camera_option
+@options.view_option
 @options.axes_option
 @options.bap_steps_option
 @options.salvage_option
@@ -35,6 +36,7 @@ def command(
     loop: bool,
     size: tuple[int, int],
     camera: str | None,
+    view: str,
     axes: str,
     bap_steps: str,
     salvage: bool,
@@ -46,5 +48,5 @@ def command(
     import player
 
     animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage)
-    scene = player.Scene(animation, axes=axes)
+    scene = player.Scene(animation, axes=axes, view=view)
     player.play(scene, size=size, speed=speed, loop=loop, camera=camera, title=file.name)

@@ -32,6 +32,7 @@ from fba.cli import options
 @click.option("--start", type=float, metavar="SECONDS", help="For a video: from when.")
 @click.option("--end", type=float, metavar="SECONDS", help="For a video: until when.")
 @options.camera_option
+@options.view_option
 @options.axes_option
 @options.bap_steps_option
 @options.salvage_option
@@ -45,6 +46,7 @@ def command(
     start: float | None,
     end: float | None,
     camera: str | None,
+    view: str,
     axes: str,
     bap_steps: str,
     salvage: bool,
@@ -53,7 +55,7 @@ def command(
     import player
 
     animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage)
-    scene = player.Scene(animation, axes=axes)
+    scene = player.Scene(animation, axes=axes, view=view)
     with options.progress("rendering", None) as step:
         try:
             player.render(

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from fba.face.feature_points import row_of
 from fba.face.points import FeaturePointFace
 from player.head import parts
+from player.head.hairline import HAIR_AXIS, hairline
 from player.head.surface import Surface, build
 from player.shapes import Eye, Mesh, MeshShape, Normals
 
@@ -23,11 +24,8 @@ Float64 = npt.NDArray[np.float64]
 
 IRIS_SHARE = 0.49
 """Radius of the iris by radius of the eyeball."""
-HAIRLINE = np.array([
-    # degrees from the front about the vertical axis, height in mm
-    (0, 67), (22, 69), (40, 63), (56, 50), (68, 30), (78, 4), (86, -4), (94, 16), (108, 14), (122, -8),
-    (140, -36), (160, -50), (180, -54),
-])  # fmt: skip
+CORNER = 0.006
+"""Metres about the corners of the eyes where normals are averaged."""
 HAIR_THICKNESS = 0.008
 
 
@@ -43,6 +41,8 @@ class Head:
         self._weights = _sparse(surface.weights)
         coloured, neutral = _painted(surface, self.face)
         self._neutral = neutral.astype(np.float32)
+        self._bald = surface.vertices.astype(np.float32)
+        self._ghosts: dict[tuple[float, ...], list[MeshShape]] = {}
         self._skin = MeshShape(surface.triangles, coloured.astype(np.float32))
         self._skin_normals = Normals(surface.triangles, len(neutral))
         pieces = [parts.ear(self.face, side) for side in ("left", "right")]
@@ -54,6 +54,7 @@ class Head:
         )
         self._rest_normals = Normals(self._rest.triangles, len(self._rest.vertices))
         self._rest_weights = _sparse(self._rest.weights)
+        self._smooth, self._corners = _corner_smoothing(surface, self.face)
         self._hair = _joined_hair(parts.brows_and_lashes(surface))
         self._hair_shape = MeshShape(
             self._hair.triangles, self._hair.colours.astype(np.float32), two_sided=True
@@ -92,14 +93,11 @@ class Head:
         bust: matrix for neck and shoulders, where they are to be shown.
         """
         moved = (self.face.local(faps) - self.face.points).astype(np.float32)
-        skin = self._neutral + self._weights @ moved
-        self._close_lips(skin)
-        self._clear_teeth(skin)
-        self._clear_eyes(skin, faps)
+        skin = self._skin_at(faps, moved, self._neutral)
         rest = (self._rest.vertices + self._rest_weights @ moved).astype(np.float32)
         hair = (skin[self._hair.rows] + self._hair.offsets).astype(np.float32)
         found = [
-            Mesh(self._skin, skin, self._skin_normals(skin), matrix),
+            Mesh(self._skin, skin, self._normals_of(skin), matrix),
             Mesh(self._rest_shape, rest, self._rest_normals(rest), matrix),
             Mesh(self._hair_shape, hair, self._hair_normals(hair), matrix),
         ]
@@ -132,6 +130,54 @@ class Head:
                 )
             )
         return found
+
+    def ghost(
+        self,
+        faps: Float32,
+        matrix: Float64,
+        colour: tuple[float, ...],
+        inset: float,
+        *,
+        bust: Float64 | None = None,
+    ) -> list[Mesh]:
+        """The skin without hair in one colour (with gloss, 4), `inset` metres further in; bust as above."""
+        if colour not in self._ghosts:
+            seen = self._bust[0].triangles
+            top = np.all(
+                (np.abs(self._bust[1][:, :1]) < 0.035) & (self._bust[1][:, 1:] > np.array([-0.100, -0.075])),
+                axis=1,
+            )  # the top of the neck would show in an empty mouth
+            seen = seen[~top[seen].all(axis=1)]
+            self._ghosts[colour] = [
+                MeshShape(triangles, np.tile(colour, (len(shape.colours), 1)).astype(np.float32), two)
+                for shape, triangles, two in (
+                    (self._skin, self._skin.triangles, False),
+                    (self._bust[0], seen, True),
+                )
+            ]
+        skin_shape, bust_shape = self._ghosts[colour]
+        moved = (self.face.local(faps) - self.face.points).astype(np.float32)
+        skin = self._skin_at(faps, moved, self._bald)
+        normals = self._normals_of(skin)
+        found = [Mesh(skin_shape, skin - normals * np.float32(inset), normals, matrix)]
+        if bust is not None:
+            found.append(Mesh(bust_shape, *self._bust[1:], bust))
+        return found
+
+    def _skin_at(self, faps: Float32, moved: Float32, neutral: Float32) -> Float32:
+        """Vertices of the skin for FAPs (68,) that move feature points by `moved` (84, 3)."""
+        skin: Float32 = neutral + self._weights @ moved
+        self._close_lips(skin)
+        self._clear_teeth(skin)
+        self._clear_eyes(skin, faps)
+        return skin
+
+    def _normals_of(self, skin: Float32) -> Float32:
+        """Normals of the skin, averaged at the corners of the eyes, whose folds are finer than the mesh."""
+        normals = self._skin_normals(skin)
+        blended = self._smooth @ normals
+        normals[self._corners] = blended / np.linalg.norm(blended, axis=1, keepdims=True).clip(1e-6)
+        return normals
 
     def _close_lips(self, skin: Float32) -> None:
         """Lips that would pass through each other meet half way instead."""
@@ -189,6 +235,17 @@ def _sparse(weights: Float64) -> Any:
     return csr_matrix(weights.astype(np.float32))
 
 
+def _corner_smoothing(surface: Surface, face: FeaturePointFace) -> tuple[Any, npt.NDArray[np.intp]]:
+    """Weights that average what is near the corners of the eyes over neighbours, and these rows."""
+    from scipy.spatial import cKDTree
+
+    corners = face.points[[row_of()[name] for name in ("3.7", "3.12", "3.8", "3.11")]]
+    rows = np.flatnonzero(cKDTree(corners).query(surface.vertices)[0] < CORNER)
+    away = np.linalg.norm(surface.vertices[rows][:, None] - surface.vertices[None], axis=2)
+    weights = np.exp(-((away / (CORNER * 0.45)) ** 2)) * (away < CORNER)
+    return _sparse(weights / weights.sum(axis=1, keepdims=True)), rows
+
+
 def _step(value: Float64, low: float, high: float | Float64) -> Float64:
     t = np.clip((value - low) / (high - low), 0, 1)
     result: Float64 = t * t * (3 - 2 * t)
@@ -197,8 +254,6 @@ def _step(value: Float64, low: float, high: float | Float64) -> Float64:
 
 def _painted(surface: Surface, face: FeaturePointFace) -> tuple[Float64, Float64]:
     """Colours (V, 4) of the skin, and its neutral places with the hair's thickness added."""
-    from scipy.interpolate import PchipInterpolator
-
     places = surface.vertices
     base = np.array(parts.SKIN)
     colour = np.tile(base, (len(places), 1))
@@ -222,10 +277,10 @@ def _painted(surface: Surface, face: FeaturePointFace) -> tuple[Float64, Float64
         nostril = np.array([side * 0.0068, -0.0442, 0.0215])
         hole = np.exp(-((np.linalg.norm((places - nostril) * (1.0, 1.25, 0.75), axis=1) / 0.0036) ** 4))
         colour *= (1 - 0.90 * hole)[:, None]
-    offset = places - (0.0, 0.0, -0.085)
+    offset = places - (0.0, 0.0, HAIR_AXIS)
     around = np.degrees(np.arctan2(np.abs(offset[:, 0]), offset[:, 2]))
-    line = PchipInterpolator(HAIRLINE[:, 0], HAIRLINE[:, 1] / 1000)(around)
-    above = places[:, 1] - line
+    height, steepness = hairline(around)
+    above = (places[:, 1] - height) / steepness
     hair = (_step(above, -0.002, 0.004) * (places[:, 1] > -0.07))[:, None]
     colour = colour * (1 - hair) + np.array(parts.HAIR) * hair
     gloss = gloss * (1 - hair[:, 0]) + 0.22 * hair[:, 0]

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from fba.face.feature_points import names, row_of
 from fba.face.points import FeaturePointFace
+from player.head.hairline import hairline_places
 from player.head.loops import LIP_STEPS, Curve, brow, lid, lip
 from player.head.spreading import spread
 
@@ -142,6 +143,8 @@ def build(face: FeaturePointFace) -> Surface:
     _add_lips(mesh, face, holes["mouth"])
     keep = [n for n in skin_points() if not n.startswith(("4.", "8."))]
     rows = [row_of()[n] for n in keep]
+    for offset in (-0.0022, 0.0010, 0.0042):
+        mesh.add(f"hairline {offset}", mirrored(hairline_places(lambda p: skin.places(to_chart(p)), offset)))
     mesh.add("points", face.points[rows], np.eye(len(names()))[rows])
     outline = [np.concatenate(loop) for loop in holes.values()]
     covered = [*_lid_areas(mesh), _lip_area(mesh)]

@@ -1,6 +1,10 @@
 #version 330 core
 uniform mat4 world;
 uniform mat4 camera;
+uniform vec3 eye;
+uniform float pixel;    // size of a pixel at a distance of 1
+uniform float raised;   // metres by which lines stand out of what they are drawn on; 0 for all else
+const float LINE = 0.0004;   // radius of the thinnest line
 in vec3 in_position;
 in vec3 in_normal;
 in vec4 in_colour;
@@ -13,5 +17,14 @@ void main() {
     place = at.xyz;
     normal = mat3(world) * in_normal;
     colour = in_colour;
+    if (raised > 0.0) {
+        // Lines stay visible from afar, and are not cut where the skin bulges between their points.
+        float away = distance(eye, place);
+        place += normal * max(0.55 * pixel * away - LINE, 0.0);
+        vec4 nearer = camera * vec4(place + (eye - place) / away * raised, 1.0);
+        gl_Position = camera * vec4(place, 1.0);
+        gl_Position.z = nearer.z / nearer.w * gl_Position.w;
+        return;
+    }
     gl_Position = camera * at;
 }

@@ -124,6 +124,24 @@ def test_help_covers_the_middle(window: Window) -> None:
     assert shown(window)[60:180, 60:260].mean() < plain[60:180, 60:260].mean() - 20
 
 
+def test_p_shows_feature_points_and_the_figure_again(window: Window) -> None:
+    window._stale = True
+    window.update()
+    figure = shown(window)
+    press(window, glfw.KEY_P)
+    window.update()
+    points = shown(window)
+    assert window.scene.view == "points"
+    skin = (slice(80, 120), slice(140, 180))
+    red = [(p[skin][..., 0] - p[skin][..., 2]).mean() for p in (figure, points)]
+    assert red[0] > 25
+    assert red[1] < 15
+    press(window, glfw.KEY_P)
+    press(window, glfw.KEY_P, glfw.REPEAT)  # held it does not flicker
+    window.update()
+    np.testing.assert_array_equal(shown(window), figure)
+
+
 def test_mouse_seeks_and_orbits(window: Window) -> None:
     controls = window.controls
     controls.press("left", controls.bar()[1], 235)
