@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from random import Random
+from typing import NamedTuple
 
 import numpy as np
 
@@ -205,17 +206,20 @@ def check(data: bytes, random: Random) -> tuple[bool, bool]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
         blocks, error, _ = _decoded(data, [len(data)], "raise")
+        ours = _flat(blocks)
         cuts = sorted(random.randrange(len(data) + 1) for _ in range(random.choice((1, 2, 8))))
-        chunked, chunked_error, _ = _decoded(data, [*cuts, len(data)], "raise")
-        if _place(error) != _place(chunked_error):
-            raise ContractError(f"in chunks {cuts}: {chunked_error}; at once: {error}")
+        if random.random() < 0.5:  # the salvaging decoder gets the chunks anyway
+            chunked, chunked_error, _ = _decoded(data, [*cuts, len(data)], "raise")
+            if _place(error) != _place(chunked_error):
+                raise ContractError(f"in chunks {cuts}: {chunked_error}; at once: {error}")
+            if ours != _flat(chunked):
+                raise ContractError(f"other frames in chunks {cuts} than at once")
         salvaged, fatal, decoder = _decoded(data, [*cuts, len(data)], "salvage")
         if fatal is not None and (salvaged or not decoder.damage):
             raise ContractError(f"a salvaging decoder raised {fatal!r}")
-        ours, theirs, rest = (_flat(some) for some in (blocks, chunked, salvaged))
-        if ours != theirs:
-            raise ContractError(f"other frames in chunks {cuts} than at once")
-        if rest[: len(ours)] != ours and not (error is None and len(rest) < len(ours)):
+        rest = _flat(salvaged)
+        earlier = rest and ours and rest[0].bit < ours[0].bit  # joined where no object start code stands
+        if rest[: len(ours)] != ours and not earlier:
             raise ContractError(
                 f"{len(rest)} frames salvaged that do not begin with the {len(ours)} good ones"
             )
@@ -228,13 +232,18 @@ def check(data: bytes, random: Random) -> tuple[bool, bool]:
             raise ContractError(f"{error} went unmentioned by the salvaging decoder")
         if salvaged:
             _animation(salvaged)
-        try:
-            frames = probe_stream(data).frames
-        except FbaError:
-            frames = 0
-        if frames != len(rest):
-            raise ContractError(f"probe counts {frames} frames, the decoder {len(rest)}")
+        if random.random() < 0.2:
+            _check_probe(data, len(rest))
         return error is None, bool(rest) and error is not None
+
+
+def _check_probe(data: bytes, expected: int) -> None:
+    try:
+        frames = probe_stream(data).frames
+    except FbaError:
+        frames = 0
+    if frames != expected:
+        raise ContractError(f"probe counts {frames} frames, the decoder {expected}")
 
 
 def compare(data: bytes) -> None:
@@ -287,9 +296,16 @@ def _decoded(data: bytes, stops: Sequence[int], mode: str) -> tuple[list[Block],
     return blocks, None, decoder
 
 
-def _flat(blocks: list[Block]) -> list[tuple[object, ...]]:
-    """Everything about every frame, however the blocks are cut."""
-    frames: list[tuple[object, ...]] = []
+class _Seen(NamedTuple):
+    """Everything about a frame that was decoded; its first bit in the stream."""
+
+    bit: int
+    content: tuple[object, ...]
+
+
+def _flat(blocks: list[Block]) -> list[_Seen]:
+    """The frames, however the blocks are cut."""
+    frames: list[_Seen] = []
     for block in blocks:
         tracks = []
         if block.face is not None:
@@ -297,15 +313,9 @@ def _flat(blocks: list[Block]) -> list[tuple[object, ...]]:
         if block.body is not None:
             tracks += [block.body.values, block.body.mask]
         for position, index in enumerate(block.index.tolist()):
-            frames.append(
-                (
-                    index,
-                    block.rate,
-                    int(block.borders[position]),
-                    int(block.borders[position + 1]),
-                    *(track[position].tobytes() for track in tracks),
-                )
-            )
+            after = int(block.borders[position + 1])
+            values = tuple(track[position].tobytes() for track in tracks)
+            frames.append(_Seen(int(block.borders[position]), (index, block.rate, after, *values)))
     return frames
 
 

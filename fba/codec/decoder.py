@@ -488,7 +488,7 @@ class Decoder:
         self.damage.append(Damage(error, self._buffer.offset + start, self._buffer.offset + start))
         self._settings.clear()
         self._code_bit = None
-        self._scanned = (self._bit >> 3) + (1 if self._objects else 0)
+        self._scanned = (self._lost_from >> 3) + 1 if self._objects else self._bit >> 3
         self._step = self._resynchronise
 
     def _close_damage(self, position: int) -> None:
