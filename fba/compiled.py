@@ -11,36 +11,25 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 try:
-    import numba
+    from numba import config, njit
 except ImportError:  # the codec runs anywhere Python and NumPy run
-    numba = None
+    config = njit = None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def compiled(function: Function) -> Function:
     """Compile on first call, cache the machine code on disk, release the GIL while running."""
-    if numba is None:
+    if njit is None:
         return function
-    return _njit(function)
-
-
-def inlined(function: Function) -> Function:
-    """Like `compiled`, for small helpers that only compiled functions call."""
-    if numba is None:
-        return function
-    return _njit(function, inline="always")
-
-
-def _njit(function: Function, **options: str) -> Function:
     result: Function
     try:
-        result = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+        result = njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # no folder to keep machine code in: neither beside the source nor in a home
-        result = numba.njit(nogil=True, error_model="numpy", **options)(function)
+        result = njit(nogil=True, error_model="numpy")(function)
     return result
 
 
 def is_compiled() -> bool:
     """Whether the hot loops run as machine code in this process."""
-    return numba is not None and not numba.config.DISABLE_JIT
+    return njit is not None and not config.DISABLE_JIT
