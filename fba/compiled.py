@@ -20,13 +20,22 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def compiled(function: Function) -> Function:
     """Compile on first call, cache the machine code on disk, release the GIL while running."""
+    return _compiled(function)
+
+
+def inlined(function: Function) -> Function:
+    """Like `compiled`, for small helpers that only compiled functions call."""
+    return _compiled(function, inline="always")
+
+
+def _compiled(function: Function, **options: str) -> Function:
     if njit is None:
         return function
     result: Function
     try:
-        result = njit(cache=True, nogil=True, error_model="numpy")(function)
+        result = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     except RuntimeError:  # no folder to keep machine code in: neither beside the source nor in a home
-        result = njit(nogil=True, error_model="numpy")(function)
+        result = njit(nogil=True, error_model="numpy", **options)(function)
     return result
 
 
