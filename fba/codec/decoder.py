@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -28,6 +29,8 @@ _RUN = 512
 """Planes that one call of the compiled loop decodes at most."""
 _CHUNK = 1 << 16
 """Bytes that `decode` hands over at a time, so that blocks do not pile up."""
+_DOUBTFUL = 8
+"""Planes before damage that may have been misread: a start code that stands in them is believed."""
 _LARGE_PLANE = 4096
 """Bytes beyond which a plane that is still incomplete is not tried again for every byte that comes."""
 
@@ -39,7 +42,8 @@ class Damage:
     """Something that a salvaging decoder stepped over.
 
     error: what was wrong. start, stop: bytes of the stream that were lost, from the first byte of the
-    damaged plane to where decoding went on (or the end).
+    damaged plane to where decoding went on (or the end). Where a plane before that one, which was given
+    out, turned out to hold a start code, decoding goes on there, and start is stop.
     """
 
     error: FbaError
@@ -84,6 +88,7 @@ class Decoder:
         self._models_used = False
         self._clock = StreamClock()
         self._lost_from = 0
+        self._doubtful: deque[int] = deque(maxlen=_DOUBTFUL)  # where the last planes begin in the stream
         self._rows = np.zeros((0, 0), dtype=np.int32)
         self._rows_layout: Layout | None = None
         self._skips = np.zeros(_RUN, dtype=np.int64)
@@ -112,7 +117,8 @@ class Decoder:
         blocks = self._advance(final=False)
         if not blocks:
             self._raise_pending()
-        dropped = self._buffer.drop(min(self._bit >> 3, self._scanned or self._bit >> 3))
+        needed = (self._doubtful[0] >> 3) - self._buffer.offset if self._doubtful else self._bit >> 3
+        dropped = self._buffer.drop(min(needed, self._bit >> 3, self._scanned or self._bit >> 3))
         self._bit -= 8 * dropped
         self._scanned = max(self._scanned - dropped, 0)
         self._retry_at = max(self._retry_at - dropped, 0)
@@ -220,6 +226,7 @@ class Decoder:
             return None
         if code != plane.NO_START_CODE:
             start, self._bit = self._bit, after
+            self._doubtful.clear()
             if code not in syntax.PLANE_CODES:
                 self._code_bit = None
             elif self._code_bit is None:
@@ -258,6 +265,7 @@ class Decoder:
             if code in syntax.PLANE_CODES and not buffer.data[position + 4] & 0x80:
                 continue  # a P plane: what it builds upon is lost
             self._close_damage(position)
+            self._doubtful.clear()
             self._bit = 8 * position
             self._scanned = 0
             self._step = self._decode_planes
@@ -410,6 +418,9 @@ class Decoder:
             settings=settings,
         )
         self.planes += count
+        if self._salvage:
+            starts = borders[-1 - _DOUBTFUL : -1] + 8 * self._buffer.offset  # behind any start code
+            self._doubtful.extend(starts.tolist())
         self._bit = int(borders[-1])
         self._code_bit = None
         return block
@@ -488,12 +499,15 @@ class Decoder:
         self.damage.append(Damage(error, self._buffer.offset + start, self._buffer.offset + start))
         self._settings.clear()
         self._code_bit = None
-        self._scanned = (self._lost_from >> 3) + 1 if self._objects else self._bit >> 3
+        if self._doubtful:
+            self._scanned = (self._doubtful[0] >> 3) - self._buffer.offset
+        else:
+            self._scanned = (self._lost_from >> 3) + 1 if self._objects else self._bit >> 3
         self._step = self._resynchronise
 
     def _close_damage(self, position: int) -> None:
-        last = self.damage[-1]
-        self.damage[-1] = Damage(last.error, last.start, self._buffer.offset + position)
+        last, stop = self.damage[-1], self._buffer.offset + position
+        self.damage[-1] = Damage(last.error, min(last.start, stop), stop)
 
     def _raise_pending(self) -> None:
         if self._error is not None:
