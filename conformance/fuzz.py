@@ -63,7 +63,7 @@ class Finding:
 
 @dataclass
 class Report:
-    """What became of the streams. worst: seconds that the slowest took."""
+    """What became of the streams. slowest: number of that which took longest, `worst` seconds."""
 
     count: int = 0
     decoded: int = 0
@@ -71,13 +71,14 @@ class Report:
     salvaged: int = 0
     compared: int = 0
     worst: float = 0.0
+    slowest: int = -1
     findings: list[Finding] = field(default_factory=list)
 
     def line(self) -> str:
         return (
             f"{self.count} streams: {self.decoded} decoded whole, {self.refused} refused, of these "
             f"{self.salvaged} salvaged in part; {self.compared} compared with the independent reader; "
-            f"slowest {1000 * self.worst:.0f} ms; {len(self.findings)} findings"
+            f"slowest {1000 * self.worst:.0f} ms (number {self.slowest}); {len(self.findings)} findings"
         )
 
 
@@ -196,7 +197,9 @@ def fuzz(
                 compare(data)
         except Exception:  # whatever it is: finding it is what this is for
             report.findings.append(Finding(seed, number, data, traceback.format_exc(limit=-4)))
-        report.worst = max(report.worst, time.perf_counter() - begin)
+        seconds = time.perf_counter() - begin
+        if seconds > report.worst:
+            report.worst, report.slowest = seconds, number
         report.count += 1
     return report
 

@@ -265,7 +265,6 @@ class Decoder:
             if code in syntax.PLANE_CODES and not buffer.data[position + 4] & 0x80:
                 continue  # a P plane: what it builds upon is lost
             self._close_damage(position)
-            self._doubtful.clear()
             self._bit = 8 * position
             self._scanned = 0
             self._step = self._decode_planes
@@ -501,6 +500,7 @@ class Decoder:
         self._code_bit = None
         if self._doubtful:
             self._scanned = (self._doubtful[0] >> 3) - self._buffer.offset
+            self._doubtful.clear()
         else:
             self._scanned = (self._lost_from >> 3) + 1 if self._objects else self._bit >> 3
         self._step = self._resynchronise
