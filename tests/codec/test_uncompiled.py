@@ -1,0 +1,82 @@
+"""Without machine code, and without numba at all: the same values and bytes, slower, and no warning."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from conformance import fuzz
+from fba import compiled
+
+SCRIPT = """
+import sys
+if "no-numba" in sys.argv:
+    sys.modules["numba"] = None
+import hashlib, json
+import fba
+from fba import compiled
+from conformance import fuzz, motion
+from fractions import Fraction
+
+result = {"compiled": compiled.is_compiled(), "numba": sys.modules.get("numba") is not None}
+streams = fuzz.base_streams()
+result["bytes"] = hashlib.sha256(b"|".join(streams)).hexdigest()
+long = fba.encode(motion.animation(motion.face(30, high_level=True), motion.body(30)))
+result["long"] = hashlib.sha256(long).hexdigest()
+values = hashlib.sha256()
+for stream in [*streams, long]:
+    decoder = fba.Decoder()
+    for frame in decoder.push(stream) + decoder.finish():
+        for track in (frame.face, frame.body):
+            if track is not None:
+                values.update(track.values.tobytes() + track.mask.tobytes())
+        if frame.face is not None:
+            values.update(frame.face.viseme.tobytes() + frame.face.expression.tobytes())
+result["values"] = values.hexdigest()
+report = fuzz.fuzz(60, 3, streams=streams[:3], compare_every=0)
+result["fuzz"] = [report.decoded, report.refused, report.salvaged]
+result["findings"] = [finding.reason for finding in report.findings]
+print(json.dumps(result))
+"""
+
+
+def run(*arguments: str, **environment: str) -> dict[str, object]:
+    """The script's result, in a process of its own where every warning is an error."""
+    script = subprocess.run(
+        [sys.executable, "-W", "error", "-c", SCRIPT, *arguments],
+        cwd=Path(__file__).parents[2],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert script.returncode == 0, script.stderr
+    result: dict[str, object] = json.loads(script.stdout)
+    return result
+
+
+@pytest.fixture(scope="module")
+def usual() -> dict[str, object]:
+    """The result as this installation comes, compiled where numba is there."""
+    result = run()
+    assert result["compiled"] == compiled.is_compiled()
+    assert result["findings"] == []
+    assert result["bytes"] == hashlib.sha256(b"|".join(fuzz.base_streams())).hexdigest()
+    return result
+
+
+@pytest.mark.parametrize("way", ["NUMBA_DISABLE_JIT=1", "no numba"])
+def test_the_same_without_machine_code(way: str, usual: dict[str, object]) -> None:
+    result = run(NUMBA_DISABLE_JIT="1") if way == "NUMBA_DISABLE_JIT=1" else run("no-numba")
+    assert result["compiled"] is False
+    if way == "no numba":
+        assert result["numba"] is False
+    same = ("bytes", "long", "values", "fuzz", "findings")
+    assert {name: result[name] for name in same} == {name: usual[name] for name in same}
