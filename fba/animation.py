@@ -24,6 +24,9 @@ from fba.parameters import (
     VISEME_SELECT_MAX,
 )
 
+_INDEX_MAX = 1 << 62
+"""Beyond this, indices are no longer counted in 64 bits."""
+
 Int32 = npt.NDArray[np.int32]
 Int16 = npt.NDArray[np.int16]
 Bool = npt.NDArray[np.bool_]
@@ -317,7 +320,8 @@ class Animation:
     @property
     def times(self) -> npt.NDArray[np.float64]:
         """(T,) seconds at which the frames are shown."""
-        return self.index * self.rate.denominator / self.rate.numerator
+        whole, part = _scaled(self.index, 1 / self.rate)
+        return whole.astype(np.float64) + part
 
     @property
     def duration(self) -> Fraction:
@@ -344,17 +348,18 @@ class Animation:
         )  # first new frame not before ours
         last = int(self.index[-1]) * ratio.numerator // ratio.denominator
         count = max(last - first + 1, 1)
-        if count > MAX_FRAMES:
+        if count > MAX_FRAMES or max(abs(first), abs(last)) > _INDEX_MAX:
             raise ValueError(
                 f"resample: {self.name or 'the animation'} would become {count} frames at {rate} frames/s "
                 f"(at most {MAX_FRAMES}); its times are implausible or the rate is too high"
             )
         index = np.arange(first, first + count, dtype=np.int64)
-        at = index * ratio.denominator / ratio.numerator  # in frames of this animation
-        before = np.clip(np.searchsorted(self.index, at, side="right") - 1, 0, len(self) - 1)
+        whole, part = _scaled(index, 1 / ratio)  # in frames of this animation
+        whole = whole.astype(np.int64)
+        before = np.clip(np.searchsorted(self.index, whole, side="right") - 1, 0, len(self) - 1)
         after = np.minimum(before + 1, len(self) - 1)
         gap = np.maximum(self.index[after] - self.index[before], 1)
-        weight = np.clip((at - self.index[before]) / gap, 0.0, 1.0)
+        weight = np.clip((whole - self.index[before] + part) / gap, 0.0, 1.0)
         fresh = np.ones(count, dtype=bool)
         fresh[1:] = before[1:] != before[:-1]
         face = _resampled_face(self.face, before, after, weight, fresh) if self.face is not None else None
@@ -364,6 +369,18 @@ class Animation:
             both = mask & self.body.mask[after]
             body = BodyTrack(_between(self.body.values, before, after, weight, both), mask)
         return Animation(rate, index, face, body, self.name)
+
+
+def _scaled(
+    index: npt.NDArray[np.int64], factor: Fraction
+) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
+    """index x factor: whole part, exact, and the rest in 0..1. In Python's integers where 64 bits end."""
+    largest = max(abs(int(index[0])), abs(int(index[-1])), 1) if len(index) else 1
+    fits = largest * factor.numerator < _INDEX_MAX > factor.denominator
+    product = (index if fits else index.astype(object)) * factor.numerator
+    whole = product // factor.denominator
+    rest = (product - whole * factor.denominator).astype(np.float64)
+    return whole, rest / float(factor.denominator)
 
 
 Track = TypeVar("Track", FaceTrack, BodyTrack)

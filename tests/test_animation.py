@@ -1,0 +1,284 @@
+"""The data model: what it accepts, that it cannot be changed, slices, joins, resampling."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fba import Animation, BodyTrack, FaceTrack, Frame
+
+FACE, BODY = 68, 296
+
+
+def face(count: int, **fields: object) -> FaceTrack:
+    values = np.zeros((count, FACE), dtype=np.int32)
+    values[:, 2] = np.arange(count) * 10
+    mask = np.zeros((count, FACE), dtype=bool)
+    mask[:, :3] = True
+    return FaceTrack(values, mask, **fields)  # type: ignore[arg-type]
+
+
+def body(count: int) -> BodyTrack:
+    values = np.zeros((count, BODY), dtype=np.int32)
+    values[:, 0] = np.arange(count) * -7
+    mask = np.zeros((count, BODY), dtype=bool)
+    mask[:, 0] = True
+    return BodyTrack(values, mask)
+
+
+def animation(count: int = 4, start: int = 0, rate: Fraction | int = 25) -> Animation:
+    return Animation(Fraction(rate), np.arange(start, start + count), face(count), body(count), "test")
+
+
+def test_what_was_not_sent_is_0() -> None:
+    values = np.full((2, BODY), 5, dtype=np.int32)
+    mask = np.zeros((2, BODY), dtype=bool)
+    mask[0, 3] = True
+    track = BodyTrack(values, mask)
+    assert track.values.sum() == 5
+    assert track.values[0, 3] == 5
+    assert (values == 5).all()  # the caller's array is not touched
+    fields = np.ones((2, 4), dtype=np.int16)
+    assert not FaceTrack(
+        np.zeros((2, FACE), dtype=np.int32), np.zeros((2, FACE), dtype=bool), fields
+    ).viseme.any()
+
+
+def test_nothing_of_it_can_be_changed() -> None:
+    values, mask = np.zeros((2, BODY), dtype=np.int32), np.ones((2, BODY), dtype=bool)
+    index = np.arange(2)
+    whole = Animation(Fraction(25), index, None, BodyTrack(values, mask))
+    values[0, 0] = index[0] = 9
+    mask[0, 0] = False
+    track = whole.body
+    assert track is not None
+    assert (track.values[0, 0], track.mask[0, 0], whole.index[0]) == (0, True, 0)
+    for array in (track.values, track.mask, whole.index, whole[:1].index):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+    with pytest.raises(AttributeError):
+        whole.rate = Fraction(1)  # type: ignore[misc]
+    with pytest.raises(AttributeError):
+        track.values = values  # type: ignore[misc]
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(whole)
+
+
+@pytest.mark.parametrize(
+    ("values", "mask", "message"),
+    [
+        (np.zeros((2, 67), dtype=np.int32), np.zeros((2, 67), dtype=bool), r"shape \(T, 68\), not \(2, 67\)"),
+        (np.zeros(68, dtype=np.int32), np.zeros(68, dtype=bool), r"shape \(T, 68\), not \(68,\)"),
+        (np.zeros((2, 68)), np.zeros((2, 68), dtype=bool), "must be integers, not float64"),
+        (np.full((2, 68), np.nan), np.zeros((2, 68), dtype=bool), "must be integers"),
+        (np.zeros((2, 68), dtype=np.int32), np.zeros((2, 68), dtype=int), "mask must be bool, not int64"),
+        (np.zeros((2, 68), dtype=np.int32), np.zeros((3, 68), dtype=bool), r"mask has shape \(3, 68\)"),
+        (np.full((2, 68), 2**31), np.ones((2, 68), dtype=bool), "must fit int32: found 2147483648"),
+        (np.ones((2, 68), dtype=np.int32), np.ones((2, 68), dtype=bool), "columns 0 and 1"),
+    ],
+)
+def test_wrong_tracks(values: np.ndarray, mask: np.ndarray, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        FaceTrack(values, mask)
+
+
+@pytest.mark.parametrize(
+    ("field", "column", "value", "message"),
+    [
+        ("viseme", 0, 15, r"viseme_select1 must lie in 0\.\.14, found 15"),
+        ("viseme", 1, -1, r"viseme_select2 must lie in 0\.\.14, found -1"),
+        ("viseme", 3, 2, r"viseme_def must lie in 0\.\.1, found 2"),
+        ("expression", 0, 7, r"expression_select1 must lie in 0\.\.6, found 7"),
+        ("expression", 2, 7, r"expression_select2 must lie in 0\.\.6, found 7"),
+        ("expression", 4, 2, r"init_face must lie in 0\.\.1, found 2"),
+        ("expression", 5, -1, r"expression_def must lie in 0\.\.1, found -1"),
+        ("expression", 1, 40_000, "must fit int16"),
+    ],
+)
+def test_wrong_fields(field: str, column: int, value: int, message: str) -> None:
+    fields = np.zeros((2, 4 if field == "viseme" else 6), dtype=np.int64)
+    fields[1, column] = value
+    with pytest.raises(ValueError, match=message):
+        face(2, **{field: fields})
+    with pytest.raises(ValueError, match="must have shape"):
+        face(3, **{field: np.zeros_like(fields)})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0, [0, 1], face(2)), "frame rate must be positive, not 0"),
+        ((-25, [0, 1], face(2)), "frame rate must be positive"),
+        ((25, [0, 0], face(2)), "index must increase, but frame 1 has 0 after 0"),
+        ((25, [0, 5, 4], face(3)), "frame 2 has 4 after 5"),
+        ((25, [[0, 1]], face(2)), r"shape \(T,\)"),
+        ((25, [0.0, 1.5], face(2)), "index must be integers"),
+        ((25, [0, 1]), "needs a face track, a body track, or both"),
+        ((25, [0, 1, 2], face(2)), "3 frame indices, but 2 face frames"),
+        ((25, [0, 1, 2], None, body(2)), "3 frame indices, but 2 body frames"),
+    ],
+)
+def test_wrong_animations(arguments: tuple[object, ...], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Animation(*arguments)  # type: ignore[arg-type]
+
+
+def test_frames_and_slices() -> None:
+    whole = animation(6, start=10)
+    assert whole.duration == Fraction(6, 25)
+    assert np.allclose(whole.times, np.arange(10, 16) / 25)
+    frame = whole[-2]
+    assert (frame.index, frame.time) == (14, Fraction(14, 25))
+    assert frame.face is not None
+    assert frame.face.values.shape == (1, FACE)
+    assert frame.face.values[0, 2] == 40
+    assert whole[2:4].index.tolist() == [12, 13]
+    assert whole[::2].index.tolist() == [10, 12, 14]
+    assert whole[::2].face == face(6)[::2]
+    assert whole[3:3].duration == 0
+    with pytest.raises(IndexError):
+        whole[6]
+    with pytest.raises(ValueError, match="backwards"):
+        whole[::-1]
+    assert Animation.from_frames(list(whole), "test") == whole
+    assert [f.index for f in whole] == list(range(10, 16))
+
+
+def test_equality_is_of_content() -> None:
+    one, other = animation(), animation()
+    assert one == other
+    assert Animation(one.rate, one.index, one.face, one.body, "another name") == one
+    assert one != Animation(one.rate, one.index + 1, one.face, one.body)
+    assert one != Animation(Fraction(30), one.index, one.face, one.body)
+    assert one != Animation(one.rate, one.index, one.face)
+    assert one != "an animation"
+    assert one.face != one.body
+    assert face(3) != face(3, viseme=np.array([[1, 0, 63, 0]] * 3))
+    assert one[0] == other[0]
+    assert one[0] != one[1]
+
+
+def test_from_frames() -> None:
+    """Frames that lack a part leave it unsent."""
+    whole = animation(3)
+    frames = [Frame(0, Fraction(25), whole[0].face), Frame(2, Fraction(25), None, whole[2].body)]
+    joined = Animation.from_frames(frames)
+    assert joined.index.tolist() == [0, 2]
+    assert joined.face is not None
+    assert joined.body is not None
+    assert joined.face.mask.any(axis=1).tolist() == [True, False]
+    assert joined.body.mask.any(axis=1).tolist() == [False, True]
+    with pytest.raises(ValueError, match="no frames"):
+        Animation.from_frames([])
+    with pytest.raises(ValueError, match="several rates: 25, 30"):
+        Animation.from_frames([Frame(0, Fraction(25), whole[0].face), Frame(1, Fraction(30), whole[1].face)])
+
+
+def test_concatenate() -> None:
+    faces = Animation(Fraction(25), np.array([100, 103]), face(2))
+    joined = Animation.concatenate([animation(3), faces, animation(2, start=7)])
+    assert joined.index.tolist() == [0, 1, 2, 3, 6, 7, 8]
+    assert joined.body is not None
+    assert joined.body.mask.any(axis=1).tolist() == [True] * 3 + [False] * 2 + [True] * 2
+    assert joined.name == "test"
+    assert Animation.concatenate([animation(0), animation(2)]).index.tolist() == [0, 1]
+    with pytest.raises(ValueError, match="no parts"):
+        Animation.concatenate([])
+    with pytest.raises(ValueError, match="different frame rates"):
+        Animation.concatenate([animation(), animation(rate=30)])
+
+
+def test_resample_up_and_down() -> None:
+    """A ramp of 10 a frame, at twice the rate 5 a frame; at half the rate every other frame."""
+    double = animation(4).resample(50)
+    assert double.index.tolist() == list(range(7))
+    assert double.face is not None
+    assert double.body is not None
+    assert double.face.values[:, 2].tolist() == [0, 5, 10, 15, 20, 25, 30]
+    assert double.body.values[:, 0].tolist() == [0, -4, -7, -10, -14, -18, -21]  # halves to even
+    half = animation(4).resample(Fraction(25, 2))
+    assert half.index.tolist() == [0, 1]
+    assert half.face is not None
+    assert half.face.values[:, 2].tolist() == [0, 20]
+    assert animation(4).resample(25) == animation(4)
+
+
+def test_resample_holds_masks_and_selects() -> None:
+    """What a frame does not send is not made up; selects hold; flags are set once."""
+    values = np.zeros((3, FACE), dtype=np.int32)
+    values[:, 2] = [0, 100, 0]
+    mask = np.zeros((3, FACE), dtype=bool)
+    mask[:, 0] = True
+    mask[:2, 2] = True
+    viseme = np.array([[3, 0, 63, 1], [5, 0, 63, 0], [5, 0, 31, 0]])
+    track = FaceTrack(values, mask, viseme)
+    got = Animation(Fraction(25), np.arange(3), track).resample(100).face
+    assert got is not None
+    assert got.mask[:, 2].tolist() == [True] * 8 + [False]
+    assert got.values[:, 2].tolist() == [0, 25, 50, 75, 100, 100, 100, 100, 0]
+    assert got.viseme[:, 0].tolist() == [3] * 4 + [5] * 5
+    assert got.viseme[:, 2].tolist() == [63] * 4 + [63, 55, 47, 39, 31]
+    assert got.viseme[:, 3].tolist() == [1] + [0] * 8
+
+
+def test_resample_fills_gaps() -> None:
+    gap = Animation(Fraction(10), np.array([0, 4]), None, body(2)).resample(10)
+    assert gap.index.tolist() == [0, 1, 2, 3, 4]
+    assert gap.body is not None
+    assert gap.body.values[:, 0].tolist() == [0, -2, -4, -5, -7]
+
+
+@pytest.mark.parametrize("rate", [0, -1, Fraction(-1, 2)])
+def test_resample_to_no_rate(rate: Fraction | int) -> None:
+    with pytest.raises(ValueError, match="must be positive"):
+        animation().resample(rate)
+
+
+def test_resample_does_not_fill_the_memory() -> None:
+    far = Animation(Fraction(1, 16), np.array([0, 10**12]), face(2))
+    with pytest.raises(ValueError, match=r"would become \d+ frames"):
+        far.resample(25)
+    late = Animation(Fraction(1, 16), np.array([10**18]), face(1))
+    with pytest.raises(ValueError, match="its times are implausible or the rate is too high"):
+        late.resample(25)
+    assert late.times.tolist() == [1.6e19]
+
+
+def test_rates_of_many_digits() -> None:
+    """As they come from floats: exact all the same."""
+    source = animation(100, rate=Fraction(29.97))
+    assert np.allclose(source.times, np.arange(100) / 29.97, rtol=1e-15)
+    assert source.resample(Fraction(29.97)) == source
+    got = source.resample(2 * Fraction(29.97))
+    assert got.face is not None
+    assert got.face.values[:, 2].tolist() == list(range(0, 991, 5))
+
+
+@given(st.integers(1, 20), st.fractions("1/4", 100), st.fractions("1/4", 100), st.integers(-50, 50))
+@settings(max_examples=100, deadline=None)
+def test_resampled_times_lie_within(count: int, rate: Fraction, wanted: Fraction, start: int) -> None:
+    source = animation(count, start, rate)
+    got = source.resample(wanted)
+    assert got.rate == wanted
+    assert (np.diff(got.index) == 1).all()
+    first, last = (Fraction(int(source.index[i])) / rate for i in (0, -1))
+    assert Fraction(int(got.index[0])) / wanted >= first
+    assert len(got) == 1 or Fraction(int(got.index[-1])) / wanted <= last
+    assert Fraction(int(got.index[-1]) + 1) / wanted > last
+    assert got.face is not None
+    assert (np.diff(got.face.values[:, 2]) >= 0).all()
+
+
+def test_empty_tracks() -> None:
+    nothing = Animation(Fraction(25), np.array([], dtype=np.int64), FaceTrack.empty(0))
+    assert len(nothing) == 0
+    assert list(nothing) == []
+    assert nothing.resample(30).rate == 30
+    assert BodyTrack.join([(None, 2)]) is None
+    joined = BodyTrack.join([(None, 2), (body(1), 1)])
+    assert joined is not None
+    assert len(joined) == 3
