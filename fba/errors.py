@@ -31,7 +31,8 @@ class FbaWarning(UserWarning):
 class BitstreamError(FbaError, ValueError):
     """Damage in an FBA stream.
 
-    plane: number of the plane (0-based, in stream order) in which it was found.
+    message: the text without the place. plane: number of the plane (0-based, in stream order) in which
+    it was found.
     bit: position of the offending bit, counted from the start of the stream.
     blocks: what `Decoder.finish` decoded before it, of what no earlier call had returned.
     """
@@ -39,6 +40,7 @@ class BitstreamError(FbaError, ValueError):
     blocks: Sequence[Any] = ()
 
     def __init__(self, message: str, *, plane: int | None = None, bit: int | None = None) -> None:
+        self.message = message
         self.plane = plane
         self.bit = bit
         where = []

@@ -8,33 +8,23 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-import numpy.typing as npt
-
 from fba.animation import Animation, Frame
 from fba.codec import plane, slots, syntax
-from fba.codec.arithmetic import OK, OUT_OF_DATA
 from fba.codec.assembly import Assembly
-from fba.codec.bits import BitReader, OutOfDataError
+from fba.codec.bits import OutOfDataError
 from fba.codec.block import Block
 from fba.codec.buffer import Buffer
 from fba.codec.clock import StreamClock
-from fba.codec.models import Models
-from fba.codec.plane import Layout
-from fba.codec.settings import FrameRate, PartSettings, PlaneSettings
+from fba.codec.plane_reader import PlaneReader, Planes
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
 
-_RUN = 512
-"""Planes that one call of the compiled loop decodes at most."""
 _CHUNK = 1 << 16
 """Bytes that `decode` hands over at a time, so that blocks do not pile up."""
 _DOUBTFUL = 8
 """Planes before damage that may have been misread: a start code that stands in them is believed."""
 _LARGE_PLANE = 4096
 """Bytes beyond which a plane that is still incomplete is not tried again for every byte that comes."""
-
-_PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
 
 
 @dataclass(frozen=True)
@@ -74,7 +64,6 @@ class Decoder:
         self.planes = 0
         """Planes decoded so far."""
         self._salvage = on_error == "salvage"
-        self._bap_steps = bap_steps
         self._buffer = Buffer()
         self._bit = 0  # next bit to decode, in the buffer
         self._scanned = 0  # byte up to which no start code was found, while looking for one
@@ -85,17 +74,10 @@ class Decoder:
         self._objects = 0
         self._object_end = 0  # byte of the stream at which the last object was over
         self._no_head: BitstreamError | None = None  # why what the stream begins with is none
-        self._models_used = False
         self._clock = StreamClock()
         self._lost_from = 0
         self._doubtful: deque[int] = deque(maxlen=_DOUBTFUL)  # where the last planes begin in the stream
-        self._rows = np.zeros((0, 0), dtype=np.int32)
-        self._rows_layout: Layout | None = None
-        self._skips = np.zeros(_RUN, dtype=np.int64)
-        self._borders = np.zeros(_RUN + 1, dtype=np.int64)
-        self._models = Models(bap_steps)
-        self._settings: dict[int, PartSettings] = {}
-        self._layouts: dict[int, Layout] = {}
+        self._reader = PlaneReader(bap_steps)
         self._code_bit: int | None = None  # where the start code before the next plane begins
 
     # ---- what users call
@@ -237,8 +219,9 @@ class Decoder:
                 self._end_object(code)
             return iter(())
         try:
-            reader = BitReader(buffer.data, self._bit, end)
-            blocks = self._intra(reader) if reader.read(1) else self._predicted(end)
+            planes = self._reader.read(buffer.data, self._bit, end, after_code=self._code_bit is not None)
+        except (BitstreamError, UnsupportedError) as error:
+            raise self._located(error) from None
         except OutOfDataError:
             if final:
                 raise BitstreamError(
@@ -249,7 +232,7 @@ class Decoder:
             waiting = buffer.length - (self._bit >> 3)
             self._retry_at = buffer.length + (waiting // 4 if waiting > _LARGE_PLANE else 0)
             return None
-        return iter(blocks)
+        return iter([self._block(planes)] if planes is not None else [])
 
     def _resynchronise(self, final: bool) -> Iterator[Block] | None:
         """After damage: go to the next start code of a plane or object that an I plane follows."""
@@ -275,180 +258,39 @@ class Decoder:
             self._close_damage(buffer.length)
         return None
 
-    # ---- planes
-
-    def _intra(self, reader: BitReader) -> list[Block]:
-        number, start = self.planes, reader.bit - 1
-        mask = self._read_object_mask(reader)
-        frame_rate = self._read_frame_rate(reader)
-        time_code = syntax.read_time_code(reader) if reader.read(1) else None
-        try:
-            skip = syntax.read_skip(reader, number)
-        except BitstreamError as error:
-            raise self._located(error) from None
-        row = np.zeros((1, slots.row_width(body=bool(mask & slots.BODY_BIT))), dtype=np.int32)
-        settings: dict[int, PartSettings] = {}
-        values: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
-        models = self._models
-        for part, name in _PARTS:
-            if not mask & part:
-                continue
-            try:
-                one = syntax.read_part(reader, part, number)
-            except BitstreamError as error:
-                raise self._located(error) from None
-            if one.coding_type == syntax.DCT:
-                here = self._absolute(reader.bit - 1)
-                raise UnsupportedError(
-                    f"plane {number}, bit {here}: {name} are coded as DCT segments "
-                    "(object_coding_type 1), whose code tables are in no public source",
-                    what="DCT segments (object_coding_type 1)",
-                    plane=number,
-                    bit=here,
-                )
-            self._models_used = True
-            models.begin_intra(part, one)
-            undefined = models.undefined(one, part)
-            if undefined is not None:
-                raise BitstreamError(
-                    f"{slots.label(undefined)} is sent, but no range for it: extension BAPs have no default",
-                    plane=number,
-                    bit=self._absolute(reader.bit),
-                )
-            settings[part] = one
-            order, segments = slots.coding_order(
-                one.mask if part == slots.FACE_BIT else None, one.mask if part == slots.BODY_BIT else None
-            )
-            symbols, decoded = np.zeros_like(order), np.zeros_like(order)
-            flags = np.zeros(3, dtype=np.int64)
-            status, place = plane.decode_values(
-                reader.data,
-                reader.bit,
-                reader.end,
-                Layout(order, segments),
-                models.intra,
-                False,
-                symbols,
-                decoded,
-                flags,
-            )
-            self._check(status, place)
-            reader.bit = place
-            row[0, order] = decoded
-            if part == slots.FACE_BIT:
-                row[0, slots.FLAGS] = flags
-            values.append((order, decoded))
-        for order, decoded in values:
-            models.last[order] = decoded
-        self._settings.update(settings)
-        self._layouts.clear()
-        for odd in self._clock.begin_intra(frame_rate, time_code):
-            self._warn(f"plane {number}, bit {self._absolute(start)}: {odd}")
-        face, body = settings.get(slots.FACE_BIT), settings.get(slots.BODY_BIT)
-        plane_settings = PlaneSettings(
-            intra=True,
-            face=face,
-            body=body,
-            frame_rate=frame_rate,
-            time_code=time_code,
-            skip=skip,
-            start_code=self._code_bit is not None,
-        )
-        borders = np.array([start, reader.bit], dtype=np.int64)
-        return [self._block(row, borders, np.array([skip], dtype=np.int64), plane_settings)]
-
-    def _predicted(self, end: int) -> list[Block]:
-        """A run of P planes with one fba_object_mask."""
-        mask = self._read_object_mask(BitReader(self._buffer.data, self._bit + 1, end))
-        for part, name in _PARTS:
-            if mask & part and part not in self._settings:
-                raise BitstreamError(
-                    f"a P plane carries {name}, but no I plane with {name} came before it in this object",
-                    plane=self.planes,
-                    bit=self._absolute(self._bit),
-                )
-        face = self._settings[slots.FACE_BIT] if mask & slots.FACE_BIT else None
-        body = self._settings[slots.BODY_BIT] if mask & slots.BODY_BIT else None
-        if mask not in self._layouts:
-            self._layouts[mask] = Layout(
-                *slots.coding_order(
-                    face.mask if face is not None else None, body.mask if body is not None else None
-                )
-            )
-        layout = self._layouts[mask]
-        if self._rows_layout is not layout:
-            self._rows_layout = layout
-            width = slots.row_width(body=body is not None)
-            self._rows = np.zeros((_RUN, width), dtype=np.int32)  # what this layout does not code stays 0
-        count, status, _, place = plane.decode_run(
-            self._buffer.data, self._bit, end, self._code_bit is not None, mask, layout,
-            self._models.predicted, self._rows, self._skips, self._borders,
-        )  # fmt: skip
-        if count == 0:
-            self._check(status, place)
-            return []
-        settings = PlaneSettings(intra=False, face=face, body=body, start_code=self._code_bit is not None)
-        block = self._block(self._rows[:count], self._borders[: count + 1], self._skips[:count], settings)
-        return [block]
-
-    def _block(
-        self,
-        rows: slots.Int32,
-        borders: npt.NDArray[np.int64],
-        skips: npt.NDArray[np.int64],
-        settings: PlaneSettings,
-    ) -> Block:
-        count = len(rows)
-        clock = self._clock
+    def _block(self, planes: Planes) -> Block:
+        """Planes with their times; the stream goes on behind them."""
+        settings, clock = planes.settings, self._clock
+        if settings.intra:
+            for odd in clock.begin_intra(settings.frame_rate, settings.time_code):
+                self._warn(f"plane {self.planes}, bit {self._absolute(int(planes.borders[0]))}: {odd}")
         assert clock.rate is not None
-        absolute = borders + 8 * self._buffer.offset
+        borders = planes.borders + 8 * self._buffer.offset
+        if self._salvage:
+            self._doubtful.extend(borders[-1 - _DOUBTFUL : -1].tolist())  # behind any start code
         if self._code_bit is not None:
-            absolute[0] = self._code_bit
+            borders[0] = self._code_bit
+        face, body = settings.face, settings.body
         start = clock.time
         block = Block(
-            index=clock.advance(skips),
+            index=clock.advance(planes.skips),
             start=start,
             rate=clock.rate,
-            face=slots.face_track(rows, settings.face.mask) if settings.face is not None else None,
-            body=slots.body_track(rows, settings.body.mask) if settings.body is not None else None,
+            face=slots.face_track(planes.rows, face.mask) if face is not None else None,
+            body=slots.body_track(planes.rows, body.mask) if body is not None else None,
             number=self.planes,
-            borders=absolute,
-            skips=skips.copy(),
+            borders=borders,
+            skips=planes.skips.copy(),
             settings=settings,
         )
-        self.planes += count
-        if self._salvage:
-            starts = borders[-1 - _DOUBTFUL : -1] + 8 * self._buffer.offset  # behind any start code
-            self._doubtful.extend(starts.tolist())
-        self._bit = int(borders[-1])
+        self.planes += len(planes.skips)
+        self._bit = int(planes.borders[-1])
         self._code_bit = None
         return block
 
-    def _read_object_mask(self, reader: BitReader) -> int:
-        mask = reader.read(2)
-        if mask == 0:
-            raise BitstreamError(
-                plane.STATUS_TEXT[plane.BAD_MASK], plane=self.planes, bit=self._absolute(reader.bit - 2)
-            )
-        return mask
-
-    def _read_frame_rate(self, reader: BitReader) -> FrameRate | None:
-        if not reader.read(1):
-            return None
-        rate = syntax.read_frame_rate(reader)
-        if rate.fraction == 0:
-            raise BitstreamError(
-                "the frame rate is 0", plane=self.planes, bit=self._absolute(reader.bit - 13)
-            )
-        return rate
-
     def _begin_object(self) -> None:
-        if self._models_used:
-            self._models = Models(self._bap_steps)
-            self._models_used = False
+        self._reader.begin_object()
         self._objects += 1
-        self._settings.clear()
-        self._layouts.clear()
         self._code_bit = None
 
     def _end_object(self, code: int) -> None:
@@ -465,29 +307,17 @@ class Decoder:
 
     # ---- damage
 
-    def _check(self, status: int, place: int) -> None:
-        if status == OK:
-            return
-        if status == OUT_OF_DATA:
-            raise OutOfDataError
-        if status == plane.OUT_OF_RANGE:
-            raise BitstreamError(
-                f"{slots.label(place)} gets a value outside {self._models.lowest[place]}.."
-                f"{self._models.highest[place]}; the stream is damaged here or before",
-                plane=self.planes,
-                bit=self._absolute(self._bit),
-            )
-        if status in plane.STATUS_TEXT:
-            raise BitstreamError(plane.STATUS_TEXT[status], plane=self.planes, bit=self._absolute(place))
-
     def _absolute(self, bit: int) -> int:
         return bit + 8 * self._buffer.offset
 
-    def _located(self, error: BitstreamError) -> BitstreamError:
-        """An error whose bit counts from the start of the buffer, as one that counts from the stream's."""
+    def _located(self, error: BitstreamError | UnsupportedError) -> BitstreamError | UnsupportedError:
+        """An error of the plane at hand whose bit counts from the start of the buffer, as what users get."""
         assert error.bit is not None
-        text = str(error).split(": ", 1)[1]
-        return BitstreamError(text, plane=error.plane, bit=self._absolute(error.bit))
+        bit = self._absolute(error.bit)
+        if isinstance(error, UnsupportedError):
+            text = f"plane {self.planes}, bit {bit}: {error}"
+            return UnsupportedError(text, what=error.what, plane=self.planes, bit=bit)
+        return BitstreamError(error.message, plane=self.planes, bit=bit)
 
     def _lose(self, error: FbaError) -> None:
         """Note damage in the plane at `_bit`, and go looking for the next place to start from."""
@@ -496,7 +326,7 @@ class Decoder:
             if kept is not None:
                 kept.__traceback__ = kept.__context__ = None
         self.damage.append(Damage(error, self._buffer.offset + start, self._buffer.offset + start))
-        self._settings.clear()
+        self._reader.forget_values()
         self._code_bit = None
         if self._doubtful:
             self._scanned = (self._doubtful[0] >> 3) - self._buffer.offset

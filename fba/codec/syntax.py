@@ -67,7 +67,7 @@ def write_time_code(writer: BitWriter, code: TimeCode) -> None:
         writer.write(value, bits)
 
 
-def read_skip(reader: BitReader, plane: int) -> int:
+def read_skip(reader: BitReader) -> int:
     """skip_frames and number_of_frames_to_skip."""
     if not reader.read(1):
         return 0
@@ -75,7 +75,7 @@ def read_skip(reader: BitReader, plane: int) -> int:
     if status == OUT_OF_DATA:
         raise OutOfDataError
     if status != OK:
-        raise BitstreamError(STATUS_TEXT[status], plane=plane, bit=reader.bit)
+        raise BitstreamError(STATUS_TEXT[status], bit=reader.bit)
     return skip
 
 
@@ -87,7 +87,7 @@ def write_skip(writer: BitWriter, skip: int) -> None:
         writer.write(skip % 15, 4)
 
 
-def read_part(reader: BitReader, part: int, plane: int) -> PartSettings:
+def read_part(reader: BitReader, part: int) -> PartSettings:
     """The header of the FAP or BAP half of an I plane, up to its first arithmetic segment.
 
     Raises BitstreamError on a wrong marker bit or a reserved mask type.
@@ -99,12 +99,11 @@ def read_part(reader: BitReader, part: int, plane: int) -> PartSettings:
     for number, group in enumerate(groups(part), 1):
         bits = reader.read(3)
         if not bits >> 2:
-            raise _marker_error(reader, plane, f"before {name}_mask_type of group {number}", 3)
+            raise _marker_error(reader, f"before {name}_mask_type of group {number}", 3)
         kind = bits & 3
         if kind == MASK_INTERPOLATE and part == slots.BODY_BIT:
             raise BitstreamError(
                 f"bap_mask_type of group {number} is 2 (interpolate), which exists for FAPs only",
-                plane=plane,
                 bit=reader.bit - 2,
             )
         types.append(kind)
@@ -116,7 +115,7 @@ def read_part(reader: BitReader, part: int, plane: int) -> PartSettings:
             mask[columns] = [(bits >> shift) & 1 for shift in reversed(range(len(group)))]
     gender = reader.read(1)
     coding_type = reader.read(1)
-    ranges = RangeLists() if coding_type == DCT else _read_ranges(reader, part, mask, plane)
+    ranges = RangeLists() if coding_type == DCT else _read_ranges(reader, part, mask)
     mask.flags.writeable = False
     return PartSettings(tuple(types), mask, quant, gender, coding_type, ranges)
 
@@ -142,7 +141,7 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
                 writer.write(bits, 1 + RANGE_BITS * len(chunk))
 
 
-def _read_ranges(reader: BitReader, part: int, mask: slots.Bool, plane: int) -> RangeLists:
+def _read_ranges(reader: BitReader, part: int, mask: slots.Bool) -> RangeLists:
     flags = [reader.read(1) for _ in LISTS]
     chunks = _range_chunks(part, mask) if any(flags) else []
     lists: list[np.ndarray | None] = []
@@ -154,7 +153,7 @@ def _read_ranges(reader: BitReader, part: int, mask: slots.Bool, plane: int) -> 
         for chunk in chunks:
             bits = reader.read(1 + RANGE_BITS * len(chunk))
             if not bits >> RANGE_BITS * len(chunk):
-                raise _marker_error(reader, plane, f"in the {name} range list", 1 + RANGE_BITS * len(chunk))
+                raise _marker_error(reader, f"in the {name} range list", 1 + RANGE_BITS * len(chunk))
             for parameter in reversed(chunk):
                 codes[parameter - 1] = bits & RANGE_CODE_MAX
                 bits >>= RANGE_BITS
@@ -173,5 +172,5 @@ def _range_chunks(part: int, mask: slots.Bool) -> list[list[int]]:
     ]
 
 
-def _marker_error(reader: BitReader, plane: int, where: str, back: int) -> BitstreamError:
-    return BitstreamError(f"marker bit {where} is 0, expected 1", plane=plane, bit=reader.bit - back)
+def _marker_error(reader: BitReader, where: str, back: int) -> BitstreamError:
+    return BitstreamError(f"marker bit {where} is 0, expected 1", bit=reader.bit - back)
