@@ -7,6 +7,7 @@
     ├── FormatError(path, line, token)      also ValueError   a file is not what its format says
     ├── RangeError(parameter, value, limits) also ValueError  a value that the syntax cannot carry
     ├── UnsupportedError(what)              also NotImplementedError  correct, but not handled here
+    ├── OptionError                         also TypeError    an option that does not exist, or contradicts
     ├── ModelError                          also ValueError   a face or body model is unusable
     └── DisplayError                        also OSError      no window, no OpenGL, no video encoder
 
@@ -112,6 +113,10 @@ class UnsupportedError(FbaError, NotImplementedError):
         self.plane: int | None = details.get("plane")
         self.bit: int | None = details.get("bit")
         super().__init__(message)
+
+
+class OptionError(FbaError, TypeError):
+    """An option that a format does not know, or options that contradict each other."""
 
 
 class ModelError(FbaError, ValueError):

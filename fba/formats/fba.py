@@ -9,7 +9,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
-from fba.errors import BitstreamError, RangeError
+from fba.errors import BitstreamError, OptionError, RangeError
 from fba.formats.atomic import atomic
 from fba.formats.source import Path, read_whole
 
@@ -62,7 +62,6 @@ def write_fba(
     written.
     """
     from fba.codec import EncoderOptions, encode
-    from fba.formats.registry import OptionError
 
     if settings:
         if options is not None:

@@ -16,15 +16,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
-from fba.errors import FbaError, FbaWarning, FormatError, UnsupportedError
+from fba.errors import FbaWarning, FormatError, OptionError, UnsupportedError
 from fba.formats.source import Path, read_head
 
 if TYPE_CHECKING:
     from fba.codec import StreamInfo
-
-
-class OptionError(FbaError, TypeError):
-    """An option that a format does not know, or options that contradict each other."""
 
 
 class Lazy:
