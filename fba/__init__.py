@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         FbaWarning,
         FormatError,
         ModelError,
+        OptionError,
         RangeError,
         UnsupportedError,
     )
@@ -43,6 +44,7 @@ _PLACES = {
     "FbaWarning": "fba.errors",
     "FormatError": "fba.errors",
     "ModelError": "fba.errors",
+    "OptionError": "fba.errors",
     "RangeError": "fba.errors",
     "UnsupportedError": "fba.errors",
     "Decoder": "fba.codec",
@@ -71,6 +73,7 @@ __all__ = [
     "FormatError",
     "Frame",
     "ModelError",
+    "OptionError",
     "RangeError",
     "StreamInfo",
     "UnsupportedError",
