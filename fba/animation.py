@@ -10,157 +10,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, TypeVar, overload
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.parameters import (
-    BAP_COUNT,
-    EXPRESSION_FIELDS,
-    EXPRESSION_SELECT_MAX,
-    FAP_COUNT,
-    VISEME_FIELDS,
-    VISEME_SELECT_MAX,
-)
+from fba.tracks import BodyTrack, Bool, FaceTrack, freeze, integers
+
+__all__ = ["MAX_FRAMES", "Animation", "BodyTrack", "FaceTrack", "Frame"]
 
 _INDEX_MAX = 1 << 62
 """Beyond this, indices are no longer counted in 64 bits."""
 
-Int32 = npt.NDArray[np.int32]
-Int16 = npt.NDArray[np.int16]
-Bool = npt.NDArray[np.bool_]
-
 MAX_FRAMES = 50_000_000
 """Most frames that a resampling makes: a guard against absurd times in damaged input."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class FaceTrack:
-    """FAPs over time.
-
-    values: int32 (T, 68), FAP i+1 in column i, in its FAPU; columns 0 and 1 are always 0.
-    mask: bool (T, 68), True where the parameter was sent; columns 0 and 1 for viseme and expression.
-    viseme: int16 (T, 4): viseme_select1, viseme_select2, viseme_blend, viseme_def.
-    expression: int16 (T, 6): expression_select1, expression_intensity1, expression_select2,
-        expression_intensity2, init_face, expression_def.
-
-    Arrays are copied if they must be changed, and read-only afterwards. Raises ValueError on a wrong
-    shape, a non-integer dtype, or a select or flag outside its range.
-    """
-
-    values: Int32
-    mask: Bool
-    viseme: Int16 = None  # type: ignore[assignment]
-    expression: Int16 = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        values, mask = _checked_values(self.values, self.mask, FAP_COUNT, "FaceTrack")
-        if values[:, :2].any():
-            raise ValueError(
-                "FaceTrack: columns 0 and 1 of values (FAP 1 viseme, FAP 2 expression) must be 0; "
-                "their content goes into viseme and expression"
-            )
-        count = len(values)
-        viseme = _checked_fields(self.viseme, count, VISEME_FIELDS, "viseme", mask[:, 0])
-        expression = _checked_fields(self.expression, count, EXPRESSION_FIELDS, "expression", mask[:, 1])
-        for fields, names in ((viseme, VISEME_FIELDS), (expression, EXPRESSION_FIELDS)):
-            for column, name in enumerate(names):
-                if "select" in name:
-                    limit = VISEME_SELECT_MAX if name.startswith("viseme") else EXPRESSION_SELECT_MAX
-                elif name.endswith("_def") or name == "init_face":
-                    limit = 1
-                else:
-                    continue  # blends and intensities may leave 0..63 by the quantiser's rounding
-                low, high = (int(fields[:, column].min()), int(fields[:, column].max())) if count else (0, 0)
-                if low < 0 or high > limit:
-                    raise ValueError(
-                        f"FaceTrack: {name} must lie in 0..{limit}, found {low if low < 0 else high}"
-                    )
-        _freeze(self, values=values, mask=mask, viseme=viseme, expression=expression)
-
-    @classmethod
-    def empty(cls, count: int) -> FaceTrack:
-        """A track of that many frames that send nothing."""
-        return cls(np.zeros((count, FAP_COUNT), dtype=np.int32), np.zeros((count, FAP_COUNT), dtype=bool))
-
-    @classmethod
-    def join(cls, parts: Iterable[tuple[FaceTrack | None, int]]) -> FaceTrack | None:
-        """Tracks one after another; each with its count of frames, None where it sends nothing."""
-        parts = list(parts)
-        if all(track is None for track, _ in parts):
-            return None
-        tracks = [track if track is not None else cls.empty(count) for track, count in parts]
-        return cls(
-            _stacked([t.values for t in tracks]),
-            _stacked([t.mask for t in tracks]),
-            _stacked([t.viseme for t in tracks]),
-            _stacked([t.expression for t in tracks]),
-        )
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __getitem__(self, frames: slice) -> FaceTrack:
-        names = ("values", "mask", "viseme", "expression")
-        return trusted(FaceTrack, **{name: getattr(self, name)[frames] for name in names})
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, FaceTrack):
-            return NotImplemented
-        return (
-            np.array_equal(self.mask, other.mask)
-            and np.array_equal(self.values, other.values)
-            and np.array_equal(self.viseme, other.viseme)
-            and np.array_equal(self.expression, other.expression)
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class BodyTrack:
-    """BAPs over time.
-
-    values: int32 (T, 296), BAP i+1 in column i: 1e-5 rad, millimetres for BAPs 181..183.
-    mask: bool (T, 296), True where the parameter was sent.
-
-    Same rules as `FaceTrack`.
-    """
-
-    values: Int32
-    mask: Bool
-
-    def __post_init__(self) -> None:
-        values, mask = _checked_values(self.values, self.mask, BAP_COUNT, "BodyTrack")
-        _freeze(self, values=values, mask=mask)
-
-    @classmethod
-    def empty(cls, count: int) -> BodyTrack:
-        """A track of that many frames that send nothing."""
-        return cls(np.zeros((count, BAP_COUNT), dtype=np.int32), np.zeros((count, BAP_COUNT), dtype=bool))
-
-    @classmethod
-    def join(cls, parts: Iterable[tuple[BodyTrack | None, int]]) -> BodyTrack | None:
-        """Tracks one after another; each with its count of frames, None where it sends nothing."""
-        parts = list(parts)
-        if all(track is None for track, _ in parts):
-            return None
-        tracks = [track if track is not None else cls.empty(count) for track, count in parts]
-        return cls(_stacked([t.values for t in tracks]), _stacked([t.mask for t in tracks]))
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __getitem__(self, frames: slice) -> BodyTrack:
-        return trusted(BodyTrack, values=self.values[frames], mask=self.mask[frames])
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, BodyTrack):
-            return NotImplemented
-        return np.array_equal(self.mask, other.mask) and np.array_equal(self.values, other.values)
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +81,7 @@ class Animation:
         rate = Fraction(self.rate)
         if rate <= 0:
             raise ValueError(f"Animation: the frame rate must be positive, not {rate}")
-        index = _integers(self.index, np.int64, "Animation: index")
+        index = integers(self.index, np.int64, "Animation: index")
         if index.ndim != 1:
             raise ValueError(f"Animation: index must have shape (T,), not {index.shape}")
         if len(index) > 1 and not (np.diff(index) > 0).all():
@@ -231,7 +94,7 @@ class Animation:
         for kind, track in (("face", self.face), ("body", self.body)):
             if track is not None and len(track) != len(index):
                 raise ValueError(f"Animation: {len(index)} frame indices, but {len(track)} {kind} frames")
-        _freeze(self, rate=rate, index=index)
+        freeze(self, rate=rate, index=index)
 
     @classmethod
     def from_frames(cls, frames: Iterable[Frame], name: str = "") -> Animation:
@@ -381,73 +244,6 @@ def _scaled(
     whole = product // factor.denominator
     rest = (product - whole * factor.denominator).astype(np.float64)
     return whole, rest / float(factor.denominator)
-
-
-Track = TypeVar("Track", FaceTrack, BodyTrack)
-
-
-def trusted(kind: type[Track], **arrays: npt.NDArray[Any]) -> Track:
-    """A track of arrays that are known to be right, such as parts of another's, without any check."""
-    track: Track = object.__new__(kind)
-    _freeze(track, **arrays)
-    return track
-
-
-def _checked_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:
-    array = _integers(values, np.int32, f"{what}: values")
-    sent = np.asarray(mask)
-    if array.ndim != 2 or array.shape[1] != columns:
-        raise ValueError(f"{what}: values must have shape (T, {columns}), not {array.shape}")
-    if sent.dtype != np.bool_:
-        raise ValueError(f"{what}: mask must be bool, not {sent.dtype}")
-    if sent.shape != array.shape:
-        raise ValueError(f"{what}: mask has shape {sent.shape}, values {array.shape}")
-    if sent.flags.writeable:
-        sent = sent.copy()
-    if array.any(where=~sent):
-        array = np.where(sent, array, np.int32(0))
-    return array, sent
-
-
-def _checked_fields(fields: object, count: int, names: tuple[str, ...], what: str, sent: Bool) -> Int16:
-    if fields is None:
-        return np.zeros((count, len(names)), dtype=np.int16)
-    array = _integers(fields, np.int16, f"FaceTrack: {what}")
-    if array.shape != (count, len(names)):
-        raise ValueError(f"FaceTrack: {what} must have shape ({count}, {len(names)}), not {array.shape}")
-    if array[~sent].any():
-        array = np.where(sent[:, None], array, np.int16(0))
-    return array
-
-
-def _integers(values: object, dtype: type[np.signedinteger], what: str) -> npt.NDArray[np.signedinteger]:
-    """An array of this dtype that no caller can change; refuses what would lose information."""
-    array = np.asarray(values)
-    if array.size == 0 and array.dtype == np.float64:
-        array = array.astype(dtype)
-    if not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"{what} must be integers, not {array.dtype}")
-    if array.dtype != dtype:
-        info = np.iinfo(dtype)
-        if array.size and (int(array.min()) < info.min or int(array.max()) > info.max):
-            raise ValueError(f"{what} must fit {info.dtype}: found {array.min()}..{array.max()}")
-    if array.dtype != dtype or array.flags.writeable:
-        array = array.astype(dtype, copy=True)
-    return array
-
-
-def _freeze(instance: object, **fields: object) -> None:
-    for name, value in fields.items():
-        if isinstance(value, np.ndarray):
-            value.flags.writeable = False  # ours by now: whatever a caller could still change was copied
-        object.__setattr__(instance, name, value)
-
-
-def _stacked(arrays: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-    """One array of all, read-only, so that a track takes it over without a copy."""
-    stacked = np.concatenate(arrays)
-    stacked.flags.writeable = False
-    return stacked
 
 
 def _between(

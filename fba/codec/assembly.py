@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba.animation import Animation, BodyTrack, FaceTrack, trusted
+from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec.block import Block
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
+from fba.tracks import trusted
 
 _COMMON_RATE_MAX = 1_000_000
 
