@@ -48,8 +48,9 @@ class Decoder:
     of it tells. on_error: "raise", or "salvage" to go on after damage at the next start code that an
     I plane follows; what was lost is then listed in `damage`.
 
-    `push` and `finish` return the frames whose planes are complete, as soon as they are. Frames decoded
-    before the damage are always returned first: the error is raised by the call after that.
+    `push` and `finish` return the frames whose planes are complete, as soon as they are. What `push`
+    decoded before damage it returns first: the error is raised by the call after that. `finish` raises
+    at once, and what it still decoded is in the `blocks` of its error.
 
     Raises BitstreamError on damage, UnsupportedError for DCT segments (object_coding_type 1, whose
     tables are in no public source); ValueError on wrong arguments. ISO/IEC 14496-2, FBA object.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +60,3 @@ class Fapu:
 
     def __getitem__(self, unit: str) -> float:
         return float(getattr(self, unit))
-
-    def as_dict(self) -> Mapping[str, float]:
-        """Size of one step, by the standard's name of the unit."""
-        return {unit: self[unit] for unit in ("IRISD", "ES", "ENS", "MNS", "MW", "AU")}
