@@ -1,0 +1,311 @@
+"""A face: meshes, the feature points bound to them, and what every FAP does to them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.expressions import Definitions
+from fba.face.fapu import Fapu
+from fba.face.feature_points import names, row_of
+from fba.face.tables import HEAD, FaceDefTables
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
+
+if TYPE_CHECKING:
+    from fba.face.interpolation_table import InterpolationTable
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+PART_KINDS = ("skin", "eye", "teeth", "tongue", "mouth", "brow", "lash", "hair", "other")
+"""What a part is. "mouth" is the inside of the mouth where it is not part of the skin; "eye" a whole
+eyeball, left or right by the side of its centre."""
+SHARED_POINT = 1e-4
+"""A bound feature point may stand this far from its vertex, as a share of the face's height."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """How a surface looks. colour: linear light, 0..1. roughness: 0..1. texture: PNG or JPEG bytes, sRGB."""
+
+    name: str = "plain"
+    colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    roughness: float = 0.6
+    texture: bytes | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of a face.
+
+    name: unique in its model. kind: one of `PART_KINDS`. vertices: float32 (V, 3), metres, neutral face.
+    triangles: int32 (F, 3), counter-clockwise from outside. normals: float32 (V, 3), unit, or None to
+    have them computed. texcoords: float32 (V, 2), origin at the picture's top left, or None. colours:
+    float32 (V, 4), linear light, the fourth how glossy, or None for the material's.
+
+    Arrays are read-only copies. ModelError for other shapes, indices out of range, numbers not finite.
+    """
+
+    name: str
+    kind: str
+    vertices: Float32
+    triangles: Int32
+    normals: Float32 | None = None
+    texcoords: Float32 | None = None
+    colours: Float32 | None = None
+    material: Material = field(default_factory=Material)
+
+    def __post_init__(self) -> None:
+        where = f"part {self.name!r}"
+        if not self.name or self.name == HEAD:
+            raise ModelError(f"{where}: a part needs a name, and {HEAD!r} stands for all of them")
+        if self.kind not in PART_KINDS:
+            raise ModelError(f"{where}: its kind {self.kind!r} is none of {', '.join(PART_KINDS)}")
+        vertices = _array(self.vertices, (-1, 3), f"{where}: vertices")
+        count = len(vertices)
+        triangles = np.array(self.triangles)
+        if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+            raise ModelError(f"{where}: triangles must be whole numbers, (F, 3), not {triangles.shape}")
+        if triangles.size and (int(triangles.min()) < 0 or int(triangles.max()) >= count):
+            bad = int(np.argwhere(((triangles < 0) | (triangles >= count)).any(axis=1))[0, 0])
+            raise ModelError(
+                f"{where}: triangle {bad} names vertex {triangles[bad].tolist()}, but there are {count}"
+            )
+        arrays: dict[str, Any] = {"vertices": vertices, "triangles": triangles.astype(np.int32)}
+        from fba.face.normals import vertex_normals
+
+        arrays["normals"] = (
+            vertex_normals(vertices, arrays["triangles"])
+            if self.normals is None
+            else _array(self.normals, (count, 3), f"{where}: normals")
+        )
+        if self.texcoords is not None:
+            arrays["texcoords"] = _array(self.texcoords, (count, 2), f"{where}: texture coordinates")
+        if self.colours is not None:
+            arrays["colours"] = _array(self.colours, (count, 4), f"{where}: colours")
+        for name, array in arrays.items():
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True, eq=False)
+class FaceModel:
+    """A face that FAPs can move.
+
+    parts: its meshes; vertices of the whole model are counted through them in order. points: float64
+    (84, 3), the neutral feature points in metres, rows as `feature_point_names()`, NaN where the face
+    has none. bound: int32 (84,), the vertex that each stands on, -1 for those inside or outside the
+    meshes (the centre of the head, the thickness of hair). tables: what each FAP does, each FAP at most
+    once. fit: how unsent FAPs follow from sent ones, or None for the standard's mates. definitions: the
+    FAPs of visemes and expressions. lost: FAPs without tables and why, by number. notes: origin,
+    licence and the like.
+
+    Axes: +x the subject's left, +y up, +z forward. Raises ModelError naming the place of what is wrong.
+    """
+
+    parts: tuple[Part, ...]
+    points: Float64
+    bound: Int32
+    tables: tuple[FaceDefTables, ...] = ()
+    fit: InterpolationTable | None = None
+    definitions: Definitions = field(default_factory=Definitions.default)
+    name: str = ""
+    lost: Mapping[int, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", tuple(self.parts))
+        object.__setattr__(self, "tables", tuple(sorted(self.tables, key=lambda table: table.fap)))
+        if not self.parts:
+            raise ModelError("a face needs at least one part")
+        seen = [part.name for part in self.parts]
+        for name in seen:
+            if seen.count(name) > 1:
+                raise ModelError(f"two parts are named {name!r}")
+        self._check_points()
+        self._check_tables()
+        for number in self.lost:
+            if not FIRST_LOW_LEVEL_FAP <= number <= FAP_COUNT:
+                raise ModelError(f"FAP {number} cannot be lost: there are {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}")
+        object.__setattr__(self, "lost", dict(self.lost))
+        object.__setattr__(self, "notes", dict(self.notes))
+        self.fapu  # noqa: B018 - a face without units is none
+
+    @staticmethod
+    def default() -> FaceModel:
+        """The built-in head."""
+        from fba.face.builtin import default
+
+        return default()
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> FaceModel:
+        """A face from a glTF 2.0 file (.glb or .gltf) with the FBA extension, as `save` writes it.
+
+        Raises ModelError where it is damaged or brings no feature points; FileNotFoundError and other
+        OSError as `open` does.
+        """
+        from fba.face.storage import load
+
+        return load(path)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the face as glTF 2.0 (.glb): whole or not at all."""
+        from fba.face.storage import save
+
+        save(self, path)
+
+    @cached_property
+    def vertices(self) -> Float32:
+        """float32 (V, 3): the neutral face, all parts in order, metres; read-only."""
+        return _joined([part.vertices for part in self.parts])
+
+    @cached_property
+    def normals(self) -> Float32:
+        """float32 (V, 3): unit normals of the neutral face; read-only."""
+        return _joined([part.normals for part in self.parts if part.normals is not None])
+
+    @cached_property
+    def triangles(self) -> Int32:
+        """int32 (F, 3): indices into `vertices`; read-only."""
+        starts = self.starts
+        joined = np.concatenate([part.triangles + starts[part.name] for part in self.parts])
+        joined.flags.writeable = False
+        return joined.astype(np.int32)
+
+    @cached_property
+    def starts(self) -> dict[str, int]:
+        """Index of each part's first vertex in `vertices`."""
+        counts = np.cumsum([0, *(len(part.vertices) for part in self.parts)])
+        return {part.name: int(start) for part, start in zip(self.parts, counts[:-1], strict=True)}
+
+    @property
+    def feature_points(self) -> Float64:
+        """float64 (84, 3): the neutral feature points, metres; NaN where the face has none."""
+        return self.points
+
+    @cached_property
+    def fapu(self) -> Fapu:
+        """The units in which FAPs move this face."""
+        return Fapu.measure(self.points)
+
+    @cached_property
+    def table_of(self) -> dict[int, FaceDefTables]:
+        """Tables by FAP number."""
+        return {table.fap: table for table in self.tables}
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Feature points that the face does not have."""
+        return tuple(n for n, p in zip(names(), self.points, strict=True) if np.isnan(p).any())
+
+    def part(self, name: str) -> Part:
+        """The part of that name; ModelError where there is none."""
+        for part in self.parts:
+            if part.name == name:
+                return part
+        raise ModelError(f"no part {name!r}; there are {', '.join(part.name for part in self.parts)}")
+
+    def of_kind(self, kind: str) -> tuple[Part, ...]:
+        """All parts of a kind."""
+        return tuple(part for part in self.parts if part.kind == kind)
+
+    def with_tables(self, tables: tuple[FaceDefTables, ...], lost: Mapping[int, str]) -> FaceModel:
+        """The same face with other tables."""
+        return replace(self, tables=tables, lost=lost)
+
+    def _check_points(self) -> None:
+        points = np.array(self.points, dtype=np.float64)
+        if points.shape != (len(names()), 3):
+            raise ModelError(f"feature points must have shape ({len(names())}, 3), not {points.shape}")
+        bound = np.array(self.bound)
+        if bound.shape != (len(names()),) or bound.dtype.kind not in "iu":
+            raise ModelError(f"bound vertices must be {len(names())} whole numbers, -1 for none")
+        for row, name in enumerate(names()):
+            if np.isinf(points[row]).any() or np.isnan(points[row]).any() != np.isnan(points[row]).all():
+                raise ModelError(f"feature point {name} at {points[row].tolist()} is not finite")
+            vertex = int(bound[row])
+            if vertex >= len(self.vertices) or vertex < -1:
+                raise ModelError(
+                    f"feature point {name} is bound to vertex {vertex}, but there are {len(self.vertices)}"
+                )
+            if vertex >= 0 and np.isnan(points[row]).any():
+                raise ModelError(f"feature point {name} is bound to vertex {vertex}, but has no position")
+        tall = float(np.ptp(self.vertices[:, 1])) if len(self.vertices) else 0.0
+        held = bound >= 0
+        away = np.linalg.norm(self.vertices[bound[held]] - points[held], axis=1)
+        if len(away) and float(away.max()) > SHARED_POINT * max(tall, 1e-9):
+            row = int(np.flatnonzero(held)[int(away.argmax())])
+            raise ModelError(
+                f"feature point {names()[row]} stands {away.max():g} m away from its vertex {bound[row]}"
+            )
+        points.flags.writeable = False
+        object.__setattr__(self, "points", points)
+        bound = bound.astype(np.int32)
+        bound.flags.writeable = False
+        object.__setattr__(self, "bound", bound)
+
+    def _check_tables(self) -> None:
+        sizes = {part.name: len(part.vertices) for part in self.parts}
+        seen: set[int] = set()
+        for table in self.tables:
+            where = f"FaceDefTables of FAP {table.fap} {faps()[table.fap - 1].name}"
+            if table.fap in seen:
+                raise ModelError(f"{where}: there are two")
+            seen.add(table.fap)
+            for mesh in table.meshes:
+                if mesh.part not in sizes:
+                    raise ModelError(f"{where}: there is no part {mesh.part!r}")
+                if len(mesh.vertices) and int(mesh.vertices.max()) >= sizes[mesh.part]:
+                    raise ModelError(
+                        f"{where}: vertex {mesh.vertices.max()} of part {mesh.part!r}, "
+                        f"which has {sizes[mesh.part]}"
+                    )
+            for transform in table.transforms:
+                if transform.part != HEAD and transform.part not in sizes:
+                    raise ModelError(f"{where}: there is no part {transform.part!r}")
+
+
+def bind(parts: tuple[Part, ...], points: npt.ArrayLike, most: float) -> Int32:
+    """int32 (84,): for each feature point the nearest vertex at most `most` metres away, else -1."""
+    from scipy.spatial import cKDTree
+
+    places = np.asarray(points, dtype=np.float64)
+    tree = cKDTree(np.concatenate([part.vertices for part in parts]))
+    known = np.isfinite(places).all(axis=1)
+    bound = np.full(len(places), -1, dtype=np.int32)
+    distance, vertex = tree.query(places[known])
+    bound[known] = np.where(distance <= most, vertex, -1)
+    return bound
+
+
+def point_row(name: str) -> int:
+    """Row of a feature point in `FaceModel.points`; ModelError for an unknown name."""
+    if name not in row_of():
+        raise ModelError(f"there is no feature point {name!r}")
+    return row_of()[name]
+
+
+def _array(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
+    array = np.array(values, dtype=np.float32)
+    if array.ndim != 2 or array.shape[1] != shape[1] or (shape[0] >= 0 and len(array) != shape[0]):
+        wanted = f"({'V' if shape[0] < 0 else shape[0]}, {shape[1]})"
+        raise ModelError(f"{what} must have shape {wanted}, not {array.shape}")
+    if not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0, 0])
+        raise ModelError(f"{what}: number {row} is {array[row].tolist()}, which is not finite")
+    return array
+
+
+def _joined(arrays: list[Float32]) -> Float32:
+    joined = np.concatenate(arrays)
+    joined.flags.writeable = False
+    return joined
