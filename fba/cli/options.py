@@ -168,7 +168,7 @@ def read_input(
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a whole file, or standard output for "-"; an interrupted command leaves an old file whole."""
-    from fba.formats.atomic import atomic
+    from fba.atomic import atomic
 
     if str(path) == "-":
         sys.stdout.buffer.write(data)

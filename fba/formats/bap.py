@@ -8,9 +8,9 @@ from fba.animation import Animation, BodyTrack
 from fba.errors import FormatError
 from fba.formats.frames import read_frames
 from fba.formats.layout import bap_layout
-from fba.formats.source import Path
 from fba.formats.text import sniff_columns
 from fba.formats.writing import write_frames
+from fba.source import Path
 
 
 def sniff_bap(head: bytes, suffix: str) -> bool:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from fba.animation import Animation
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.formats.source import read_whole
+from fba.source import read_whole
 
 MAX_JOINTS = 4096
 MAX_RATE = 10_000

@@ -11,8 +11,8 @@ from fba.errors import UnsupportedError
 from fba.formats.epf_reading import read_epf
 from fba.formats.epf_tags import TAGS
 from fba.formats.epf_writing import write_epf
-from fba.formats.source import Path
 from fba.formats.text import UTF8_MARK, content, decoded
+from fba.source import Path
 
 __all__ = ["read_animation", "read_epf", "sniff_epf", "write_epf"]
 

@@ -28,9 +28,9 @@ from fba.codec.settings import (
 )
 from fba.errors import FbaWarning
 from fba.formats.epf_tags import BODY, FACE, PARTS, TAGS, Part
-from fba.formats.source import Path, open_source
 from fba.formats.text import Lines, content, decoded
 from fba.formats.values import FRAME_NUMBER_MAX
+from fba.source import Path, open_source
 
 SKIP_MAX = 1_000_000
 """Most frames that a plane may skip: 11 hours at 25 a second, and a guard against absurd numbers."""

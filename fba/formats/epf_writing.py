@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from fba.atomic import atomic
 from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT, PartSettings, PlaneSettings
 from fba.errors import FbaWarning, FormatError, UnsupportedError
-from fba.formats.atomic import atomic
 from fba.formats.epf_tags import BODY, PARTS, Part
-from fba.formats.source import Path
+from fba.source import Path
 
 
 def write_epf(path: Path, planes: Iterable[PlaneSettings]) -> None:

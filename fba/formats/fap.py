@@ -10,10 +10,10 @@ from fba.animation import Animation, FaceTrack
 from fba.errors import FormatError
 from fba.formats.frames import read_frames
 from fba.formats.layout import fap_layout
-from fba.formats.source import Path
 from fba.formats.text import sniff_columns
 from fba.formats.writing import write_frames
 from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
+from fba.source import Path
 
 _VISEME = len(VISEME_FIELDS)
 _FIELDS = _VISEME + len(EXPRESSION_FIELDS)

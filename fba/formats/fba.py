@@ -9,9 +9,9 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
+from fba.atomic import atomic
 from fba.errors import BitstreamError, OptionError, RangeError
-from fba.formats.atomic import atomic
-from fba.formats.source import Path, read_whole
+from fba.source import Path, read_whole
 
 if TYPE_CHECKING:
     from fba.codec import EncoderOptions

@@ -15,9 +15,9 @@ import numpy as np
 from fba.errors import FbaWarning, FormatError
 from fba.formats.layout import Layout
 from fba.formats.rates import parse_rate
-from fba.formats.source import Path, open_source
 from fba.formats.text import Header, Lines, content, is_header, is_mask, parse_header
 from fba.formats.values import Bool, Int32, Int64, Row, ValueParser
+from fba.source import Path, open_source
 
 BATCH_LINES = 2048
 BATCH_BYTES = 1 << 20

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError, OptionError, UnsupportedError
-from fba.formats.source import Path, read_head
+from fba.source import Path, read_head
 
 if TYPE_CHECKING:
     from fba.codec import StreamInfo
@@ -199,7 +199,7 @@ def probe(data_or_path: bytes | bytearray | memoryview | Path, *, bap_steps: str
     """
     from fba.codec import StreamInfo, probe_stream
     from fba.formats.fba import located
-    from fba.formats.source import read_whole
+    from fba.source import read_whole
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
         return probe_stream(data_or_path, bap_steps=bap_steps)

@@ -15,7 +15,7 @@ from typing import BinaryIO
 
 from fba.errors import FormatError
 from fba.formats.rates import parse_rate
-from fba.formats.source import Path
+from fba.source import Path
 
 BLOCK_BYTES = 1 << 20
 MAX_LINE_BYTES = 1 << 16
@@ -69,6 +69,8 @@ class Lines:
                     if block.startswith(mark):
                         raise self.error(f"is {encoding} text; save it as UTF-8 or ASCII")
                 block = block.removeprefix(UTF8_MARK)
+                if not block:  # nothing but the mark
+                    continue
             if b"\0" in block:
                 at = self.number + (rest + block[: block.index(b"\0")]).count(b"\n") + 1
                 raise self.error("holds NUL bytes: binary data or a damaged file, not text", line=at)

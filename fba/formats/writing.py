@@ -8,12 +8,12 @@ from itertools import accumulate
 import numpy as np
 
 from fba.animation import Animation
+from fba.atomic import atomic
 from fba.errors import FormatError
-from fba.formats.atomic import atomic
 from fba.formats.layout import Layout
 from fba.formats.rates import format_rate, parse_rate
-from fba.formats.source import Path
 from fba.formats.values import FRAME_NUMBER_MAX, Bool, Int32
+from fba.source import Path
 
 BATCH_FRAMES = 2048
 

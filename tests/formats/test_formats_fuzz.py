@@ -131,6 +131,7 @@ def test_cut_at_every_byte(tmp_path: Path) -> None:
     | st.text(max_size=300).map(str.encode)
     | st.lists(st.sampled_from(WORDS)).map(b" ".join)
 )
+@example(b"\xef\xbb\xbf")  # a byte order mark and nothing else
 def test_anything_at_all(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "a.fap"
     path.write_bytes(data)

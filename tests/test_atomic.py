@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from fba.atomic import atomic
 from fba.errors import DisplayError, FormatError
-from fba.formats.atomic import atomic
 
 
 def put(path: Path | str, data: bytes = b"new") -> None:
