@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from format_files import mask
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from fba.errors import FbaError, FbaWarning
