@@ -1,0 +1,106 @@
+"""What all importers share: opening files, reading their lines, numbers that must be numbers, limits."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from fba.errors import FormatError, ModelError
+from fba.source import open_source
+
+MAX_VERTICES = 2_000_000
+"""Most vertices of one file; a head worth animating has some ten thousand."""
+MAX_FACES = 4_000_000
+"""Most polygons of one file."""
+MAX_CORNERS = 16_000_000
+"""Most polygon corners of one file."""
+MAX_LINE = 1 << 20
+"""Longest line of a text file, in bytes."""
+MAX_TEXT = 1 << 26
+"""Largest file of feature points, weights or settings, in bytes."""
+
+
+def lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
+    """Line numbers from 1 and lines of a text file, without their ends, read one by one.
+
+    UTF-8, else Latin-1; UTF-16 as its byte order mark says is refused, as are zero bytes: such a file is
+    no text. Raises ModelError as `open_source` raises FormatError, and for a line beyond `MAX_LINE`.
+    """
+    name = os.fspath(path)
+    try:
+        file, size = open_source(name)
+    except FormatError as error:
+        raise ModelError(str(error)) from error
+    with file:
+        number, left = 0, size
+        while left > 0:
+            try:
+                raw = file.readline(min(MAX_LINE, left))
+            except OSError as error:
+                raise ModelError(f"{name}: cannot be read: {error.strerror or error}") from error
+            if not raw:
+                return
+            left -= len(raw)
+            number += 1
+            if len(raw) >= MAX_LINE:
+                raise ModelError(f"{name}:{number}: the line is longer than {MAX_LINE} bytes; is this a text file?")
+            if number == 1 and raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+                raise ModelError(f"{name}: is UTF-16 text; save it as UTF-8")
+            if b"\0" in raw:
+                raise ModelError(f"{name}:{number}: holds zero bytes; this is no text file")
+            try:
+                text = raw.decode("utf-8-sig" if number == 1 else "utf-8")
+            except UnicodeDecodeError:
+                text = raw.decode("latin-1")
+            yield number, text.rstrip("\r\n")
+
+
+def whole(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
+    """All bytes of a small file; ModelError where it cannot be read or is larger than `limit`."""
+    name = os.fspath(path)
+    try:
+        file, size = open_source(name)
+    except FormatError as error:
+        raise ModelError(str(error)) from error
+    with file:
+        if size > limit:
+            raise ModelError(f"{name}: is {size} bytes long, more than the {limit} expected of such a file")
+        try:
+            return file.read(size)
+        except OSError as error:
+            raise ModelError(f"{name}: cannot be read: {error.strerror or error}") from error
+
+
+def number(token: str, where: str, what: str) -> float:
+    """A finite number, else ModelError naming the place."""
+    try:
+        value = float(token)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) < 1e30:
+        raise ModelError(f"{where}: {what} must be a finite number, not {token[:40]!r}")
+    return value
+
+
+def whole_number(token: str, where: str, what: str) -> int:
+    """A whole number, else ModelError naming the place."""
+    try:
+        # int() takes underscores, other scripts' digits and numbers of any length
+        if len(token) <= 20 and token.isascii() and "_" not in token:
+            return int(token)
+    except ValueError:
+        pass
+    raise ModelError(f"{where}: {what} must be a whole number, not {token[:40]!r}")
+
+
+def beside(path: str | os.PathLike[str], name: str) -> Path | None:
+    """A file named in another one, looked for beside it only, or None.
+
+    Names come from files of strangers: folders in them are dropped, so none reaches outside.
+    """
+    plain = name.replace("\\", "/").rsplit("/", 1)[-1]
+    if not plain or plain in (".", "..") or "\0" in plain:
+        return None
+    candidate = Path(path).parent / plain
+    return candidate if candidate.is_file() else None
