@@ -1,0 +1,23 @@
+"""glTF 2.0 files: read into plain arrays, and written.
+
+read_gltf(path) -> Gltf          # meshes with morph targets, nodes with matrices, skins, animations
+surfaces(gltf) -> Surface ...    # what its scene shows, in one frame
+"""
+
+from fba.gltf.reader import read_gltf
+from fba.gltf.scene import Animation, Channel, Gltf, Material, Mesh, Node, Primitive, Skin
+from fba.gltf.surfaces import Surface, surfaces
+
+__all__ = [
+    "Animation",
+    "Channel",
+    "Gltf",
+    "Material",
+    "Mesh",
+    "Node",
+    "Primitive",
+    "Skin",
+    "Surface",
+    "read_gltf",
+    "surfaces",
+]

@@ -1,0 +1,187 @@
+"""A glTF file opened: its JSON, its buffers, and the files and data URIs that they come from."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import os
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+from urllib.parse import unquote
+
+from fba.errors import FbaError, ModelError
+from fba.gltf import glb
+from fba.gltf.values import Budget, Value
+from fba.source import Path, open_source
+
+MAX_JSON = 64 << 20
+"""Longest JSON text, in bytes; geometry belongs in buffers."""
+MAX_UNPACKED = 1 << 30
+"""Most bytes that the arrays and objects of one file may take together."""
+MAX_ITEMS = 1 << 18
+"""Most entries of one list of a document."""
+
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """root: the JSON. buffers: their bytes. folder: where other files may lie, None for nowhere."""
+
+    root: Value
+    buffers: tuple[memoryview, ...]
+    folder: str | None
+    budget: Budget = field(default_factory=lambda: Budget(MAX_UNPACKED))
+
+    def entries(self, key: str) -> list[Value]:
+        """Entries of one of the document's lists, e.g. "meshes"."""
+        return self.root.elements(MAX_ITEMS, key)
+
+    @cached_property
+    def _views(self) -> list[Value]:
+        return self.entries("bufferViews")
+
+    def view(self, reference: Value) -> tuple[memoryview, Value]:
+        """Bytes of the buffer view that `reference` names by its index, and its entry."""
+        entry = self._views[reference.index(len(self._views), "buffer view")]
+        buffer = self.buffers[entry.member("buffer").index(len(self.buffers), "buffer")]
+        given = entry.get("byteOffset")
+        offset = 0 if given is None else given.integer(0, glb.MAX_BYTES)
+        length = entry.member("byteLength").integer(1, glb.MAX_BYTES)
+        if offset + length > len(buffer):
+            raise entry.error(
+                f"reaches from byte {offset} to {offset + length}, but its buffer has {len(buffer)} bytes"
+            )
+        return buffer[offset : offset + length], entry
+
+    def resource(self, uri: Value, most: int = glb.MAX_BYTES) -> bytes:
+        """Content of a data URI, or of a file in the document's folder; ModelError beyond `most` bytes."""
+        if not isinstance(uri.data, str):
+            raise uri.error("expected a URI")
+        if uri.data.startswith("data:"):
+            return _inline(uri)
+        return _beside(uri, self.folder, most)
+
+
+def open_document(path: Path) -> Document:
+    """Open a .glb or .gltf file. Raises FormatError where it cannot be read, ModelError for its content."""
+    name = os.fspath(path)
+    data = _content(name, glb.MAX_BYTES)
+    return parse_document(data, os.path.basename(name) or name, os.path.dirname(os.path.abspath(name)))
+
+
+def parse_document(data: bytes, file: str, folder: str | None = None) -> Document:
+    """The same from bytes. file: name for messages. folder: where other files may lie, None for nowhere."""
+    binary: memoryview | None = None
+    text = memoryview(data)
+    if data[:4] == glb.MAGIC:
+        text, binary = glb.split(data, file)
+    elif data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
+        raise ModelError(f"{file}: is no glTF 2.0: neither a .glb container nor the JSON of a .gltf")
+    root = Value(parse_json(bytes(text), file), file)
+    asset = root.member("asset")
+    version = asset.member("version").text(100)
+    if not re.fullmatch(r"2\.\d+", version):
+        raise asset.member("version").error(f"is {version!r}; only glTF 2 is read")
+    opened = Document(root, (), folder)
+    buffers: list[memoryview] = []
+    for number, entry in enumerate(opened.entries("buffers")):
+        buffers.append(_buffer(opened, entry, binary if number == 0 else None))
+    return Document(root, tuple(buffers), folder, opened.budget)
+
+
+def parse_json(text: bytes, file: str) -> Any:
+    """The JSON object in UTF-8 text; ModelError where it is none, too long or nested too deeply."""
+    if len(text) > MAX_JSON:
+        raise ModelError(
+            f"{file}: {len(text)} bytes of JSON, more than the {MAX_JSON} that are read; "
+            "keep geometry and pictures in a .glb or in files of their own"
+        )
+    try:
+        data = json.loads(
+            text.decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_unique
+        )
+    except RecursionError:
+        raise ModelError(f"{file}: the JSON is nested too deeply; no glTF needs that") from None
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{file}: the JSON is not UTF-8 text (byte {error.start})") from None
+    except ValueError as error:  # syntax, and numbers of thousands of digits
+        raise ModelError(f"{file}: the JSON is damaged: {str(error)[:200]}") from None
+    if not isinstance(data, dict):
+        raise ModelError(f"{file}: the JSON must be an object, not {type(data).__name__}")
+    return data
+
+
+def _refuse_constant(word: str) -> float:
+    raise ValueError(f"{word} is no number")
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"an object names {ascii(twice)[:60]} twice")
+    return found
+
+
+def _buffer(document: Document, entry: Value, binary: memoryview | None) -> memoryview:
+    length = entry.member("byteLength").integer(1, glb.MAX_BYTES)
+    uri = entry.get("uri")
+    if uri is None:
+        if binary is None:
+            raise entry.error("has no uri, and there is no binary chunk that it could stand for")
+        held = binary
+    else:
+        if not (isinstance(uri.data, str) and uri.data.startswith("data:")):
+            document.budget.charge(length, entry)
+        held = memoryview(document.resource(uri, length))
+    if len(held) < length:
+        raise entry.error(f"should have {length} bytes, but only {len(held)} are there; was all copied?")
+    return held[:length]
+
+
+def _inline(uri: Value) -> bytes:
+    head, comma, body = uri.data.partition(",")
+    if not comma or not head.endswith(";base64"):
+        raise uri.error("is no data URI in base64 (data:...;base64,...)")
+    try:
+        return base64.b64decode(body, validate=True)
+    except (binascii.Error, ValueError) as error:
+        raise uri.error(f"the base64 of the data URI is damaged: {error}") from None
+
+
+def _beside(uri: Value, folder: str | None, most: int) -> bytes:
+    """At most `most` bytes of a file in the folder of the document, or below it."""
+    if folder is None:
+        raise uri.error("names another file, but the document comes from memory, not from a folder")
+    name = unquote(uri.text(4096))
+    if _SCHEME.match(name) or name.startswith(("/", "\\")) or os.path.isabs(name) or "\0" in name:
+        raise uri.error(f"{name!r} is refused: only files in the folder of the document are read")
+    base = os.path.realpath(folder)
+    try:
+        target = os.path.realpath(os.path.join(base, name))
+        inside = os.path.commonpath([base, target]) == base
+    except (OSError, ValueError):
+        inside = False
+    if not inside:
+        raise uri.error(f"{name!r} is refused: it lies outside the folder of the document")
+    try:
+        return _content(target, most, start=True)
+    except FbaError as error:
+        raise uri.error(str(error).replace(target, repr(name), 1)) from error
+
+
+def _content(path: str, most: int, *, start: bool = False) -> bytes:
+    """All bytes of a file of at most `most`; with `start`, the first `most` of a longer one."""
+    file, size = open_source(path)
+    with file:
+        if size > most and not start:
+            raise ModelError(f"{path}: is {size} bytes long, more than the {most} that are read")
+        try:
+            return file.read(min(size, most))
+        except OSError as error:
+            raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from error

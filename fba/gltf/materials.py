@@ -1,0 +1,80 @@
+"""Materials and pictures of a glTF file."""
+
+from __future__ import annotations
+
+import warnings
+
+from fba.errors import FbaWarning
+from fba.gltf.document import Document
+from fba.gltf.scene import Material
+from fba.gltf.values import Value, optional
+
+PICTURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+"""First bytes of the pictures that a glTF file may hold."""
+
+
+def media_type(data: bytes) -> str | None:
+    """ "image/png" or "image/jpeg" by the first bytes, or None for another content."""
+    return next((name for mark, name in PICTURES.items() if data.startswith(mark)), None)
+
+
+def read_materials(document: Document) -> tuple[Material, ...]:
+    """All materials, in order."""
+    pictures = _Pictures(document)
+    return tuple(_material(entry, n, pictures) for n, entry in enumerate(document.entries("materials")))
+
+
+def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
+    pictures.document.budget.charge(1024, entry)
+    name = entry.get("name")
+    look = entry.get("pbrMetallicRoughness")
+    colour, metallic, roughness, texture = (
+        optional(look, key)
+        for key in ("baseColorFactor", "metallicFactor", "roughnessFactor", "baseColorTexture")
+    )
+    red, green, blue, alpha = (1.0,) * 4 if colour is None else colour.numbers(4, 0.0, 1.0)
+    coordinates = optional(texture, "texCoord")
+    return Material(
+        name=f"material {number}" if name is None else name.text(),
+        colour=(red, green, blue, alpha),
+        metallic=1.0 if metallic is None else metallic.number(0.0, 1.0),
+        roughness=1.0 if roughness is None else roughness.number(0.0, 1.0),
+        texture=None if texture is None else pictures.texture(texture),
+        texcoord=0 if coordinates is None else coordinates.integer(0, 31),
+    )
+
+
+class _Pictures:
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self._textures = document.entries("textures")
+        self._images = document.entries("images")
+        self._known: dict[int, bytes | None] = {}
+
+    def texture(self, info: Value) -> bytes | None:
+        index = info.member("index").index(len(self._textures), "texture")
+        source = self._textures[index].get("source")
+        if source is None:  # a picture that only an extension knows how to read
+            self._warn(self._textures[index], "has no PNG or JPEG picture")
+            return None
+        number = source.index(len(self._images), "image")
+        if number not in self._known:
+            self._known[number] = self._image(self._images[number])
+        return self._known[number]
+
+    def _image(self, entry: Value) -> bytes | None:
+        uri = entry.get("uri")
+        if uri is None:
+            view, _ = self.document.view(entry.member("bufferView"))
+            self.document.budget.charge(len(view), entry)
+            data = bytes(view)
+        else:
+            data = self.document.resource(uri)
+            self.document.budget.charge(len(data), entry)
+        if media_type(data) is None:
+            self._warn(entry, "is neither PNG nor JPEG")
+            return None
+        return data
+
+    def _warn(self, entry: Value, text: str) -> None:
+        warnings.warn(f"{entry.file}: {entry.path}: {text}; left out", FbaWarning, stacklevel=3)

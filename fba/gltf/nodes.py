@@ -1,0 +1,145 @@
+"""The tree of nodes of a glTF file, with the transform of every node to its parent and to the world."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fba.gltf.document import MAX_ITEMS, Document
+from fba.gltf.scene import Float64, Mesh, Node, Skin
+from fba.gltf.values import Value
+
+
+def read_nodes(
+    document: Document, meshes: tuple[Mesh, ...], skins: tuple[Skin, ...]
+) -> tuple[tuple[Node, ...], tuple[int, ...]]:
+    """All nodes, and their indices with parents before children.
+
+    ModelError where a node has two parents or is its own ancestor, or a transform is unusable.
+    """
+    entries = document.entries("nodes")
+    for entry in entries:
+        document.budget.charge(2048, entry)
+    children = [_children(entry, len(entries)) for entry in entries]
+    parents = _parents(entries, children)
+    order = _order(entries, children, parents)
+    local = [_transform(entry) for entry in entries]
+    world: dict[int, Float64] = {}
+    for number in order:
+        parent = parents[number]
+        own = local[number][3]
+        with np.errstate(all="ignore"):
+            world[number] = own if parent is None else world[parent] @ own
+        if not np.isfinite(world[number]).all():
+            raise entries[number].error("the transform to the scene overflows")
+        own.flags.writeable = world[number].flags.writeable = False
+    nodes = []
+    for number, entry in enumerate(entries):
+        name, mesh, skin = entry.get("name"), entry.get("mesh"), entry.get("skin")
+        translation, rotation, scale, matrix = local[number]
+        node = Node(
+            name=f"node {number}" if name is None else name.text(),
+            parent=parents[number],
+            children=children[number],
+            translation=translation,
+            rotation=rotation,
+            scale=scale,
+            local=matrix,
+            world=world[number],
+            mesh=None if mesh is None else mesh.index(len(meshes), "mesh"),
+            skin=None if skin is None else skin.index(len(skins), "skin"),
+        )
+        _check_skin(entry, node, meshes, skins)
+        nodes.append(node)
+    return tuple(nodes), tuple(order)
+
+
+def read_roots(document: Document, nodes: tuple[Node, ...]) -> tuple[int, ...]:
+    """Nodes at the top of the default scene; of all nodes, where the file has no scenes."""
+    scenes = document.entries("scenes")
+    if not scenes:
+        return tuple(number for number, node in enumerate(nodes) if node.parent is None)
+    chosen = document.root.get("scene")
+    scene = scenes[0 if chosen is None else chosen.index(len(scenes), "scene")]
+    roots: dict[int, None] = {}
+    for value in scene.elements(MAX_ITEMS, "nodes"):
+        root = value.index(len(nodes), "node")
+        if nodes[root].parent is not None:
+            raise value.error(f"names node {root}, which is no root: it is a child of {nodes[root].parent}")
+        roots[root] = None
+    return tuple(roots)
+
+
+def _children(entry: Value, count: int) -> tuple[int, ...]:
+    return tuple(value.index(count, "node") for value in entry.elements(MAX_ITEMS, "children"))
+
+
+def _parents(entries: list[Value], children: list[tuple[int, ...]]) -> list[int | None]:
+    parents: list[int | None] = [None] * len(entries)
+    for number, below in enumerate(children):
+        for child in below:
+            if parents[child] is not None:
+                raise entries[number].error(
+                    f"names node {child} as a child, which is already a child of node {parents[child]}"
+                )
+            parents[child] = number
+    return parents
+
+
+def _order(entries: list[Value], children: list[tuple[int, ...]], parents: list[int | None]) -> list[int]:
+    order = [number for number, parent in enumerate(parents) if parent is None]
+    for number in order:  # grows while it is walked
+        order.extend(children[number])
+    if len(order) < len(entries):
+        reached = set(order)
+        lost = next(number for number in range(len(entries)) if number not in reached)
+        raise entries[lost].error("is its own ancestor: the tree of nodes runs in a circle")
+    return order
+
+
+def _transform(entry: Value) -> tuple[Float64 | None, Float64 | None, Float64 | None, Float64]:
+    matrix = entry.get("matrix")
+    if matrix is not None:
+        numbers = np.array(matrix.numbers(16)).reshape(4, 4).T.copy()  # column by column in the file
+        if not np.array_equal(numbers[3], (0, 0, 0, 1)):
+            raise matrix.error(f"its last row is {numbers[3].tolist()}, but must be 0 0 0 1")
+        return None, None, None, numbers
+    given = {key: entry.get(key) for key in ("translation", "rotation", "scale")}
+    shift = np.array((0.0, 0.0, 0.0) if given["translation"] is None else given["translation"].numbers(3))
+    size = np.array((1.0, 1.0, 1.0) if given["scale"] is None else given["scale"].numbers(3))
+    turn = np.array((0.0, 0.0, 0.0, 1.0))
+    if given["rotation"] is not None:
+        turn = np.array(given["rotation"].numbers(4, -1e9, 1e9))
+        length = float(np.linalg.norm(turn))
+        if length < 1e-6:
+            raise given["rotation"].error("is no rotation: a quaternion of length 0")
+        turn /= length
+    matrix_out = np.eye(4)
+    with np.errstate(all="ignore"):  # what overflows is found where the frames are multiplied
+        matrix_out[:3, :3] = rotation_matrix(turn) * size
+    matrix_out[:3, 3] = shift
+    for array in (shift, turn, size):
+        array.flags.writeable = False
+    return shift, turn, size, matrix_out
+
+
+def rotation_matrix(quaternion: Float64) -> Float64:
+    """float64 (3, 3) of a unit quaternion x, y, z, w."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _check_skin(entry: Value, node: Node, meshes: tuple[Mesh, ...], skins: tuple[Skin, ...]) -> None:
+    if node.mesh is None or node.skin is None:
+        return
+    count = len(skins[node.skin].joints)
+    for primitive in meshes[node.mesh].primitives:
+        if primitive.joints is not None and int(primitive.joints.max()) >= count:
+            raise entry.error(
+                f"mesh {node.mesh} names joint {primitive.joints.max()}, but skin {node.skin} has {count}"
+            )

@@ -1,0 +1,75 @@
+"""glTF 2.0 files read into plain arrays: `read_gltf`.
+
+Read are triangles with morph targets and skins, the tree of nodes, metallic-roughness materials with
+PNG or JPEG textures, and animations. Everything is checked before it is used or allocated.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+from fba.errors import FbaWarning
+from fba.gltf.accessors import Accessors
+from fba.gltf.animations import read_animations
+from fba.gltf.document import Document, open_document
+from fba.gltf.materials import read_materials
+from fba.gltf.meshes import read_meshes
+from fba.gltf.nodes import read_nodes, read_roots
+from fba.gltf.scene import Gltf
+from fba.gltf.skins import read_skins
+from fba.source import Path
+
+PACKED = {
+    "KHR_draco_mesh_compression": "Draco-compressed meshes",
+    "EXT_meshopt_compression": "meshopt-compressed buffers",
+    "KHR_meshopt_compression": "meshopt-compressed buffers",
+}
+"""Extensions that hide the geometry itself."""
+KNOWN = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "FBA_face"}
+"""Extensions that may be required: honoured, or without influence on shapes."""
+
+
+def read_gltf(path: Path) -> Gltf:
+    """Read a .glb or .gltf file.
+
+    Buffers and pictures may lie in the file, in data URIs, or in files of the same folder or below it.
+    Raises FormatError where the file cannot be opened, ModelError, which names the place in the
+    document, where it is damaged, larger than what is read, or needs an extension not known here. Points,
+    lines and pictures of other kinds are left out with an FbaWarning.
+    """
+    return read_document(open_document(path))
+
+
+def read_document(document: Document) -> Gltf:
+    """The same from an opened document."""
+    _check_extensions(document)
+    accessors = Accessors(document)
+    materials = read_materials(document)
+    meshes = read_meshes(document, accessors, len(materials))
+    skins = read_skins(document, accessors, len(document.entries("nodes")))
+    nodes, order = read_nodes(document, meshes, skins)
+    return Gltf(
+        file=document.root.file,
+        meshes=meshes,
+        nodes=nodes,
+        skins=skins,
+        materials=materials,
+        animations=read_animations(document, accessors, nodes, meshes),
+        roots=read_roots(document, nodes),
+        order=order,
+        document=document.root,
+    )
+
+
+def _check_extensions(document: Document) -> None:
+    for entry in document.root.elements(1000, "extensionsRequired"):
+        name = entry.text(200)
+        if name in PACKED:
+            raise entry.error(
+                f"{name}: {PACKED[name]} are not read; export or convert the file without compression"
+            )
+        if name not in KNOWN and not name.startswith("KHR_materials_"):
+            if "texture" in name:  # a kind of picture: the shape is read without it
+                warnings.warn(f"{entry.file}: {name} is not read", FbaWarning, stacklevel=3)
+                continue
+            raise entry.error(f"the file needs the extension {name}, which is not known here")

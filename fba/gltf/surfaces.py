@@ -1,0 +1,138 @@
+"""The surfaces that a glTF file shows, in the frame of its scene: transforms and skins applied."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.errors import FbaWarning
+from fba.gltf.document import MAX_UNPACKED
+from fba.gltf.scene import Float32, Float64, Gltf, Int32, Material, Node, Primitive
+from fba.gltf.values import Budget
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """One primitive of one node, at rest: morph targets at 0, joints where the file has them.
+
+    name: the node's, else the mesh's, made unique. positions: float32 (V, 3), in the scene's frame.
+    triangles: int32 (F, 3), counter-clockwise from outside. normals: float32 (V, 3) unit, or None.
+    texcoords: float32 (V, 2) of the set that the material uses, or None. colours: float32 (V, 4) or None.
+    morphs: float32 (V, 3) displacements at weight 1, in the scene's frame, by name. node: its index.
+    primitive: what it was made from (joints and weights of a skin).
+    """
+
+    name: str
+    positions: Float32
+    triangles: Int32
+    normals: Float32 | None
+    texcoords: Float32 | None
+    colours: Float32 | None
+    morphs: Mapping[str, Float32]
+    material: Material | None
+    node: int
+    primitive: Primitive
+
+
+def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
+    """Every surface of the default scene, parents first.
+
+    Raises ModelError where they take more than 1 GiB together, as a mesh shown a million times can.
+    """
+    budget = Budget(MAX_UNPACKED)
+    found: list[Surface] = []
+    taken: set[str] = set()
+    for number in gltf.shown():
+        node = gltf.nodes[number]
+        if node.mesh is None:
+            continue
+        mesh = gltf.meshes[node.mesh]
+        for primitive in mesh.primitives:
+            moving = sum(morph is not None for morph in primitive.morphs)
+            # float64 positions and normals on the way; where joints carry, a matrix each
+            each = 200 + 12 * moving + (0 if node.skin is None else 600)
+            budget.charge(len(primitive.positions) * each, gltf.document)
+            name = _unique(node.name if not node.name.startswith("node ") else mesh.name, taken)
+            found.append(_surface(gltf, node, number, primitive, mesh.morph_names, name))
+    return tuple(found)
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    chosen, count = name, 1
+    while chosen in taken:
+        count += 1
+        chosen = f"{name} {count}"
+    taken.add(chosen)
+    return chosen
+
+
+def _surface(
+    gltf: Gltf, node: Node, number: int, primitive: Primitive, names: tuple[str, ...], name: str
+) -> Surface:
+    matrices = _frames(gltf, node, primitive)
+    linear = matrices[..., :3, :3]
+    with np.errstate(all="ignore"):
+        positions = _moved(linear, primitive.positions) + matrices[..., :3, 3]
+        morphs = {
+            word: _moved(linear, morph).astype(np.float32)
+            for word, morph in zip(names, primitive.morphs, strict=True)
+            if morph is not None
+        }
+    if len(set(names)) < len(names):
+        warnings.warn(f"{gltf.file}: {name}: two morph targets have one name", FbaWarning, stacklevel=3)
+    placed = positions.astype(np.float32)
+    if not all(np.isfinite(array).all() for array in (placed, *morphs.values())):
+        raise gltf.document.error(f"nodes[{number}]: positions overflow in the frame of the scene")
+    mirrored = float(np.linalg.det(linear.reshape(-1, 3, 3)[0])) < 0
+    material = None if primitive.material is None else gltf.materials[primitive.material]
+    chosen = 0 if material is None else material.texcoord
+    return Surface(
+        name=name,
+        positions=placed,
+        triangles=primitive.triangles[:, ::-1].copy() if mirrored else primitive.triangles,
+        normals=None if primitive.normals is None else _turned(linear, primitive.normals),
+        texcoords=primitive.texcoords[chosen] if chosen < len(primitive.texcoords) else None,
+        colours=primitive.colours,
+        morphs=morphs,
+        material=material,
+        node=number,
+        primitive=primitive,
+    )
+
+
+def _frames(gltf: Gltf, node: Node, primitive: Primitive) -> Float64:
+    """float64 (4, 4), or (V, 4, 4) where joints carry the vertices: a skin replaces the node's place."""
+    if node.skin is None or primitive.joints is None or primitive.weights is None:
+        return node.world
+    skin = gltf.skins[node.skin]
+    with np.errstate(all="ignore"):
+        joints = np.stack([gltf.nodes[joint].world for joint in skin.joints]) @ skin.inverse_bind
+        total = primitive.weights.sum(axis=1, dtype=np.float64)
+        held = total > 0
+        matrices = np.zeros((len(primitive.positions), 4, 4))
+        for slot in range(primitive.joints.shape[1]):
+            share = primitive.weights[:, slot] / np.where(held, total, 1.0)
+            matrices += share[:, None, None] * joints[primitive.joints[:, slot]]
+    matrices[~held] = node.world  # carried by no joint
+    return matrices
+
+
+def _moved(linear: Float64, vectors: Float32) -> Float64:
+    result: Float64 = np.einsum("...ij,...j->...i", linear, vectors.astype(np.float64))
+    return result
+
+
+def _turned(linear: Float64, normals: Float32) -> Float32:
+    """Normals stand on surfaces: they turn by the inverse transposed, which copes with uneven scales."""
+    cofactors = np.stack(
+        [np.cross(linear[..., (i + 1) % 3, :], linear[..., (i + 2) % 3, :]) for i in range(3)], axis=-2
+    )
+    sign = np.sign(np.linalg.det(linear))[..., None]
+    with np.errstate(all="ignore"):
+        turned = _moved(cofactors, normals) * sign
+        length = np.linalg.norm(turned, axis=1, keepdims=True)
+        unit = np.where(length > 0, turned / length, (0.0, 0.0, 1.0))
+    return np.nan_to_num(unit).astype(np.float32)

@@ -1,0 +1,172 @@
+"""Checked access to a JSON document: every value knows the file and the place that it comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from fba.errors import ModelError
+
+MAX_TEXT = 1 << 16
+"""Longest text that is taken from a document, in characters; names and notes are far shorter."""
+
+
+class Budget:
+    """Bytes that reading one file may still take, so that small files cannot ask for all the memory."""
+
+    def __init__(self, left: int) -> None:
+        self._left = self._all = left
+
+    def charge(self, amount: int, where: Value) -> None:
+        """Take `amount` bytes, before they are allocated; ModelError where that is too much."""
+        self._left -= max(amount, 256)  # even an empty array or object takes this much
+        if self._left < 0:
+            raise where.error(
+                f"the file unpacks to more than {self._all >> 20} MiB, the most that is read; "
+                "is it damaged? If not, make it smaller"
+            )
+
+
+class Value:
+    """A JSON value. data: as `json.loads` gives it. file: name for messages. path: like "meshes[0].name".
+
+    Every method that does not find what it expects raises ModelError with file and path.
+    """
+
+    __slots__ = ("data", "file", "path")
+
+    def __init__(self, data: Any, file: str, path: str = "") -> None:
+        self.data = data
+        self.file = file
+        self.path = path
+
+    def error(self, text: str) -> ModelError:
+        """The error to raise about this value."""
+        return ModelError(f"{self.file}: {self.path}: {text}" if self.path else f"{self.file}: {text}")
+
+    def get(self, key: str) -> Value | None:
+        """Member of an object, or None where it has none of that name."""
+        members = self._object()
+        return self._member(key, members[key]) if key in members else None
+
+    def member(self, key: str) -> Value:
+        """Member of an object that must be there."""
+        found = self.get(key)
+        if found is None:
+            raise self.error(f"{key!r} is missing")
+        return found
+
+    def members(self) -> Iterator[tuple[str, Value]]:
+        """Names and members of an object."""
+        for key, data in self._object().items():
+            yield key, self._member(key, data)
+
+    def elements(self, most: int, key: str | None = None) -> list[Value]:
+        """Elements of this list, or of the list in member `key` (empty where there is none)."""
+        if key is not None:
+            found = self.get(key)
+            return [] if found is None else found.elements(most)
+        if not isinstance(self.data, list):
+            raise self._unexpected("a list")
+        if len(self.data) > most:
+            raise self.error(f"{len(self.data)} elements, more than the {most} that are read")
+        return [Value(data, self.file, f"{self.path}[{n}]") for n, data in enumerate(self.data)]
+
+    def integer(self, low: int, high: int) -> int:
+        """A whole number within low..high."""
+        data = self.data
+        if isinstance(data, float) and data.is_integer():
+            data = int(data)  # some writers say 3.0
+        if isinstance(data, bool) or not isinstance(data, int):
+            raise self._unexpected("a whole number")
+        if not low <= data <= high:
+            raise self.error(f"{_short(data)} is not within {low}..{high}")
+        return data
+
+    def index(self, count: int, what: str) -> int:
+        """A whole number below `count`, which names one of so many `what`."""
+        if not count:
+            raise self.error(f"names {what} {_short(self.data)}, but there are none")
+        return self.integer(0, count - 1)
+
+    def number(self, low: float = -math.inf, high: float = math.inf) -> float:
+        """A finite number within low..high."""
+        if isinstance(self.data, bool) or not isinstance(self.data, int | float):
+            raise self._unexpected("a number")
+        try:
+            number = float(self.data)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.error("the number is too large")
+        if not low <= number <= high:
+            raise self.error(f"{number:g} is not within {low:g}..{high:g}")
+        return number
+
+    def numbers(self, count: int, low: float = -math.inf, high: float = math.inf) -> tuple[float, ...]:
+        """A list of exactly `count` finite numbers."""
+        if not isinstance(self.data, list) or len(self.data) != count:
+            raise self._unexpected(f"a list of {count} numbers")
+        return tuple(element.number(low, high) for element in self.elements(count))
+
+    def text(self, most: int = MAX_TEXT) -> str:
+        """A text of at most `most` characters, all of which can be written as UTF-8."""
+        if not isinstance(self.data, str):
+            raise self._unexpected("a text")
+        if len(self.data) > most:
+            raise self.error(f"a text of {len(self.data)} characters, more than the {most} that are read")
+        try:
+            self.data.encode()
+        except UnicodeEncodeError:
+            raise self.error("the text holds half a character (a lone surrogate)") from None
+        return self.data
+
+    def choice(self, *words: str) -> str:
+        """One of the given words."""
+        if not isinstance(self.data, str) or self.data not in words:
+            raise self.error(f"{_short(self.data)} is none of {', '.join(words)}")
+        return self.data
+
+    def boolean(self) -> bool:
+        """true or false."""
+        if not isinstance(self.data, bool):
+            raise self._unexpected("true or false")
+        return self.data
+
+    def _object(self) -> dict[str, Any]:
+        if not isinstance(self.data, dict):
+            raise self._unexpected("an object")
+        return self.data
+
+    def _member(self, key: str, data: Any) -> Value:
+        simple = key.isidentifier() and len(key) <= 60
+        step = f".{key}" if simple else f"[{_short(key)}]"
+        return Value(data, self.file, f"{self.path}{step}".removeprefix("."))
+
+    def _unexpected(self, wanted: str) -> ModelError:
+        return self.error(f"expected {wanted}, found {_kind(self.data)}")
+
+
+def optional(value: Value | None, key: str) -> Value | None:
+    """Member `key` of a value that may be missing itself."""
+    return None if value is None else value.get(key)
+
+
+def _kind(data: Any) -> str:
+    if data is None:
+        return "null"
+    if isinstance(data, dict):
+        return "an object"
+    if isinstance(data, list):
+        return f"a list of {len(data)}"
+    return _short(data)
+
+
+def _short(data: Any) -> str:
+    if isinstance(data, dict | list):
+        return _kind(data)
+    if isinstance(data, int) and not isinstance(data, bool) and abs(data) >= 10**40:
+        return "a huge number"
+    text = ascii(data)
+    return text if len(text) <= 60 else text[:57] + "..."
