@@ -1,0 +1,63 @@
+"""Eyeballs: spheres with rings at the rims of pupil and iris, so that a pupil can grow."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+AROUND = 48
+SCLERA = np.array([0.80, 0.76, 0.72])
+"""Linear light."""
+LIMBUS = np.array([0.055, 0.050, 0.045])
+IRIS_INNER = np.array([0.30, 0.17, 0.065])
+IRIS_OUTER = np.array([0.115, 0.135, 0.105])
+PUPIL = np.array([0.004, 0.004, 0.004])
+VEIN = np.array([0.62, 0.30, 0.26])
+
+
+def eyeball(centre: Float64, radius: float, iris: float) -> tuple[Float64, Int64, Float64]:
+    """Vertices (V, 3), triangles and colours (V, 4) of an eyeball looking along +z.
+
+    The first vertex is the middle of the pupil. iris: its diameter; the pupil's is a third of it.
+    """
+    edge, pupil = np.arcsin(iris / 2 / radius), np.arcsin(iris / 6 / radius)
+    polar = np.concatenate([
+        np.linspace(0, pupil, 4)[1:], np.linspace(pupil, edge, 9)[1:], edge + np.array([0.02, 0.05, 0.09]),
+        np.linspace(edge + 0.09, np.pi, 14)[1:-1],
+    ])  # fmt: skip
+    turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+    ring = np.stack(np.broadcast_arrays(
+        np.sin(polar)[:, None] * np.cos(turn), np.sin(polar)[:, None] * np.sin(turn), np.cos(polar)[:, None],
+    ), axis=-1)  # fmt: skip
+    unit = np.concatenate([[[0, 0, 1.0]], ring.reshape(-1, 3), [[0, 0, -1.0]]])
+    triangles = _sphere(len(polar))
+    colours = np.concatenate([_colours(polar, turn, pupil, edge).reshape(-1, 4)])
+    first, last = np.append(PUPIL, 0.9)[None], np.append(VEIN * 0.6, 0.9)[None]
+    return centre + unit * radius, triangles, np.concatenate([first, colours, last])
+
+
+def _sphere(rings: int) -> Int64:
+    rows = 1 + np.arange(rings * AROUND).reshape(rings, AROUND)
+    after = np.roll(rows, -1, axis=1)
+    cap = np.stack([np.zeros(AROUND, dtype=int), rows[0], after[0]], axis=1)
+    quads = np.stack([rows[:-1], rows[1:], after[1:], rows[:-1], after[1:], after[:-1]], axis=-1)
+    end = np.stack([rows[-1], np.full(AROUND, rings * AROUND + 1), after[-1]], axis=1)
+    return np.concatenate([cap, quads.reshape(-1, 3), end])
+
+
+def _colours(polar: Float64, turn: Float64, pupil: float, edge: float) -> Float64:
+    random = np.random.default_rng(3)
+    depth = np.clip((polar - pupil) / (edge - pupil), 0, 1)[:, None, None]
+    streak = 0.75 + 0.5 * random.random((1, len(turn), 1)) * (1 - 0.5 * depth)
+    iris = (IRIS_INNER * (1 - depth) ** 1.6 + IRIS_OUTER * (1 - (1 - depth) ** 1.6)) * streak
+    iris = iris * (1 - depth**6) + LIMBUS * depth**6
+    away = np.clip((polar - edge) / 0.09, 0, 1)[:, None, None]
+    back = np.clip((polar - 0.9) / 0.9, 0, 1)[:, None, None]
+    white = LIMBUS * (1 - away) ** 2 + SCLERA * (1 - (1 - away) ** 2)
+    white = white * (1 - 0.5 * back) + VEIN * 0.5 * back
+    colour = np.where((polar <= pupil + 1e-9)[:, None, None], PUPIL, np.where(depth < 1, iris, white))
+    gloss = np.full((len(polar), len(turn), 1), 0.9)
+    return np.concatenate([np.broadcast_to(colour, (len(polar), len(turn), 3)), gloss], axis=2)

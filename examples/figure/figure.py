@@ -1,0 +1,93 @@
+"""The base figure: what `extract.py` kept of it, and the parts of its surface by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+FILE = Path(__file__).parent / "figure.npz"
+EYE_LEVEL = 1.65
+"""Metres above the ground: the origin of the figure's head while it is worked on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Quads over vertices, with texture coordinates for every corner.
+
+    vertices: (V, 3), metres. quads: (F, 4). corners: (F, 4), rows of uvs. uvs: (U, 2), origin at the
+    bottom left; the whole-number part of u is the texture: 0 head, 1 inside of mouth and eyes.
+    """
+
+    vertices: Float64
+    quads: Int64
+    corners: Int64
+    uvs: Float64
+
+    @cached_property
+    def tile(self) -> Int64:
+        """(F,) the texture that each quad is on."""
+        return np.floor(self.uvs[self.corners].mean(axis=1)[:, 0]).astype(np.int64)
+
+    @cached_property
+    def edges(self) -> Int64:
+        """(E, 2) the edges, each once, smaller vertex first."""
+        sides = np.stack([self.quads, np.roll(self.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+        return np.unique(np.sort(sides, axis=1), axis=0)
+
+    def kept(self, faces: npt.NDArray[np.bool_]) -> Surface:
+        """Only some faces, and the vertices that they use."""
+        used, quads = np.unique(self.quads[faces], return_inverse=True)
+        used_uvs, corners = np.unique(self.corners[faces], return_inverse=True)
+        return Surface(
+            self.vertices[used], quads.reshape(-1, 4), corners.reshape(-1, 4), self.uvs[used_uvs]
+        )
+
+    def rings(self, start: npt.NDArray[np.integer], most: int) -> Int64:
+        """(V,) edges from the start vertices, -1 beyond `most`."""
+        distance = np.full(len(self.vertices), -1, dtype=np.int64)
+        distance[start] = 0
+        front = np.zeros(len(self.vertices), dtype=bool)
+        front[start] = True
+        for ring in range(1, most + 1):
+            touched = np.zeros_like(front)
+            touched[self.edges[front[self.edges[:, 0]], 1]] = True
+            touched[self.edges[front[self.edges[:, 1]], 0]] = True
+            front = touched & (distance < 0)
+            distance[front] = ring
+        return distance
+
+    def vertices_of(self, faces: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """(V,) vertices that any of the faces uses."""
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.quads[faces]] = True
+        return used
+
+
+def load() -> tuple[Surface, dict[str, np.ndarray]]:
+    """The whole figure, 1.76 m tall, standing on y = 0, and its joints and weights."""
+    data = dict(np.load(FILE))
+    surface = Surface(
+        data.pop("vertices").astype(np.float64),
+        data.pop("quads").astype(np.int64),
+        data.pop("corners").astype(np.int64),
+        data.pop("uvs").astype(np.float64),
+    )
+    return surface, data
+
+
+def head() -> Surface:
+    """Head, neck and the top of the shoulders, with the inside of mouth and eye sockets.
+
+    Origin on the midline at `EYE_LEVEL`.
+    """
+    figure, _ = load()
+    high = (figure.vertices[figure.quads][:, :, 1] > EYE_LEVEL - 0.12).all(axis=1)
+    found = figure.kept((figure.tile == 0) | ((figure.tile == 1) & high))
+    return Surface(found.vertices - (0.0, EYE_LEVEL, 0.0), found.quads, found.corners, found.uvs)

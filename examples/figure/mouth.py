@@ -1,0 +1,220 @@
+"""Teeth with their gums, and the tongue."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+Mesh = tuple[Float64, Int64, Float64]
+
+ENAMEL = np.array([0.80, 0.735, 0.60])
+"""Linear light."""
+NECK = np.array([0.70, 0.57, 0.40])
+GUM = np.array([0.52, 0.165, 0.145])
+TONGUE = np.array([0.50, 0.170, 0.155])
+TONGUE_UNDER = np.array([0.34, 0.09, 0.09])
+HALF_WIDTH, DEPTH = 0.0272, 0.0400
+"""The outer edge of the upper arch of teeth: half an ellipse."""
+LOWER_INSET = 0.0004
+"""How much smaller the lower arch is: the incisors' edges touch."""
+AROUND, ROWS = 14, 6
+
+
+def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
+    """A row of teeth and its gum: vertices, triangles, colours (V, 4), and the vertices of feature points.
+
+    front: (3,), where the edges of the middle incisors meet those of the other jaw.
+    """
+    sign = 1.0 if upper else -1.0
+    inset = 0.0 if upper else LOWER_INSET
+    meshes: list[Mesh] = []
+    with (Path(__file__).parent / "teeth.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["jaw"] == ("upper" if upper else "lower")]
+    along = 0.00006
+    for row in rows:
+        width, height, thick = (float(row[name]) / 1000 for name in ("width", "height", "thick"))
+        place, turn = _arch(along + width / 2, inset)
+        tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
+        meshes += [_placed(tooth, place, turn, front, 1.0), _placed(tooth, place, turn, front, -1.0)]
+        along += width + 0.00008
+    found = {"edge": int(np.abs(meshes[0][0][:, 1] - front[1]).argmin())}
+    # Of all lowest vertices of the first incisor the one nearest to the midline and the front.
+    vertices = meshes[0][0]
+    lowest = np.abs(vertices[:, 1] - front[1]) < 0.0004
+    score = np.where(lowest, vertices[:, 2] - 2 * np.abs(vertices[:, 0]), -1.0)
+    found["edge"] = int(score.argmax())
+    gum = _gum(front, sign, inset, rows)
+    start = sum(len(mesh[0]) for mesh in meshes)
+    meshes.append(gum)
+    middle = np.flatnonzero(np.abs(gum[0][:, 0]) < 1e-9)
+    high = middle[(gum[0][middle, 1] * sign).argmax()]
+    found["root"] = start + int(high)
+    return _joined(meshes), found
+
+
+def _arch(length: float, inset: float) -> tuple[Float64, float]:
+    """Place (x, z below the front) at a length along the arch from its middle, and the turn about y."""
+    angle = np.linspace(0, np.pi / 2, 400)
+    x, z = (HALF_WIDTH - inset) * np.sin(angle), -DEPTH * (1 - np.cos(angle)) - inset
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
+    beyond = max(length - run[-1], 0.0)
+    px, pz = np.interp(length, run, x), np.interp(length, run, z) - beyond
+    tangent = np.interp(length, run, angle)
+    return np.array([px, 0.0, pz]), float(np.arctan2(DEPTH * np.sin(tangent), HALF_WIDTH * np.cos(tangent)))
+
+
+def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
+    """A crown: its outer face at z = 0, its edge at y = 0, the gum towards sign x y."""
+    turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+    square = 2.8
+    cx = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** (2 / square)
+    cz = np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** (2 / square)
+    rows = np.array([0.0, 0.05, 0.22, 0.55, 0.85, 1.12])  # edge to below the gum
+    # Narrow at the neck, widest near the edge; the edge of a front tooth is thin.
+    wide = np.interp(rows, [0, 0.05, 0.25, 0.7, 1.12], [0.86, 0.95, 1.0, 0.93, 0.76])
+    deep = np.interp(rows, [0, 0.05, 0.3, 0.8, 1.12], [flat * 0.80, flat, 0.35 + 0.6 * flat, 0.92, 1.0])
+    bulge = np.interp(rows, [0, 0.3, 0.8, 1.12], [0.0, 0.00050, 0.00075, -0.0002])
+    vertices = np.zeros((len(rows), AROUND, 3))
+    vertices[..., 0] = cx * width / 2 * wide[:, None]
+    vertices[..., 1] = rows[:, None] * height * sign
+    vertices[..., 2] = (cz - 1) * thick / 2 * deep[:, None] + bulge[:, None]
+    if place == 3:  # a canine has a point
+        vertices[0, :, 1] += sign * 0.0011 * np.abs(cx)
+        vertices[1, :, 1] += sign * 0.0007 * np.abs(cx)
+    corner = 0.0001 * np.abs(cx) ** 6 * sign
+    vertices[0, :, 1] += corner
+    cap = vertices[0].mean(axis=0) * np.array([1, 0, 1]) + np.array([0, sign * (0.0 if flat < 0.5 else 0.0006), 0])
+    flat_vertices = np.concatenate([vertices.reshape(-1, 3), cap[None]])
+    triangles = _tube(len(rows), AROUND, sign)
+    last = len(flat_vertices) - 1
+    ring = np.arange(AROUND)
+    lid = np.stack([np.full(AROUND, last), ring, np.roll(ring, -1)], axis=1)
+    lid = lid[:, ::-1] if sign < 0 else lid
+    share = np.clip(rows / 1.0, 0, 1) ** 2
+    behind = 1 - 0.045 * (place - 1) ** 1.35  # those further back lie in the shade of the cheeks
+    colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * max(behind, 0.3)
+    colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1]])
+    # Between the teeth it is darker.
+    side = np.concatenate([np.tile(np.abs(cx) ** 8, len(rows)), [0.0]])
+    colours = colours * (1 - 0.45 * side)[:, None]
+    return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
+
+
+def _tube(rows: int, around: int, sign: float) -> Int64:
+    grid = np.arange(rows * around).reshape(rows, around)
+    after = np.roll(grid, -1, axis=1)
+    quads = np.stack([grid[:-1], grid[1:], after[1:], grid[:-1], after[1:], after[:-1]], axis=-1)
+    triangles = quads.reshape(-1, 3)
+    return triangles if sign > 0 else triangles[:, ::-1].copy()
+
+
+def _placed(tooth: Mesh, place: Float64, turn: float, front: Float64, side: float) -> Mesh:
+    vertices, triangles, colours = tooth
+    cos, sin = np.cos(turn), np.sin(turn)
+    x = vertices[:, 0] * cos + vertices[:, 2] * sin
+    z = -vertices[:, 0] * sin + vertices[:, 2] * cos
+    moved = np.stack([x, vertices[:, 1], z], axis=1) + place
+    if side < 0:
+        moved = moved * (-1.0, 1.0, 1.0)
+        triangles = triangles[:, ::-1].copy()
+    return moved + front, triangles, colours
+
+
+def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) -> Mesh:
+    """The gum: a band along the arch, scalloped round the necks of the teeth."""
+    widths = np.array([float(row["width"]) for row in rows]) / 1000
+    heights = np.array([float(row["height"]) for row in rows]) / 1000
+    ends = np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
+    half = np.linspace(0, ends[-1] - 0.0005, 43)
+    low = np.zeros(len(half))
+    for k, length in enumerate(half):
+        tooth = min(int(np.searchsorted(ends, length, side="right")) - 1, len(widths) - 1)
+        across = (length - ends[tooth]) / widths[tooth] * 2 - 1
+        low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
+    places = [_arch(length, inset) for length in half]
+    profile = [  # out of the arch (mm), above the scallop (mm)
+        (-3.0, -0.6), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), (0.9, 4.0), (0.2, 7.5), (-2.0, 9.5),
+        (-6.0, 9.0), (-9.5, 5.0), (-9.8, 0.5), (-8.0, -0.6),
+    ]  # fmt: skip
+    band = np.zeros((len(profile), len(half), 3))
+    for k, (place, turn) in enumerate(places):
+        outward = np.array([np.sin(turn), 0.0, np.cos(turn)])
+        for row, (out, up) in enumerate(profile):
+            reach = out / 1000 if out > -4 else out / 1000 * (1 + 0.15 * k / len(half))
+            band[row, k] = place + outward * reach + np.array([0, sign * (low[k] + up / 1000), 0])
+    mirrored = band[:, :0:-1] * (-1.0, 1.0, 1.0)
+    band = np.concatenate([mirrored, band], axis=1)
+    columns = band.shape[1]
+    grid = np.arange(len(profile) * columns).reshape(len(profile), columns)
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    triangles = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    if sign < 0:
+        triangles = triangles[:, ::-1].copy()
+    shade = 1 - 0.55 * np.abs(np.linspace(-1, 1, columns)) ** 1.5
+    colours = np.tile(GUM, (len(profile), columns, 1)) * shade[None, :, None]
+    colours[4:] *= np.linspace(0.95, 0.45, len(profile) - 4)[:, None, None]
+    flat = np.concatenate([colours, np.full((*colours.shape[:2], 1), 0.6)], axis=2)
+    return band.reshape(-1, 3) + front, triangles, flat.reshape(-1, 4)
+
+
+def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
+    """A tongue lying flat, its tip (3,) at the teeth; and the vertices of its feature points."""
+    # Down the tongue from its root to its tip, mm: z, top, half width, height.
+    spine = np.array([
+        (-68, -12, 17, 17), (-58, -4, 20, 21), (-48, 0.5, 22, 21), (-38, 2.0, 22.5, 19), (-28, 2.2, 21.5, 16),
+        (-19, 1.9, 19, 12.5), (-11, 1.4, 15.5, 9.0), (-5, 0.9, 11.5, 6.2), (-2, 0.5, 8.2, 4.4), (-0.5, 0.25, 4.6, 2.8),
+    ])  # fmt: skip
+    from scipy.interpolate import PchipInterpolator
+
+    rings, around = 25, 28
+    t = np.linspace(0, 1, rings)
+    knots = np.linspace(0, 1, len(spine))
+    z, top, half, tall = PchipInterpolator(knots, spine / 1000)(t).T
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    square = 2.6
+    cx = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** (2 / square)
+    cy = np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** (2 / square)
+    vertices = np.zeros((rings, around, 3))
+    vertices[..., 0] = half[:, None] * cx
+    vertices[..., 1] = top[:, None] + tall[:, None] * (cy - 1) / 2
+    groove = 0.0011 * np.exp(-((vertices[..., 0] / 0.0022) ** 2)) * (cy > 0.3) * np.clip((t[:, None]) * 3, 0, 1)
+    vertices[..., 1] -= groove * np.clip((1 - t[:, None]) * 6, 0, 1)
+    vertices[..., 2] = z[:, None]
+    flat = np.concatenate([vertices.reshape(-1, 3), [[0, top[0] - tall[0] / 2, z[0]]], [[0, 0.0, 0.0]]])
+    triangles = _tube(rings, around, 1.0)[:, ::-1].copy()
+    ring = np.arange(around)
+    root, point = rings * around, rings * around + 1
+    after = np.roll(ring, -1)
+    last = (rings - 1) * around
+    caps = [
+        np.stack([np.full(around, root), after, ring], axis=1),
+        np.stack([np.full(around, point), last + ring, last + after], axis=1),
+    ]
+    under = np.clip(0.5 - cy, 0, 1)[None, :, None]
+    colours = TONGUE * (1 - under) + TONGUE_UNDER * under
+    colours = colours * (0.30 + 0.70 * t[:, None, None] ** 0.8)
+    random = np.random.default_rng(5)
+    colours = colours * (1 + 0.12 * (random.random((rings, around, 1)) - 0.5))
+    flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
+    body = int(np.abs(t - 0.52).argmin())
+    upward = around // 4
+    found = {"6.1": point, "6.2": body * around + upward, "6.3": body * around + around // 28 * 0, "6.4": 0}
+    side = int(np.abs(t - 0.60).argmin())
+    found["6.3"], found["6.4"] = side * around, side * around + around // 2
+    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.7)])
+    return mesh, found
+
+
+def _joined(meshes: list[Mesh]) -> Mesh:
+    starts = np.cumsum([0, *(len(mesh[0]) for mesh in meshes)])
+    triangles = [mesh[1] + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
+    return (
+        np.concatenate([mesh[0] for mesh in meshes]),
+        np.concatenate(triangles),
+        np.concatenate([mesh[2] for mesh in meshes]),
+    )

@@ -1,0 +1,255 @@
+"""The base head made into the standard's neutral face, with an adult's proportions.
+
+The base has small eyes that look a little down and a narrow mouth. Published norms of adults ask for
+eyes some 29 mm wide and 34 mm apart and a mouth of 51 mm; the standard asks for lids that touch the rim
+of the iris above and below, and lips that touch along a level line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from figure import Surface
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+EYE_CENTRE = np.array([0.0312, -0.0018, 0.0620])
+"""Centre of the left eyeball in the frame of `figure.head`."""
+EYE_RADIUS = 0.0123
+IRIS = 0.0108
+"""Diameter of the iris and height of the eye opening: IRISD0."""
+LID_GAP = 0.00022
+"""Between the inner edge of a lid and the eyeball."""
+INNER_CORNER, OUTER_CORNER = np.array([0.0199, -0.0041]), np.array([0.0441, -0.0012])
+"""Corners of the base's left eye opening, x and y."""
+MARGIN_RING = 2
+"""Inner edge of the lid margin: its ring about the border of the eye socket."""
+MOUTH = np.array([0.0, -0.0708])
+"""Where the lips meet."""
+CONTACT_RING = 1
+"""Where the lips touch: its ring about the border of the inside of the mouth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Where vertices are on the head, by rings of edges.
+
+    eye: (V,) rings about the border of the left or right eye socket, positive on the outside, negative
+    within, 99 far away. mouth: the same about the border of the inside of the mouth. lip: (V,) 1 on the
+    upper lip and above it, -1 on the lower lip and below, 0 elsewhere and between both.
+    """
+
+    eye: Int64
+    mouth: Int64
+    lip: Int64
+
+
+FAR = 99
+
+
+def marks(head: Surface) -> Marks:
+    """Rings about eyes and mouth of the base head."""
+    inside, outside = head.vertices_of(head.tile == 1), head.vertices_of(head.tile == 0)
+    border = inside & outside
+    low = head.vertices[:, 1] < -0.03
+    eye, mouth = (_signed(head, border & chosen, inside & ~border) for chosen in (~low, low))
+    return Marks(eye, mouth, _lips(head, mouth))
+
+
+def _signed(head: Surface, border: npt.NDArray[np.bool_], inside: npt.NDArray[np.bool_]) -> Int64:
+    rings = head.rings(np.flatnonzero(border), 16)
+    return np.where(rings < 0, FAR, np.where(inside, -rings, rings))
+
+
+def sculpted(head: Surface, where: Marks) -> Surface:
+    """The base head with its eyes and mouth in proportion; symmetric as the base is."""
+    vertices = head.vertices.copy()
+    vertices = _wider_eyes(vertices, where)
+    for _ in range(4):  # laying the lids on the eyeballs moves them a little each time
+        vertices = _open_lids(vertices, where)
+    vertices = _mouth(vertices, where)
+    vertices = _fuller_lips(vertices, where)
+    vertices = _nose(vertices)
+    return Surface(vertices, head.quads, head.corners, head.uvs)
+
+
+def _both_sides(vertices: Float64) -> tuple[Float64, Float64]:
+    """The head folded onto its left side, and the sign of each vertex."""
+    sign = np.where(vertices[:, 0] < 0, -1.0, 1.0)
+    return vertices * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1), sign
+
+
+def smooth(value: Float64) -> Float64:
+    """0 below 0, 1 above 1, smooth between."""
+    t = np.clip(value, 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def _wider_eyes(vertices: Float64, where: Marks) -> Float64:
+    left, sign = _both_sides(vertices)
+    near = (where.eye != FAR) & (left[:, 2] > 0.045)
+    offset = left - EYE_CENTRE
+    away = np.hypot(offset[:, 0] / 1.3, offset[:, 1])
+    weight = np.where(near, 1 - smooth((away - 0.010) / 0.014), 0.0)
+    stretch = np.where(offset[:, 0] < 0, 0.25, 0.10)
+    ball = where.eye < 0  # the socket stays about the eyeball
+    # The nose bridge between the eyes must not be crossed.
+    left[:, 0] += offset[:, 0] * stretch * weight * np.where(ball, 0.5, 1.0)
+    left[:, 0] = np.where(np.abs(vertices[:, 0]) < 1e-6, 0.0, left[:, 0])
+    left[:, 0] *= sign
+    return left
+
+
+def eye_corners() -> tuple[Float64, Float64]:
+    """Inner and outer corner of the left eye after `_wider_eyes`, x and y."""
+    inner, outer = INNER_CORNER.copy(), OUTER_CORNER.copy()
+    inner[0] += (inner[0] - EYE_CENTRE[0]) * 0.25
+    outer[0] += (outer[0] - EYE_CENTRE[0]) * 0.10
+    return inner, outer
+
+
+def column(x: Float64) -> Float64:
+    """How far each x is from the corners of the left eye: 0 there, 1 in the middle of the opening."""
+    inner, outer = eye_corners()
+    t = np.clip((x - inner[0]) / (outer[0] - inner[0]), 0, 1)
+    middle = (EYE_CENTRE[0] - inner[0]) / (outer[0] - inner[0])
+    warped = np.where(t < middle, t / middle * 0.5, 0.5 + (t - middle) / (1 - middle) * 0.5)
+    return np.sin(np.pi * warped) ** 0.85
+
+
+def upper_side(x: Float64, y: Float64) -> npt.NDArray[np.bool_]:
+    """Whether places near the left eye are above the line through its corners."""
+    inner, outer = eye_corners()
+    return y > np.interp(x, [inner[0], outer[0]], [inner[1], outer[1]])
+
+
+def _open_lids(vertices: Float64, where: Marks) -> Float64:
+    left, sign = _both_sides(vertices)
+    ring = where.eye
+    region = (ring != FAR) & (left[:, 2] > 0.045)
+    upper = upper_side(left[:, 0], left[:, 1])
+    margin = region & (ring == MARGIN_RING)
+    wanted = {True: EYE_CENTRE[1] + IRIS / 2, False: EYE_CENTRE[1] - IRIS / 2}
+    for side in (True, False):
+        mine = region & (upper == side)
+        edge = margin & (upper == side)
+        # One vertex of each margin stands over the middle of the pupil.
+        nearest = left[edge, 0][np.abs(left[edge, 0] - EYE_CENTRE[0]).argmin()]
+        bump = np.exp(-(((left[:, 0] - nearest) / 0.005) ** 2)) * (1 - smooth((np.abs(ring) - 3) / 5.0))
+        left[:, 0] += (EYE_CENTRE[0] - nearest) * bump * mine
+        order = np.argsort(left[edge, 0])
+        x, y = left[edge, 0][order], left[edge, 1][order]
+        move = wanted[side] - np.interp(EYE_CENTRE[0], x, y)
+        fade = np.where(ring >= 0, 1 - smooth((ring - 4) / 8.0), 1 - smooth(-ring / 3.0))
+        shift = move * column(left[:, 0]) * fade * mine
+        left[:, 1] += shift
+    left = _onto_eyeball(left, ring, region)
+    return left * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1)
+
+
+def _onto_eyeball(left: Float64, ring: Int64, region: npt.NDArray[np.bool_]) -> Float64:
+    """Lids laid on the eyeball, with what surrounds them; the socket kept clear of it."""
+    offset = left - EYE_CENTRE
+    away = np.linalg.norm(offset, axis=1)
+    edge = region & (ring == MARGIN_RING)
+    # Where the margin has to go, looked up by direction for the rings outside it.
+    angle = np.arctan2(offset[:, 1], offset[:, 0])
+    order = np.argsort(angle[edge])
+    towards = (EYE_RADIUS + LID_GAP - away[edge])[order]
+    caruncle = left[edge, 0][order] < EYE_CENTRE[0] - EYE_RADIUS * 0.86
+    towards = np.where(caruncle, np.clip(towards, -0.001, None), towards)
+    sorted_angles = angle[edge][order]
+    pull = np.interp(angle, sorted_angles, towards, period=2 * np.pi)
+    fade = 1 - smooth((ring - 3) / 6.0)
+    outside = region & (ring >= 1)
+    moved = left + offset / away[:, None] * (pull * fade * outside)[:, None]
+    within = region & (ring <= 1)
+    least = EYE_RADIUS + np.where(ring >= 0, LID_GAP + 0.0001, 0.0009)
+    offset = moved - EYE_CENTRE
+    away = np.linalg.norm(offset, axis=1)
+    keep_out = np.where(within, np.maximum(away, least), away)
+    return EYE_CENTRE + offset / away[:, None] * keep_out[:, None]
+
+
+def laid_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
+    """Lid margins and sockets of the refined head, clear of the eyeballs again."""
+    left, sign = _both_sides(vertices)
+    offset = left - EYE_CENTRE
+    away = np.linalg.norm(offset, axis=1)
+    region = (ring != FAR) & (left[:, 2] > 0.045)
+    least = np.where(ring > 1.0, EYE_RADIUS + LID_GAP, EYE_RADIUS + LID_GAP + 0.0001)
+    least = np.where(ring < 0, EYE_RADIUS + 0.0009, least)
+    out = np.where(region & (ring <= 8), np.maximum(away, least), away)
+    moved = EYE_CENTRE + offset / away[:, None] * out[:, None]
+    return moved * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1)
+
+
+def _mouth(vertices: Float64, where: Marks) -> Float64:
+    """A wider mouth, whose lips touch along a level line."""
+    ring, lip = where.mouth, where.lip
+    away = np.hypot(vertices[:, 0] / 1.25, vertices[:, 1] - MOUTH[1])
+    weight = np.where(vertices[:, 2] > 0.02, 1 - smooth((away - 0.016) / 0.022), 0.0)
+    vertices = vertices.copy()
+    vertices[:, 0] *= 1 + 0.11 * weight
+    contact = ring == CONTACT_RING
+    lines = {}
+    for side in (1, -1):
+        mine = np.flatnonzero(contact & (lip == side))
+        lines[side] = vertices[mine[np.argsort(vertices[mine, 0])]]
+    x = vertices[:, 0]
+    corner = vertices[contact][np.abs(vertices[contact, 0]).argmax()]
+    for side, line in lines.items():  # both lines end in the corners
+        ends = np.array([corner * (-1.0, 1.0, 1.0), corner]) if corner[0] > 0 else np.array([corner, corner * (-1.0, 1.0, 1.0)])
+        lines[side] = np.concatenate([ends[:1], line, ends[1:]])
+    y = {side: np.interp(x, line[:, 0], line[:, 1]) for side, line in lines.items()}
+    z = {side: np.interp(x, line[:, 0], line[:, 2]) for side, line in lines.items()}
+    fade = np.where(ring == FAR, 0.0, 1 - smooth((np.abs(ring - CONTACT_RING) - 1) / 9.0))
+    # Between both lips, in the corners, either line serves: they meet there.
+    label = np.where((lip == 0) & (ring != FAR), 1, lip)
+    for side in (1, -1):
+        mine = label == side
+        vertices[mine, 1] += ((MOUTH[1] - y[side]) * fade)[mine]
+        vertices[mine, 2] += (((z[1] + z[-1]) / 2 - z[side]) * fade)[mine]
+    return vertices
+
+
+def _fuller_lips(vertices: Float64, where: Marks) -> Float64:
+    """The red of the lips a little higher and rounder; where they meet stays."""
+    out = np.where(where.mouth == FAR, 0, np.maximum(where.mouth - CONTACT_RING, 0)).astype(np.float64)
+    fade = np.where(out > 0, np.exp(-(((out - 3.0) / 2.2) ** 2)), 0.0)
+    middle = 1 - smooth((np.abs(vertices[:, 0]) - 0.006) / 0.018)
+    vertices = vertices.copy()
+    lift = np.where(where.lip > 0, 0.0011, -0.0013)
+    vertices[:, 1] += np.where(where.lip != 0, lift, 0.0) * fade * (0.25 + 0.75 * middle)
+    vertices[:, 2] += 0.0008 * fade * middle
+    return vertices
+
+
+def _nose(vertices: Float64) -> Float64:
+    """The tip a little lower, so that the nostrils look down and not ahead."""
+    tip = np.array([0.0, -0.0385, 0.106])
+    away = np.linalg.norm((vertices - tip) * (0.75, 1.0, 0.8), axis=1)
+    weight = 1 - smooth((away - 0.004) / 0.020)
+    vertices = vertices.copy()
+    vertices[:, 1] -= 0.0024 * weight
+    return vertices
+
+
+def _lips(head: Surface, ring: Int64) -> Int64:
+    """(V,) 1 on the upper lip and above, -1 on the lower, 0 elsewhere, from the texture's two halves."""
+    inside = head.tile == 1
+    heights = head.uvs[head.corners][:, :, 1].mean(axis=1)
+    faces = inside & (head.vertices[head.quads][:, :, 1] < -0.03).all(axis=1)
+    votes = np.zeros(len(head.vertices))
+    np.add.at(votes, head.quads[faces].ravel(), np.repeat(np.where(heights[faces] > 0.8065, 1.0, -1.0), 4))
+    label = np.where((ring != FAR) & (ring <= 0), np.sign(votes), 0.0)
+    for k in range(1, int(ring[ring != FAR].max()) + 1):
+        total = np.zeros(len(label))
+        for a, b in (head.edges.T, head.edges[:, ::-1].T):
+            step = (ring[a] == k) & (ring[b] == k - 1)
+            np.add.at(total, a[step], label[b[step]])
+        label = np.where(ring == k, np.sign(total), label)
+    return label.astype(np.int64)
