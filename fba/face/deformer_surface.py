@@ -1,0 +1,156 @@
+"""Which triangles and vertices share a normal, prepared for the compiled loops."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.model import FaceModel
+from fba.parameters import faps
+
+SEAM_COSINE = 0.7
+"""Coincident vertices share a normal where their neutral ones differ by less than about 45 degrees: along
+the seam of a texture they may well differ by some, where each side was shaded for itself."""
+SEAM_MOTION = 0.01
+"""... and where what the FAPs do to them differs by less than this share. Lips that touch move apart."""
+
+
+HEADS_MAX = 16
+"""Different surfaces that may meet in one place; a mesh with more there is damaged."""
+
+
+class Surface(NamedTuple):
+    """Triangles whose normals change, and where their sums go.
+
+    A sum belongs to one vertex, or to several along a seam. The first of a part, [sums_start[p],
+    sums_start[p + 1]), are added up anew from the triangles [triangles_start[p], triangles_start[p + 1]);
+    then come those that no FaceDefMesh reaches, which keep their neutral normal; the last is for the
+    corners that belong to such.
+    """
+
+    triangles: npt.NDArray[np.uint32]
+    """(F, 3) vertices."""
+    corners: npt.NDArray[np.uint32]
+    """(F, 3) the sums that they add to."""
+    triangles_start: npt.NDArray[np.int64]
+    sums_start: npt.NDArray[np.int64]
+    sum_of: npt.NDArray[np.uint32]
+    """(V,) the sum that a vertex takes its normal from."""
+    sums: npt.NDArray[np.float32]
+    """(C + 1, 3), scratch but for the neutral normals in it."""
+    neutral: npt.NDArray[np.float32]
+    """(V, 3) unit normals of the neutral face, made in the same way."""
+    itself: npt.NDArray[np.uint32]
+    """(V,) 0, 1, 2, ...: the row of `neutral` that a vertex takes its normal from."""
+
+
+def surface(model: FaceModel, moved: npt.NDArray[np.bool_]) -> Surface:
+    """moved: (V,), the vertices that some FaceDefMesh moves."""
+    group = _seams(model)
+    triangles = model.triangles
+    corners = group[triangles]
+    count = int(group.max()) + 1 if len(group) else 0
+    summed = _sums(model.vertices.astype(np.float64), triangles, corners, count)
+    length = np.linalg.norm(summed, axis=1, keepdims=True)
+    shaded = length[group, 0] > 0
+    unit = summed / np.where(length > 0, length, 1)
+    neutral = np.where(shaded[:, None], unit[group], model.normals).astype(np.float32)
+
+    changing = np.zeros(count, dtype=bool)
+    changing[corners[moved[triangles].any(axis=1)]] = True
+    needed = changing[corners].any(axis=1)
+    part_of_group = np.zeros(count, dtype=np.int64)
+    part_of_group[group] = np.repeat(np.arange(len(model.parts)), [len(p.vertices) for p in model.parts])
+    # Sums in the order of the parts, as the vertices are: the groups are numbered by their first vertex.
+    order = np.argsort(~changing, kind="stable")
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    sums = np.zeros((count + 1, 3), dtype=np.float32)
+    sums[place[group]] = neutral
+    used = np.where(changing[corners], place[corners], count)[needed]
+    parts = np.arange(len(model.parts) + 1)
+    triangle_part = part_of_group[corners[needed][:, 0]]
+    return Surface(
+        triangles=triangles[needed].astype(np.uint32),
+        corners=used.astype(np.uint32),
+        triangles_start=np.searchsorted(triangle_part, parts).astype(np.int64),
+        sums_start=np.searchsorted(part_of_group[order[: int(changing.sum())]], parts).astype(np.int64),
+        sum_of=place[group].astype(np.uint32),
+        sums=sums,
+        neutral=neutral,
+        itself=np.arange(len(neutral), dtype=np.uint32),
+    )
+
+
+def _sums(
+    vertices: npt.NDArray[np.float64],
+    triangles: npt.NDArray[np.int32],
+    corners: npt.NDArray[np.int64],
+    count: int,
+) -> npt.NDArray[np.float64]:
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    across = np.cross(b - a, c - a)
+    summed = np.empty((count, 3))
+    for axis in range(3):
+        summed[:, axis] = np.bincount(corners.ravel(), np.repeat(across[:, axis], 3), minlength=count)
+    return summed
+
+
+def _seams(model: FaceModel) -> npt.NDArray[np.int64]:
+    """(V,): a number for each vertex, the same for those that are one point of one smooth surface."""
+    part = np.repeat(np.arange(len(model.parts)), [len(p.vertices) for p in model.parts])
+    vertices = model.vertices + np.float32(0)  # -0 is 0
+    order = np.lexsort((*vertices.T, part))
+    same = (vertices[order][1:] == vertices[order][:-1]).all(axis=1) & (part[order][1:] == part[order][:-1])
+    leader = np.arange(len(vertices))
+    if same.any():
+        starts = np.flatnonzero(np.concatenate([[True], ~same]))
+        sizes = np.diff(np.append(starts, len(order)))
+        first = np.empty_like(leader)
+        first[order] = np.repeat(order[starts], sizes)  # lexsort is stable: the lowest number of them
+        alike = _Alike(model)
+        agree = alike(leader, first)
+        leader[agree] = first[agree]
+        whole = np.logical_and.reduceat(agree[order], starts)
+        for start, size in zip(starts[~whole], sizes[~whole], strict=True):
+            _sort_out(order[start : start + size], alike, leader)
+    return np.asarray(np.unique(leader, return_inverse=True)[1], dtype=np.int64)
+
+
+def _sort_out(together: npt.NDArray[np.intp], alike: _Alike, leader: npt.NDArray[np.intp]) -> None:
+    """Vertices in one place that are not all one: each joins the first that it agrees with."""
+    heads: list[int] = []
+    for vertex in together.tolist():
+        joined = np.flatnonzero(alike(np.full(len(heads), vertex), np.array(heads, dtype=np.intp)))
+        leader[vertex] = heads[int(joined[0])] if len(joined) else vertex
+        if not len(joined) and len(heads) < HEADS_MAX:
+            heads.append(vertex)
+
+
+class _Alike:
+    """Whether pairs of coincident vertices have the same normal and are moved alike."""
+
+    def __init__(self, model: FaceModel) -> None:
+        self._normals = model.normals
+        self._probes = [_probe(model, sign) for sign in (1.0, -1.0)]
+
+    def __call__(self, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+        normals = self._normals
+        agree = np.einsum("ij,ij->i", normals[one], normals[other]) > SEAM_COSINE
+        for probe in self._probes:
+            apart = np.abs(probe[one] - probe[other]).max(axis=1, initial=0)
+            agree &= apart <= SEAM_MOTION * np.abs(probe[one]).max(axis=1, initial=0)
+        return np.asarray(agree | (one == other))
+
+
+def _probe(model: FaceModel, sign: float) -> npt.NDArray[np.float64]:
+    """(V, 3) how the vertices move when all FAPs have some value, no two the same."""
+    moved = np.zeros(model.vertices.shape)
+    for table in model.tables:
+        value = sign * (200.0 + 37.0 * (table.fap * 29 % 67))
+        for mesh in table.meshes:
+            shift = mesh.shift(value) * model.fapu[faps()[table.fap - 1].unit]
+            moved[model.starts[mesh.part] + mesh.vertices] += shift
+    return moved

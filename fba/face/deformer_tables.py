@@ -1,0 +1,194 @@
+"""The FaceDefTables of a whole face as flat arrays, in the order in which the compiled loops read them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.model import FaceModel
+from fba.face.tables import HEAD, FaceDefMesh
+from fba.parameters import faps
+
+VALUE_MAX = 2**31 - 1
+"""FAPs beyond this are refused: no stream carries more than 32 bits."""
+KIND_ORDER = ("translation", "rotation", "scale")
+"""How the transforms of one part are nested, outermost first, as in a Transform node."""
+HEAD_PITCH, HEAD_ROLL = 48, 50
+
+
+class Shifts(NamedTuple):
+    """All FaceDefMesh of a face. One `track` is one of them, cut into intervals.
+
+    Interval s of track m, first[m] <= s < first[m + 1], holds for values up to upper[s]. There the rows
+    [start[s], start[s + 1]) of `rows` move by slopes x (value - anchor[s]), plus, unless base[s] is -1,
+    by `bases` from row base[s] on: where they are when the value is anchor[s], the border nearer to 0.
+    """
+
+    column: npt.NDArray[np.int64]
+    """(M,) FAP - 1."""
+    part: npt.NDArray[np.int64]
+    """(M,) the part that moves."""
+    first: npt.NDArray[np.int64]
+    """(M + 1,) first interval."""
+    upper: npt.NDArray[np.float64]
+    """(S,) value at the interval's upper end; the last one of a track is infinite."""
+    anchor: npt.NDArray[np.float64]
+    """(S,) value at the end that is nearer to 0."""
+    start: npt.NDArray[np.int64]
+    """(S + 1,) first row."""
+    base: npt.NDArray[np.int64]
+    """(S,) first row in `bases`, -1 for none."""
+    rows: npt.NDArray[np.uint32]
+    """(N,) vertices of the whole face, rising within an interval. Unsigned: no check for negative ones."""
+    slopes: npt.NDArray[Any]
+    """(N, 3) metres per step."""
+    bases: npt.NDArray[Any]
+    """(B, 3) metres."""
+    amount: npt.NDArray[Any]
+    """(1,) scratch: brings a value to the tables' own precision."""
+
+
+class Transforms(NamedTuple):
+    """All FaceDefTransform of a face, those of a part together, outermost first; the head's come last."""
+
+    start: npt.NDArray[np.int64]
+    """(P + 2,) first transform of each part, then of the head."""
+    column: npt.NDArray[np.int64]
+    """(K,) FAP - 1."""
+    kind: npt.NDArray[np.int64]
+    """(K,) place in `KIND_ORDER`."""
+    amount: npt.NDArray[np.float64]
+    """(K, 3) for one step: metres, radians about each axis, or growth."""
+    centre: npt.NDArray[np.float64]
+    """(K, 3) metres."""
+
+
+Members = list[tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]]
+"""For each part: the vertices of interest, in the part's own count, and the rows that they are moved in."""
+
+
+def all_vertices(model: FaceModel) -> Members:
+    """Every vertex of every part, in order."""
+    sizes = [np.arange(len(part.vertices)) for part in model.parts]
+    return [(own, own + model.starts[part.name]) for part, own in zip(model.parts, sizes, strict=True)]
+
+
+def bound_points(model: FaceModel) -> Members:
+    """The vertices that feature points stand on; the points are the rows."""
+    members = []
+    for part in model.parts:
+        own = model.bound - model.starts[part.name]
+        rows = np.flatnonzero((model.bound >= 0) & (own >= 0) & (own < len(part.vertices)))
+        members.append((own[rows].astype(np.intp), rows))
+    return members
+
+
+def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]]) -> Shifts:
+    """What FaceDefMesh does to the given vertices, in metres, zero displacements left out.
+
+    Raises ModelError where a displacement is too large for numbers of that precision.
+    """
+    number = {part.name: place for place, part in enumerate(model.parts)}
+    column, part, first, upper, anchor, rows, slopes = ([] for _ in range(7))  # type: ignore[var-annotated]
+    bases, base, base_count = [], [], 0
+    for table in model.tables:
+        unit = model.fapu[faps()[table.fap - 1].unit]
+        for mesh in table.meshes:
+            place = number[mesh.part]
+            cuts = _intervals(mesh, *members[place], len(model.parts[place].vertices), unit)
+            column.append(table.fap - 1)
+            part.append(place)
+            first.append(len(upper))
+            for limit, from_value, moving, per_step, at_anchor in cuts:
+                _check(per_step, at_anchor, dtype, f"FaceDefTables of FAP {table.fap}, part {mesh.part!r}")
+                upper.append(limit)
+                anchor.append(from_value)
+                rows.append(moving)
+                slopes.append(per_step)
+                held = at_anchor.any()
+                base.append(base_count if held else -1)
+                if held:
+                    bases.append(at_anchor)
+                    base_count += len(at_anchor)
+    return Shifts(
+        column=np.array(column, dtype=np.int64),
+        part=np.array(part, dtype=np.int64),
+        first=np.array([*first, len(upper)], dtype=np.int64),
+        upper=np.array(upper, dtype=np.float64),
+        anchor=np.array(anchor, dtype=np.float64),
+        start=np.cumsum([0, *map(len, rows)], dtype=np.int64),
+        base=np.array(base, dtype=np.int64),
+        rows=np.concatenate([np.zeros(0, dtype=np.uint32), *rows]).astype(np.uint32),
+        slopes=np.concatenate([np.zeros((0, 3)), *slopes]).astype(dtype),
+        bases=np.concatenate([np.zeros((0, 3)), *bases]).astype(dtype),
+        amount=np.zeros(1, dtype=dtype),
+    )
+
+
+_Interval = tuple[float, float, npt.NDArray[np.intp], npt.NDArray[np.float64], npt.NDArray[np.float64]]
+
+
+def _intervals(
+    mesh: FaceDefMesh, own: npt.NDArray[np.intp], rows: npt.NDArray[np.intp], size: int, unit: float
+) -> list[_Interval]:
+    """(upper end, anchor, rows, metres per step, metres at the anchor) of each interval."""
+    place = np.full(size, -1)
+    place[mesh.vertices] = np.arange(len(mesh.vertices))
+    found = place[own]
+    moves = mesh.displacements[found[found >= 0]].astype(np.float64) * unit
+    rows = rows[found >= 0]
+    borders = mesh.borders.astype(np.float64)
+    passed = np.concatenate([np.zeros((len(rows), 1, 3)), moves * np.diff(borders)[:, None]], axis=1)
+    shape = np.cumsum(passed, axis=1)
+    shape -= shape[:, [int(np.flatnonzero(mesh.borders == 0)[0])]]
+    cuts: list[_Interval] = []
+    for j in range(len(borders) - 1):
+        end = j if borders[j] >= 0 else j + 1
+        moving = moves[:, j].any(axis=1) | shape[:, end].any(axis=1)
+        limit = borders[j + 1] if j + 2 < len(borders) else np.inf
+        cuts.append((limit, borders[end], rows[moving], moves[moving, j], shape[moving, end]))
+    return cuts
+
+
+def _check(
+    per_step: npt.NDArray[np.float64],
+    at_anchor: npt.NDArray[np.float64],
+    dtype: type[np.floating[Any]],
+    where: str,
+) -> None:
+    most = float(np.abs(per_step).max(initial=0)) * 2 * VALUE_MAX + float(np.abs(at_anchor).max(initial=0))
+    if not most * len(faps()) < float(np.finfo(dtype).max):
+        raise ModelError(f"{where}: displacements of up to {np.abs(per_step).max():g} m a step are too large")
+
+
+def flat_transforms(model: FaceModel) -> Transforms:
+    """The transforms of each part, nested as `Deformer` documents. ModelError where one is too large."""
+    names = [*(part.name for part in model.parts), HEAD]
+    found: list[list[tuple[tuple[int, float], int, list[float], tuple[float, ...]]]] = [[] for _ in names]
+    for table in model.tables:
+        unit = model.fapu[faps()[table.fap - 1].unit]
+        # yaw 49, roll 50, pitch 48: the order of the joints of the spine that the head stands on
+        outward = HEAD_ROLL + 0.5 if table.fap == HEAD_PITCH else float(table.fap)
+        for transform in table.transforms:
+            kind = KIND_ORDER.index(transform.kind)
+            amount = [unit * step for step in transform.amount]
+            if not max(map(abs, amount)) * VALUE_MAX < 1e30:
+                raise ModelError(
+                    f"FaceDefTables of FAP {table.fap}, {transform.kind} of {transform.part!r}: "
+                    f"{max(map(abs, amount)):g} a step is too large"
+                )
+            place = names.index(transform.part)
+            found[place].append(((kind, outward), table.fap - 1, amount, transform.centre))
+    for of_part in found:
+        of_part.sort(key=lambda entry: entry[0])
+    flat = [entry for of_part in found for entry in of_part]
+    return Transforms(
+        start=np.cumsum([0, *map(len, found)], dtype=np.int64),
+        column=np.array([entry[1] for entry in flat], dtype=np.int64),
+        kind=np.array([entry[0][0] for entry in flat], dtype=np.int64),
+        amount=np.array([entry[2] for entry in flat], dtype=np.float64).reshape(-1, 3),
+        centre=np.array([entry[3] for entry in flat], dtype=np.float64).reshape(-1, 3),
+    )
