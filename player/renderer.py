@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from player.camera import Camera
+from player.face_renderer import FaceRenderer
 from player.primitives import capsule_mesh, sphere_mesh
+from player.programs import load_program, matrix_bytes, set_uniform
 from player.shapes import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
 
 MOST_BLOBS = 8
@@ -33,9 +34,10 @@ class Renderer:
 
     def __init__(self, context: Any) -> None:
         self._gl = context
-        self._programs = {name: self._program(name) for name in ("mesh", "capsule", "eye")}
-        self._programs["studio"] = self._program("studio")
-        self._programs["shadow"] = self._program("shadow")
+        self._programs = {
+            name: load_program(context, name) for name in ("mesh", "capsule", "eye", "studio", "shadow", "face")
+        }
+        self._faces = FaceRenderer(context, self._programs["face"])
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
         square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
         self._studio_buffer = context.buffer(corners.tobytes())
@@ -58,7 +60,7 @@ class Renderer:
             index_buffer=self._eye_parts[1],
         )
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
-        _set(self._programs["capsule"], "opacity", 1.0)
+        set_uniform(self._programs["capsule"], "opacity", 1.0)
 
     def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> None:
         """Clear the bound framebuffer and draw the view; size: its width and height in pixels."""
@@ -70,9 +72,9 @@ class Renderer:
         pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
         eye = tuple(float(v) for v in camera.eye)
         for program in self._programs.values():
-            _set(program, "eye", eye)
-            _set(program, "camera", _bytes(matrix))
-            _set(program, "pixel", pixel)
+            set_uniform(program, "eye", eye)
+            set_uniform(program, "camera", matrix_bytes(matrix))
+            set_uniform(program, "pixel", pixel)
         self._draw_studio(view, matrix, size)
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
@@ -81,6 +83,7 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
+        self._faces.draw(view.faces)
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""
@@ -88,25 +91,13 @@ class Renderer:
             for part in parts:
                 part.release()
         self._shapes.clear()
+        self._faces.close()
         for part in (
             *(self._backdrop[:0:-1] if self._backdrop else ()), self._shadow, self._square, self._blobs,
             self._studio, self._studio_buffer, self._capsules, self._instances, *self._capsule_parts,
             self._eye, *self._eye_parts, *self._programs.values(),
         ):  # fmt: skip
             part.release()
-
-    def _program(self, name: str) -> Any:
-        folder = files(__package__) / "shaders"
-        sources = {}
-        for stage, suffix in (("vertex_shader", "vert"), ("fragment_shader", "frag")):
-            file = folder / f"{name}.{suffix}"
-            if not file.is_file():
-                file = folder / f"mesh.{suffix}"
-            text = file.read_text(encoding="utf-8")
-            sources[stage] = text.replace(
-                "//include lighting.glsl", (folder / "lighting.glsl").read_text(encoding="utf-8")
-            )
-        return self._gl.program(**sources)
 
     def _uploaded(
         self, vertices: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]
@@ -134,9 +125,9 @@ class Renderer:
             texture, kept = self._kept_backdrop(size)
             self._backdrop = (key, texture, kept)
             program = self._programs["studio"]
-            _set(program, "unproject", _bytes(np.linalg.inv(matrix)))
-            _set(program, "ground", 1.0 if view.ground else 0.0)
-            _set(program, "centre", (float(middle[0]), float(middle[1])))
+            set_uniform(program, "unproject", matrix_bytes(np.linalg.inv(matrix)))
+            set_uniform(program, "ground", 1.0 if view.ground else 0.0)
+            set_uniform(program, "centre", (float(middle[0]), float(middle[1])))
             kept.use()
             gl.viewport = (0, 0, *size)
             gl.enable_only(gl.NOTHING)
@@ -165,9 +156,9 @@ class Renderer:
         positions.write(np.ascontiguousarray(mesh.positions, dtype="f4"))
         normals.orphan()
         normals.write(np.ascontiguousarray(mesh.normals, dtype="f4"))
-        _set(self._programs["mesh"], "world", _bytes(mesh.matrix))
-        _set(self._programs["mesh"], "two_sided", 1.0 if mesh.shape.two_sided else 0.0)
-        _set(self._programs["mesh"], "raised", mesh.shape.raised)
+        set_uniform(self._programs["mesh"], "world", matrix_bytes(mesh.matrix))
+        set_uniform(self._programs["mesh"], "two_sided", 1.0 if mesh.shape.two_sided else 0.0)
+        set_uniform(self._programs["mesh"], "raised", mesh.shape.raised)
         array.render()
 
     def _shape_parts(self, mesh: Mesh) -> tuple[Any, Any, Any]:
@@ -214,42 +205,30 @@ class Renderer:
         if not len(marks):
             return
         gl = self._gl
-        _set(self._programs["capsule"], "thinnest", THINNEST)
-        _set(self._programs["capsule"], "raised", RAISED)
+        set_uniform(self._programs["capsule"], "thinnest", THINNEST)
+        set_uniform(self._programs["capsule"], "raised", RAISED)
         self._draw_capsules(marks)
         gl.enable_only(gl.DEPTH_TEST | gl.BLEND | gl.CULL_FACE)
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
         gl.depth_func = ">"
         gl.fbo.depth_mask = False
-        _set(self._programs["capsule"], "opacity", THROUGH)
+        set_uniform(self._programs["capsule"], "opacity", THROUGH)
         self._capsules.render(instances=len(marks))
-        _set(self._programs["capsule"], "opacity", 1.0)
-        _set(self._programs["capsule"], "thinnest", 0.0)
-        _set(self._programs["capsule"], "raised", 0.0)
+        set_uniform(self._programs["capsule"], "opacity", 1.0)
+        set_uniform(self._programs["capsule"], "thinnest", 0.0)
+        set_uniform(self._programs["capsule"], "raised", 0.0)
         gl.fbo.depth_mask = True
         gl.depth_func = "<"
         gl.enable_only(gl.DEPTH_TEST)
 
     def _draw_eye(self, ball: Eye) -> None:
         program = self._programs["eye"]
-        up = ball.up / max(float(np.linalg.norm(ball.up)), 1e-9)
-        _set(program, "world", _bytes(ball.matrix))
-        _set(program, "iris", ball.iris)
-        _set(program, "pupil", ball.pupil)
-        _set(program, "lid", ball.lid)
-        _set(program, "up", tuple(float(v) for v in up))
+        set_uniform(program, "world", matrix_bytes(ball.matrix))
+        set_uniform(program, "iris", ball.iris)
+        set_uniform(program, "pupil", ball.pupil)
+        set_uniform(program, "lids", np.ascontiguousarray(ball.lids, dtype="f4").tobytes())
+        set_uniform(program, "head", matrix_bytes(ball.axes))
+        axes = ball.matrix[:3, :3] / max(float(np.linalg.norm(ball.matrix[:3, 0])), 1e-9)
+        set_uniform(program, "ball", matrix_bytes(axes))
+        set_uniform(program, "tint", ball.tint)
         self._eye.render()
-
-
-def _set(program: Any, name: str, value: Any) -> None:
-    member = program.get(name, None)
-    if member is None:
-        return
-    if isinstance(value, bytes):
-        member.write(value)
-    else:
-        member.value = value
-
-
-def _bytes(matrix: npt.NDArray[Any]) -> bytes:
-    return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()

@@ -14,6 +14,8 @@ from player.shapes import View, translation
 from player.timeline import Timeline
 
 if TYPE_CHECKING:
+    from fba.face.model import FaceModel
+    from player.face import FaceFigure
     from player.head import Head
     from player.head.drawing import Drawing
     from player.mannequin import Mannequin
@@ -38,18 +40,27 @@ LOOKS = ("figure", "points")
 class Scene:
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
-    animation: at least one frame, else ValueError. axes: name of the body's axis convention
+    animation: at least one frame, else ValueError. model: the face, by default the built-in head. axes: name of the body's axis convention
     (`fba.body.convention_names()`). view: "figure", a person, or "points", the face as its 84 feature
     points with lines through them and the body as its bones; it may be set at any time, ValueError where
     it is something else. Nothing is worked out before it is asked for.
     """
 
-    def __init__(self, animation: Animation, *, axes: str = "iso", view: str = "figure") -> None:
+    def __init__(
+        self,
+        animation: Animation,
+        model: FaceModel | None = None,
+        *,
+        axes: str = "iso",
+        view: str = "figure",
+    ) -> None:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
         self.animation = animation
-        self.timeline = Timeline(animation)
+        self.timeline = Timeline(animation, model)
+        self.model = model
         self.view = view
+        self._figure: FaceFigure | None = None
         self._head: Head | None = None
         self._drawing: Drawing | None = None
         self._mannequin: Mannequin | None = None
@@ -80,6 +91,15 @@ class Scene:
         if name not in LOOKS:
             raise ValueError(f"no view {name!r}; there are {', '.join(LOOKS)}")
         self._view = name
+
+    @property
+    def figure(self) -> FaceFigure | None:
+        """The face that is shown; built on first use."""
+        if self._figure is None and self.model is not None:
+            from player.face import FaceFigure
+
+            self._figure = FaceFigure(self.model)
+        return self._figure
 
     @property
     def head(self) -> Head:
@@ -114,7 +134,7 @@ class Scene:
     def subject(self) -> Subject:
         """What a camera is to have in view over the whole performance."""
         if self._subject is None:
-            self._subject = self._extent() if self.has_body else FACE_SUBJECT
+            self._subject = self._extent() if self.has_body else self._face_subject
         return self._subject
 
     @property
@@ -131,11 +151,16 @@ class Scene:
     @property
     def face_subject(self) -> Subject:
         """The head alone, where the performance begins."""
+        face = self._face_subject
         if not self.has_body:
-            return FACE_SUBJECT
+            return face
         matrix = self._head_matrix(*self._posed(float(self.start)))
-        x, y, z = (matrix @ np.array([*FACE_SUBJECT.centre, 1.0]))[:3]
-        return Subject((float(x), float(y), float(z)), FACE_SUBJECT.half_height, FACE_SUBJECT.half_width)
+        x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3]
+        return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
+
+    @property
+    def _face_subject(self) -> Subject:
+        return FACE_SUBJECT if self.figure is None else self.figure.subject
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """A camera that has everything in view: the named preset, or the one that suits the content.
@@ -156,6 +181,8 @@ class Scene:
         faps, joints = self._posed(time)
         if self._view == "points":
             return self._points(faps, joints)
+        if self.figure is not None:
+            return self._figured(self.figure, faps, joints)
         if joints is None:
             matrix = self._head_matrix(faps, None)
             return View(
@@ -168,6 +195,22 @@ class Scene:
             meshes=[*self.head.meshes(faps, matrix), self._torso.mesh(joints)],
             capsules=capsules,
             eyes=self.head.eyes(faps, matrix),
+            blobs=_shadows(joints, self._skeleton.names),
+            ground=True,
+        )
+
+    def _figured(self, figure: FaceFigure, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+        """The face, on a body where there is one."""
+        if joints is None or self._mannequin is None:
+            matrix = np.eye(4)
+            return View(eyes=figure.eyes(faps, matrix), faces=figure.meshes(faps, matrix))
+        placed = HEAD_ON_BODY - self._skull_centre
+        matrix = joints[self._skull] @ translation(placed) @ translation(-figure.between_eyes)
+        return View(
+            meshes=[self._torso.mesh(joints)],
+            capsules=self._mannequin.capsules(joints),
+            eyes=figure.eyes(faps, matrix),
+            faces=figure.meshes(faps, matrix, on_body=True),
             blobs=_shadows(joints, self._skeleton.names),
             ground=True,
         )
@@ -208,6 +251,13 @@ class Scene:
 
     def _head_matrix(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> Float64:
         """Frame of the head (origin between the pupils) into the world."""
+        if self.figure is not None:
+            turned = self.figure.pose(faps).turn
+            if joints is None:
+                return turned
+            moved = translation(HEAD_ON_BODY - self._skull_centre) @ translation(-self.figure.between_eyes)
+            on_skull: Float64 = joints[self._skull] @ moved @ turned
+            return on_skull
         face = self.head.face
         turn = np.eye(4)
         turn[:3, :3] = face.head_rotation(faps)

@@ -45,18 +45,66 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False)
+class FaceShape:
+    """What does not change in a part of a face; keep the object, renderers remember it.
+
+    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light, the
+    fourth how glossy. sway: float32 (V,), 1 where it goes with the head, 0 where it stands, as shoulders
+    do. texcoords: float32 (V, 2), origin at the picture's top left. picture: uint8 (H, W, 4), sRGB, by
+    which the colours are multiplied. scatter: how far light wanders below the surface: 1 skin, 0 cloth.
+    fine: strength of the skin's relief. two_sided: False where the inside is to look dark.
+    """
+
+    triangles: npt.NDArray[np.int32]
+    colours: Float32
+    sway: Float32
+    texcoords: Float32 | None = None
+    picture: npt.NDArray[np.uint8] | None = None
+    scatter: float = 0.0
+    fine: float = 0.0
+    two_sided: bool = False
+
+    @property
+    def see_through(self) -> bool:
+        """Whether the picture has places where it is not there."""
+        return self.picture is not None and bool((self.picture[..., 3] < 255).any())
+
+
+@dataclass(frozen=True, eq=False)
+class FaceMesh:
+    """A part of a face in one pose.
+
+    positions, normals: float32 (V, 3), without the head's rotation. light: float32 (V, 4), 0..1, what
+    reaches each vertex past the rest of the face: of the key light, of the open sky, through the skin
+    from behind, of the rim light. matrix: (4, 4) into the world. turn: (3,) axis of the head's rotation
+    times its angle, about centre (3,), in the frame of the positions.
+    """
+
+    shape: FaceShape
+    positions: Float32
+    normals: Float32
+    light: Float32
+    matrix: Float64
+    turn: Float64
+    centre: Float64
+
+
+@dataclass(frozen=True, eq=False)
 class Eye:
     """An eyeball. matrix (4, 4): its frame (looking along +z, radius 1) into the world.
 
-    iris, pupil: their radii as fractions of the eyeball's. lid: height of the upper lid's margin above
-    the eyeball's centre, as a fraction of the radius, for its shadow. up (3,): the head's, in the world.
+    iris, pupil: their radii as fractions of the eyeball's. lids: (4, 3), middles of the upper and the
+    lower lid's margin, outer and inner corner, from the eyeball's centre in the axes of the head, as
+    fractions of its radius: they shade it. axes: (3, 3), the head's in the world, in columns. tint: of
+    the iris, linear light.
     """
 
     matrix: Float64
     iris: float
     pupil: float
-    lid: float
-    up: Float64
+    lids: Float64
+    axes: Float64
+    tint: tuple[float, float, float] = (0.075, 0.105, 0.10)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +120,7 @@ class View:
     capsules: Float32 = field(default_factory=lambda: np.zeros((0, CAPSULE_FLOATS), dtype=np.float32))
     marks: Float32 = field(default_factory=lambda: np.zeros((0, CAPSULE_FLOATS), dtype=np.float32))
     eyes: list[Eye] = field(default_factory=list)
+    faces: list[FaceMesh] = field(default_factory=list)
     blobs: Float32 = field(default_factory=lambda: np.zeros((0, 4), dtype=np.float32))
     ground: bool = False
 
@@ -115,6 +164,14 @@ def srgb(text: str) -> tuple[float, float, float]:
     values = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
     red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values)
     return red, green, blue
+
+
+def rotation_vector(matrix: Float64) -> Float64:
+    """(3,) axis of a rotation (3, 3) times its angle, 0..pi."""
+    from scipy.spatial.transform import Rotation
+
+    vector: Float64 = Rotation.from_matrix(matrix).as_rotvec()
+    return vector
 
 
 def translation(offset: npt.ArrayLike) -> Float64:

@@ -111,22 +111,22 @@ class Head:
         points = self.face.local(faps)
         radius = self.face.eyeball_radius
         found = []
-        for side, lid in ((0, "3.1"), (1, "3.2")):
+        for side, lids in ((0, ("3.1", "3.3", "3.7", "3.11")), (1, ("3.2", "3.4", "3.12", "3.8"))):
             forward = balls.gaze[0, side]
             right = np.cross((0.0, 1.0, 0.0), forward)
             right /= max(float(np.linalg.norm(right)), 1e-9)
             frame = np.eye(4)
             frame[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1) * radius
             frame[:3, 3] = balls.centres[0, side]
-            height = (points[row_of()[lid], 1] - balls.centres[0, side, 1]) / radius
+            places = (points[[row_of()[name] for name in lids]] - balls.centres[0, side]) / radius
             pupil = float(balls.pupils[0, side]) / 2 / radius
             found.append(
                 Eye(
                     matrix @ frame,
                     IRIS_SHARE,
                     float(np.clip(pupil, 0.02, IRIS_SHARE * 0.95)),
-                    float(height),
-                    matrix[:3, 1],
+                    places.astype(np.float64),
+                    matrix[:3, :3],
                 )
             )
         return found

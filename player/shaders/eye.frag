@@ -1,40 +1,96 @@
 #version 330 core
 //include lighting.glsl
-uniform float iris;
+uniform float iris;      // radii, by the eyeball's
 uniform float pupil;
-uniform float lid;
-uniform vec3 up;      // of the head, in the world
+uniform mat3 head;       // axes of the head, in the world
+uniform mat3 ball;       // axes of the eyeball, in the world
+uniform vec3 lids[4];    // middles of upper and lower lid, outer and inner corner, by the eyeball's radius
+uniform vec3 tint;       // of the iris
 in vec3 place;
 in vec3 normal;
 in vec3 local;
 out vec4 pixel;
 
-float spokes(float angle) {
-    return 0.5 + 0.28 * sin(angle * 23.0 + sin(angle * 7.0) * 2.0) + 0.22 * sin(angle * 61.0 + 1.3);
+const float CORNEA = 0.26;    // how far the cornea's centre lies before the eyeball's
+const float DEEP = 0.11;      // the iris lies this far below the cornea's rim
+
+float grain(vec2 at) {
+    return fract(sin(dot(at, vec2(12.9898, 78.233))) * 43758.5453);
+}
+
+float noise(float at) {
+    float low = floor(at);
+    float part = at - low;
+    return mix(grain(vec2(low, 1.0)), grain(vec2(low + 1.0, 1.0)), part * part * (3.0 - 2.0 * part));
+}
+
+// Fibres that run from the pupil outwards.
+float fibres(float angle, float across) {
+    float turn = angle * 6.3662;   // 40 a turn
+    float coarse = noise(turn + 50.0) * 0.5 + noise(turn * 2.3 + across * 1.5 + 90.0) * 0.3;
+    return coarse + noise(turn * 5.0 + 190.0) * 0.2;
+}
+
+// Height of a lid's margin at x: a curve through the corners and its middle.
+float margin(float x, vec3 middle) {
+    vec3 corner = x > middle.x ? (lids[2].x > middle.x ? lids[2] : lids[3]) : (lids[2].x > middle.x ? lids[3] : lids[2]);
+    float t = clamp((x - middle.x) / (corner.x - middle.x), 0.0, 1.0);
+    return mix(middle.y, corner.y, t * t);
 }
 
 void main() {
     vec3 n = normalize(normal);
     vec3 view = normalize(eye - place);
-    float r = local.z > 0.0 ? length(local.xy) : 2.0;
-    float soft = max(fwidth(r) * 1.2, 0.012);
-    float angle = atan(local.y, local.x);
-    vec3 white = mix(vec3(0.78, 0.76, 0.74), vec3(0.70, 0.52, 0.48), smoothstep(0.62, 1.0, r) * 0.55);
+    vec3 at = normalize(local);
+    float rim = at.z > 0.0 ? length(at.xy) : 2.0;
+    float cornea = 1.0 - smoothstep(iris * 0.92, iris * 1.16, rim);
+
+    // Through the cornea the iris is seen where refraction takes the look.
+    vec3 bulge = normalize(at - vec3(0.0, 0.0, CORNEA));
+    vec3 look = -(transpose(ball) * view);
+    vec3 bent = refract(look, mix(at, bulge, 0.7), 1.0 / 1.336);
+    float plane = sqrt(1.0 - iris * iris) - DEEP;
+    vec3 behind = at + bent * ((at.z + 0.05 * cornea - plane) / max(-bent.z, 0.3));
+    float r = mix(rim, length(behind.xy), cornea);
+    float soft = clamp(fwidth(rim) * 1.2, 0.012, 0.2);
+
+    float angle = atan(behind.y, behind.x);
     float across = clamp((r - pupil) / max(iris - pupil, 1e-3), 0.0, 1.0);
-    vec3 ring = mix(vec3(0.17, 0.11, 0.055), vec3(0.055, 0.13, 0.16), smoothstep(0.05, 0.75, across));
-    ring *= 0.65 + 0.75 * spokes(angle) * (1.0 - 0.5 * across);
-    ring *= 1.0 - 0.8 * smoothstep(0.72, 1.0, across);
-    // Light that enters from the key side gathers on the far side of the iris.
-    ring *= 1.0 + 1.1 * max(dot(normalize(vec3(local.xy, 0.001)), normalize(vec3(-0.5, -0.8, 0.0))), 0.0);
-    vec3 base = mix(ring, vec3(0.006), 1.0 - smoothstep(pupil - soft, pupil + soft, r));
-    base = mix(base, white, smoothstep(iris - soft * 1.5, iris + soft * 1.5, r));
-    float height = dot(n, up);
-    float shade = mix(0.34, 1.0, smoothstep(0.02, 0.42, lid - height)) * mix(0.75, 1.0, smoothstep(-0.62, -0.3, height));
-    float key = max(dot(n, KEY_DIRECTION) * 0.7 + 0.3, 0.0);
-    vec3 light = (KEY * key * 0.62 + FILL + mix(FLOOR, SKY, 0.6) * 0.55) * shade;
-    vec3 halfway = normalize(KEY_DIRECTION + view);
-    float spark = smoothstep(0.9905, 0.9945, dot(n, halfway)) * 0.95;
-    vec3 second = normalize(FILL_DIRECTION + view);
-    spark += smoothstep(0.986, 0.996, dot(n, second)) * 0.10;
-    pixel = vec4(encode(base * light + spark * smoothstep(0.0, 0.25, shade)), 1.0);
+    vec3 ring = mix(tint * vec3(1.75, 1.25, 0.75) + vec3(0.03, 0.014, 0.0), tint, smoothstep(0.1, 0.55, across));
+    ring *= 0.45 + 1.1 * fibres(angle, across);
+    ring *= 1.0 - 0.72 * smoothstep(0.72, 1.0, across);            // the dark ring around it
+    ring *= 0.55 + 0.45 * smoothstep(0.0, 0.12, across);           // and around the pupil
+    vec3 base = mix(ring, vec3(0.004), 1.0 - smoothstep(pupil - soft, pupil + soft, r));
+    vec3 in_head = transpose(head) * n;
+    float aside = smoothstep(0.30, 0.95, abs(in_head.x));
+    vec3 white = mix(vec3(0.66, 0.63, 0.61), vec3(0.60, 0.40, 0.36), aside * 0.75);
+    float edge = iris + soft;
+    base = mix(base, white, smoothstep(edge - soft * 1.5 - 0.05, edge + soft * 1.5 + 0.03, rim));
+
+    // Lids shade the eyeball, the upper one most.
+    float below = margin(in_head.x, lids[0]) - in_head.y;
+    float above = in_head.y - margin(in_head.x, lids[1]);
+    float shade = smoothstep(-0.06, 0.40, below);
+    shade = (0.18 + 0.82 * shade) * (0.45 + 0.55 * smoothstep(-0.05, 0.20, above));
+    shade *= 1.0 - 0.45 * aside;
+    // The iris is lit from the side opposite to the light, as a hollow is.
+    vec3 hollow = normalize(mix(n, normalize(n - 0.9 * (ball * vec3(at.xy, 0.0))), cornea));
+    float key = max(dot(hollow, KEY_DIRECTION) * 0.75 + 0.25, 0.0);
+    vec3 light = KEY * key * shade + (FILL * 0.8 + mix(FLOOR, SKY, 0.55) * 0.62) * (0.25 + 0.75 * shade);
+    vec3 shown = base * light;
+
+    // The wet surface mirrors the key light's window and the studio.
+    vec3 wet = normalize(mix(n, ball * bulge, cornea));
+    vec3 mirrored = reflect(-view, wet);
+    vec3 right = normalize(cross(vec3(0.0, 1.0, 0.0), KEY_DIRECTION));
+    vec2 window = abs(vec2(dot(mirrored, right), dot(mirrored, cross(KEY_DIRECTION, right))));
+    float side = clamp(fwidth(window.x) + fwidth(window.y), 0.03, 0.12);
+    vec2 within = 1.0 - smoothstep(vec2(0.20 - side), vec2(0.20 + side), window);
+    float spark = within.x * within.y * step(0.0, dot(mirrored, KEY_DIRECTION));
+    float graze = 1.0 - max(dot(wet, view), 0.0);
+    float fresnel = 0.03 + 0.6 * graze * graze * graze * graze;
+    float lit = smoothstep(0.02, 0.10, below);
+    shown += spark * mix(0.55, 1.7, cornea) * vec3(1.0, 0.97, 0.93) * lit;
+    shown += mix(FLOOR, SKY, mirrored.y * 0.5 + 0.5) * fresnel * (0.3 + 0.7 * shade);
+    pixel = vec4(encode(shown), 1.0);
 }

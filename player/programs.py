@@ -1,0 +1,38 @@
+"""Shader programs from the files beside this module, and setting what they take."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+
+def load_program(context: Any, name: str) -> Any:
+    """The program of shaders/NAME.vert and NAME.frag on a moderngl context."""
+    folder = files(__package__) / "shaders"
+    lighting = (folder / "lighting.glsl").read_text(encoding="utf-8")
+    sources = {
+        stage: (folder / f"{name}.{suffix}")
+        .read_text(encoding="utf-8")
+        .replace("//include lighting.glsl", lighting)
+        for stage, suffix in (("vertex_shader", "vert"), ("fragment_shader", "frag"))
+    }
+    return context.program(**sources)
+
+
+def set_uniform(program: Any, name: str, value: Any) -> None:
+    """Set what a program takes under a name; bytes are written as they are, unknown names passed over."""
+    member = program.get(name, None)
+    if member is None:
+        return
+    if isinstance(value, bytes):
+        member.write(value)
+    else:
+        member.value = value
+
+
+def matrix_bytes(matrix: npt.NDArray[Any]) -> bytes:
+    """A matrix as OpenGL stores it: float32, column by column."""
+    return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()

@@ -1,0 +1,30 @@
+#version 330 core
+//include lighting.glsl
+uniform sampler2D picture;
+uniform float textured;    // 1: the picture times the colour
+uniform float fine;        // strength of the skin's relief, 0 for none
+uniform float scatter;     // how far light goes below the surface: 1 skin, 0 cloth
+uniform float two_sided;   // 0: what is seen from inside is a dark hollow
+in vec3 place;
+in vec3 normal;
+in vec4 colour;
+in vec2 texture_at;
+in vec4 light;
+out vec4 pixel;
+
+void main() {
+    if (!gl_FrontFacing && two_sided < 0.5) {
+        pixel = vec4(encode(vec3(0.020, 0.0045, 0.004)), 1.0);
+        return;
+    }
+    vec3 albedo = colour.rgb;
+    float opaque = 1.0;
+    if (textured > 0.5) {
+        vec4 texel = texture(picture, texture_at);
+        albedo *= decode(texel.rgb);
+        opaque = texel.a;
+    }
+    vec3 n = normalize(gl_FrontFacing ? normal : -normal);
+    vec3 shown = surface(place, n, n, albedo, colour.a, light, scatter);
+    pixel = vec4(encode(shown), opaque);
+}
