@@ -44,7 +44,7 @@ def lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
             left -= len(raw)
             number += 1
             if len(raw) >= MAX_LINE:
-                raise ModelError(f"{name}:{number}: the line is longer than {MAX_LINE} bytes; is this a text file?")
+                raise ModelError(f"{name}:{number}: the line is longer than {MAX_LINE} bytes; is this text?")
             if number == 1 and raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
                 raise ModelError(f"{name}: is UTF-16 text; save it as UTF-8")
             if b"\0" in raw:

@@ -161,8 +161,8 @@ def _head(base: Polygons) -> Bool:
     shared = np.flatnonzero(edge[1:] == edge[:-1])
     links = (np.ones(len(shared)), (face[shared], face[shared + 1]))
     _, label = connected_components(coo_array(links, shape=(len(body), len(body))), directed=False)
-    crown = face_of = np.flatnonzero((base.corners[starts[:, None] + np.arange(sizes.min())] == CROWN).any(axis=1))
-    if not len(face_of):
+    crown = np.flatnonzero((base.corners[starts[:, None] + np.arange(3)] == CROWN).any(axis=1))
+    if not len(crown):
         raise ModelError("the base mesh has no crown of the head; is it damaged?")
     chosen = np.zeros(len(base), dtype=np.bool_)
     chosen[body[label == label[crown[0]]]] = True

@@ -64,9 +64,9 @@ def _vertex(token: str, base: Float64, where: str) -> int:
 
 def _place(tokens: list[str], base: Float64, scale: Float64, where: str) -> Float64:
     if len(tokens) == 1:
-        return base[_vertex(tokens[0], base, where)]
+        return np.asarray(base[_vertex(tokens[0], base, where)])
     if len(tokens) < 6:
-        raise ModelError(f"{where}: one vertex, or three and their weights are needed, not {len(tokens)} words")
+        raise ModelError(f"{where}: one vertex, or three and their weights, are needed, not {len(tokens)}")
     corners = [_vertex(token, base, where) for token in tokens[:3]]
     weights = [number(token, where, "a weight") for token in tokens[3:6]]
     offset = [number(token, where, "an offset") for token in tokens[6:9]] or [0.0, 0.0, 0.0]

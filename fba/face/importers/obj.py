@@ -6,6 +6,7 @@ import os
 from array import array
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.errors import ModelError
 from fba.face.importers.files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
@@ -43,7 +44,7 @@ class _Reader:
             if text.endswith("\\"):
                 pending += text[:-1] + " "
                 if len(pending) > MAX_CORNERS:
-                    raise ModelError(f"{self.path}:{line}: a line is continued beyond {MAX_CORNERS} characters")
+                    raise ModelError(f"{self.path}:{line}: a line goes on beyond {MAX_CORNERS} characters")
                 continue
             tokens = (pending + text).split("#", 1)[0].split()
             pending = ""
@@ -119,6 +120,6 @@ class _Reader:
         return place
 
 
-def _linear(colour: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def _linear(colour: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """sRGB as such files hold it -> linear light."""
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).astype(np.float32)

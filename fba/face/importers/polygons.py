@@ -68,9 +68,7 @@ def triangulate(polygons: Polygons, faces: Bool) -> Triangles:
     place = np.arange(len(polygon)) - np.repeat(np.cumsum(counts) - counts, counts)
     first = polygons.starts[polygon]
     at = np.stack([first, first + place + 1, first + place + 2], axis=1)
-    return Triangles(
-        polygons.corners[at], polygons.corner_texcoords[at], polygon.astype(np.int32)
-    )
+    return Triangles(polygons.corners[at], polygons.corner_texcoords[at], polygon.astype(np.int32))
 
 
 @dataclass(frozen=True, eq=False)
