@@ -1,0 +1,230 @@
+"""The skin's texture: complexion, lips, brows, cropped hair, painted where they lie on the head."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from hair import CROWN, brow, scalp
+from PIL import Image, ImageDraw, ImageFilter
+from sculpt import smooth
+
+Float64 = npt.NDArray[np.float64]
+SIZE = 2048
+
+# sRGB, 0..255
+SKIN = np.array([217, 168, 142.0])
+BLUSH = np.array([214, 138, 118.0])
+SOCKET = np.array([186, 128, 112.0])
+WATERLINE = np.array([203, 138, 126.0])
+CARUNCLE = np.array([206, 118, 110.0])
+LIP = np.array([184, 104, 96.0])
+LIP_LINE = np.array([132, 62, 58.0])
+MOUTH = np.array([96, 34, 34.0])
+NECK = np.array([206, 158, 131.0])
+HAIR = np.array([52, 38, 30.0])
+SCALP = np.array([158, 122, 104.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """What lies at every texel: place (S, S, 3), metres; value (S, S, K); known (S, S)."""
+
+    place: Float64
+    value: Float64
+    known: npt.NDArray[np.bool_]
+
+
+def chart(
+    vertices: Float64, values: Float64, triangles: npt.NDArray[np.integer], uvs: Float64, size: int = SIZE
+) -> Chart:
+    """Draw triangles (F, 3) at their corners' uvs (F, 3, 2), origin at the bottom left."""
+    data = np.concatenate([vertices, values], axis=1)
+    out = np.zeros((size, size, data.shape[1]))
+    known = np.zeros((size, size), dtype=bool)
+    corners = np.stack([uvs[..., 0] * size - 0.5, (1 - uvs[..., 1]) * size - 0.5], axis=-1)
+    for triangle, corner in zip(triangles, corners, strict=True):
+        low = np.maximum(np.floor(corner.min(axis=0) - 1).astype(int), 0)
+        high = np.minimum(np.ceil(corner.max(axis=0) + 2).astype(int), size)
+        if (high <= low).any():
+            continue
+        x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+        a, b, c = corner
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+        if abs(area) < 1e-12:
+            continue
+        wb = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / area
+        wc = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / area
+        wa = 1 - wb - wc
+        grown = -0.6 / max(np.sqrt(abs(area)), 1e-6)  # half a texel beyond, against seams
+        inside = (wa >= grown) & (wb >= grown) & (wc >= grown)
+        weights = np.stack([wa, wb, wc], axis=-1)[inside]
+        out[y[inside], x[inside]] = weights @ data[triangle]
+        known[y[inside], x[inside]] = True
+    return Chart(out[..., :3], out[..., 3:], known)
+
+
+def noise(places: Float64, scale: float, seed: int) -> Float64:
+    """Smooth noise in -1..1 over places (N, 3); scale: size of its grains, metres."""
+    from scipy.ndimage import map_coordinates
+
+    lattice = np.random.default_rng(seed).uniform(-1, 1, (48, 48, 48))
+    return map_coordinates(lattice, (places / scale).T, order=1, mode="grid-wrap")
+
+
+def paint(lay: Chart) -> Image.Image:
+    """The texture. lay.value: rings about the mouth, about the eyes, and whether it is the upper lip."""
+    p = lay.place[lay.known]
+    ring_mouth, ring_eye, lip_side = (lay.value[lay.known][:, k] for k in range(3))
+    colour = _complexion(p)
+    colour = _eyes(colour, p, ring_eye)
+    colour = _mouth(colour, p, ring_mouth, lip_side)
+    hair = scalp(p, 0.011)
+    speckle = 0.5 + 0.5 * noise(p, 0.0009, 31)
+    cover = smooth(hair * 1.25 - 0.55 * speckle * (1 - hair))
+    colour = colour * (1 - 0.72 * cover[:, None]) + SCALP * 0.72 * cover[:, None]
+    along, density = brow(p)
+    colour = colour * (1 - 0.30 * density[:, None]) + HAIR * 0.30 * density[:, None]
+    image = np.zeros((*lay.known.shape, 3))
+    image[:] = SKIN
+    image[lay.known] = colour
+    _spread(image, lay.known)
+    picture = Image.fromarray(np.clip(image, 0, 255).astype(np.uint8))
+    _strokes(picture, lay)
+    return picture
+
+
+def encoded(picture: Image.Image, quality: int = 88) -> bytes:
+    """The picture as a JPEG file."""
+    buffer = io.BytesIO()
+    picture.save(buffer, "JPEG", quality=quality, optimize=True, subsampling=0)
+    return buffer.getvalue()
+
+
+def _towards(colour: Float64, other: Float64, share: Float64) -> Float64:
+    return colour + (other - colour) * np.clip(share, 0, 1)[:, None]
+
+
+def _spot(p: Float64, centre: tuple[float, float, float], radius: float) -> Float64:
+    """1 in the middle of a spot on either side of the face, 0 at its edge; millimetres."""
+    folded = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1) * 1000
+    return 1 - smooth(np.linalg.norm(folded - centre, axis=1) / radius)
+
+
+def _complexion(p: Float64) -> Float64:
+    colour = np.tile(SKIN, (len(p), 1))
+    colour = _towards(colour, NECK, smooth((-0.095 - p[:, 1]) / 0.05) * 0.9)
+    broad = 0.75 + 0.5 * noise(p, 0.011, 1)
+    for centre, radius, share in (
+        ((40, -40, -4), 40, 0.55), ((0, -38, 33), 24, 0.45), ((14, -40, 14), 14, 0.35), ((0, -104, 6), 26, 0.25),
+        ((84, -15, -98), 44, 0.5), ((0, 40, 12), 40, 0.10),
+    ):  # fmt: skip
+        colour = _towards(colour, BLUSH, _spot(p, centre, radius) * share * broad)
+    colour += np.array([5, 3.2, 2.4]) * (noise(p, 0.018, 2) * 0.8 + noise(p, 0.007, 3) * 0.7)[:, None]
+    red = noise(p, 0.0042, 4)[:, None] * np.array([1.5, -2.4, -2.6])
+    fine = noise(p, 0.0011, 5)[:, None] * np.array([2.6, 2.6, 2.4])
+    pores = np.clip(noise(p, 0.00065, 6) - 0.45, 0, 1)[:, None]
+    nose = np.clip(_spot(p, (6, -34, 24), 26) + _spot(p, (28, -34, 6), 26) * 0.7, 0, 1)[:, None]
+    colour += red + fine - pores * (6 + 26 * nose) * np.array([0.8, 1.0, 1.0])
+    freckle = smooth((noise(p, 0.0021, 7) - 0.62) / 0.2) * smooth((noise(p, 0.010, 8) + 0.2) / 0.8)
+    return _towards(colour, np.array([178, 118, 92.0]), freckle * 0.30 * _spot(p, (24, -26, 8), 42))
+
+
+def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
+    x, y = np.abs(p[:, 0]) * 1000, p[:, 1] * 1000
+    near = ring < 90
+    upper = _spot(p, (31, 8, 1), 17) * (y > -1)
+    lower = _spot(p, (26, -10, 0), 15) * (y <= -1)
+    inner = _spot(p, (17, 1, 2), 13)
+    colour = _towards(colour, SOCKET, upper * 0.42 + lower * 0.30 + inner * 0.25)
+    lid = near & (ring < 5.0)
+    colour = _towards(colour, WATERLINE, np.where(lid, smooth((4.2 - ring) / 2.4) * 0.75, 0))
+    # The root of the lashes draws a line along the margin's outer edge.
+    line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
+    line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
+    line *= smooth((x - 19.0) / 5.0)
+    colour = _towards(colour, HAIR, line)
+    caruncle = near & (ring < 1.6) & (x < 24)
+    return np.where(caruncle[:, None], CARUNCLE + noise(p, 0.001, 9)[:, None] * 10, colour)
+
+
+def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64) -> Float64:
+    near = ring < 90
+    corner = smooth((np.abs(p[:, 0]) - 0.015) / 0.012)
+    border = np.where(side > 0, 5.0, 5.1) - 1.9 * corner  # vermilion ends nearer in the corners
+    red = np.where(near, smooth((border + 0.55 - ring) / 1.0), 0.0)
+    lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
+    lip = LIP + lines[:, None] * np.array([9, 9, 8.0]) + (side > 0)[:, None] * np.array([-8, -7, -6.0])
+    colour = _towards(colour, lip, red * 0.88)
+    seam = np.where(near, smooth((2.1 - ring) / 1.2), 0.0)
+    colour = _towards(colour, LIP_LINE, seam * 0.8)
+    inside = np.where(near, smooth((0.6 - ring) / 1.2), 0.0)
+    colour = _towards(colour, MOUTH, inside)
+    # A light edge above the upper lip catches the eye.
+    edge = np.where(near & (side > 0), np.exp(-(((ring - border - 0.9) / 0.5) ** 2)), 0.0) * (1 - corner)
+    return _towards(colour, SKIN + 12, edge * 0.35)
+
+
+def _spread(image: Float64, known: npt.NDArray[np.bool_]) -> None:
+    """Colours carried into what no triangle covers, so that nothing bleeds in at the seams."""
+    from scipy.ndimage import distance_transform_edt
+
+    _, (row, column) = distance_transform_edt(~known, return_indices=True)
+    image[:] = image[row, column]
+
+
+def _strokes(picture: Image.Image, lay: Chart) -> None:
+    """Single hairs: cropped ones on the scalp, longer ones in the brows."""
+    random = np.random.default_rng(17)
+    step_x = np.gradient(lay.place, axis=1)
+    step_y = np.gradient(lay.place, axis=0)
+    area = np.linalg.norm(np.cross(step_x, step_y), axis=2)
+    solid = lay.known & (area < 1e-6) & (area > 1e-12)
+    rows, columns = np.nonzero(solid)
+    p = lay.place[rows, columns]
+    layers = []
+    hair = scalp(p, 0.012)
+    weight = area[rows, columns] * np.clip(hair * 1.15 - 0.1, 0, 1)
+    chosen = random.choice(len(p), 90000, p=weight / weight.sum())
+    away = p[chosen] - CROWN
+    swirl = np.cross(away, (0.0, 1.0, 0.0)) * 0.35
+    direction = _unit(away + swirl + random.normal(0, 0.018, away.shape)) * random.uniform(0.002, 0.0045, (len(chosen), 1))
+    layers.append((chosen, direction, 0.62))
+    along, density = brow(p)
+    weight = area[rows, columns] * density**1.2
+    chosen = random.choice(len(p), 2600, p=weight / weight.sum())
+    layers.append((chosen, _brow_hairs(p[chosen], along[chosen], random), 0.80))
+    for chosen, direction, strength in layers:
+        mask = Image.new("L", (SIZE * 2, SIZE * 2), 0)
+        draw = ImageDraw.Draw(mask)
+        at = np.stack([columns[chosen], rows[chosen]], axis=1).astype(np.float64)
+        move = _in_texels(step_x[rows[chosen], columns[chosen]], step_y[rows[chosen], columns[chosen]], direction)
+        good = np.abs(move).max(axis=1) < 60
+        for (x0, y0), (dx, dy) in zip(at[good] * 2, move[good] * 2, strict=True):
+            draw.line((x0 - dx / 2, y0 - dy / 2, x0 + dx / 2, y0 + dy / 2), fill=255, width=2)
+        soft = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
+        soft = soft.point(lambda value, s=strength: int(value * s))
+        picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in HAIR)), (0, 0), soft)
+
+
+def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:
+    """Hairs grow upwards at the inner end, outwards along the brow, and down at its tail."""
+    lean = np.interp(along, [0.0, 0.2, 0.6, 1.0], [78.0, 42.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
+    middle = np.interp(np.abs(p[:, 0]), [0.012, 0.035, 0.06], [0.0148, 0.0232, 0.0135])
+    lean = np.radians(lean - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
+    out = np.stack([np.cos(lean) * np.sign(p[:, 0]), np.sin(lean), np.zeros(len(p))], axis=1)
+    return out * random.uniform(0.0035, 0.0062, (len(p), 1))
+
+
+def _in_texels(step_x: Float64, step_y: Float64, direction: Float64) -> Float64:
+    """(N, 2) texels that a way (N, 3) on the surface takes."""
+    xx, yy, xy = ((a * b).sum(axis=1) for a, b in ((step_x, step_x), (step_y, step_y), (step_x, step_y)))
+    dx, dy = ((step * direction).sum(axis=1) for step in (step_x, step_y))
+    det = np.maximum(xx * yy - xy**2, 1e-24)
+    return np.stack([(yy * dx - xy * dy) / det, (xx * dy - xy * dx) / det], axis=1)
+
+
+def _unit(vectors: Float64) -> Float64:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
