@@ -18,7 +18,7 @@ What no public text says is read as follows.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from fba.errors import ModelError
 from fba.face.interpolation_table import (
@@ -28,6 +28,7 @@ from fba.face.interpolation_table import (
     Function,
     Link,
     Term,
+    number_of,
 )
 from fba.parameters import FAP_COUNT, fap_numbers, faps
 
@@ -56,7 +57,7 @@ def links_of(node: Mapping[str, Sequence[float]]) -> list[Link]:
         raise ModelError(f"a FIT node has no field {unknown[0]!r}")
     fields = {name: _Field(name, node.get(name, ())) for name in (*INTEGER_FIELDS, *FLOAT_FIELDS)}
     sets = _sets(fields["FAPs"])
-    links = []
+    links: list[Link] = []
     graph = fields["Graph"]
     if graph.left % 2:
         raise ModelError(f"Graph of the FIT holds {graph.left} numbers; it must be pairs")
@@ -105,14 +106,17 @@ class _Field:
 
     def __init__(self, name: str, numbers: Sequence[float]) -> None:
         self.name = name
-        self.numbers = list(numbers)
         self._next = 0
+        if isinstance(numbers, (str, bytes)) or not isinstance(numbers, Iterable):
+            raise ModelError(f"{name} of the FIT must be a list of numbers, not {type(numbers).__name__}")
+        self.numbers = [number_of(number) for number in numbers]
         low, high = INTEGER_FIELDS.get(name, (-math.inf, math.inf))
-        for place, number in enumerate(self.numbers, 1):
-            whole = name not in INTEGER_FIELDS or (math.isfinite(number) and number == int(number))
+        for place, (number, given) in enumerate(zip(self.numbers, numbers, strict=True), 1):
+            whole = name not in INTEGER_FIELDS or number.is_integer()
             if not whole or not math.isfinite(number) or not low <= number <= high:
                 wanted = f"a whole number {low}..{high}" if name in INTEGER_FIELDS else "finite"
-                raise ModelError(f"{name} of the FIT: number {place} is {number}, which must be {wanted}")
+                said = str(given) if isinstance(given, float) else repr(given)[:40]
+                raise ModelError(f"{name} of the FIT: number {place} is {said}, which must be {wanted}")
 
     @property
     def left(self) -> int:

@@ -141,6 +141,16 @@ class InterpolationTable:
                     done[fap] = None
         return tuple(done)
 
+    @cached_property
+    def links_to(self) -> dict[int, tuple[Link, ...]]:
+        """For each destination FAP its links, in the order in which they are tried."""
+        numbers = fap_numbers()
+        found: dict[int, list[Link]] = {}
+        for link in self.links:
+            for name in link.functions:
+                found.setdefault(numbers[name], []).append(link)
+        return {fap: tuple(links) for fap, links in found.items()}
+
 
 def sources_of(links: Iterable[Link]) -> dict[int, set[int]]:
     """For each destination FAP the FAPs that some link to it starts from."""
@@ -216,7 +226,7 @@ def _checked_terms(
 
 
 def _checked_term(term: Term, numbers: tuple[str, ...], where: str, impulses: bool) -> Term:
-    coefficient = _number(term.coefficient)
+    coefficient = number_of(term.coefficient)
     if not math.isfinite(coefficient):
         raise ModelError(f"{where}: the coefficient {term.coefficient!r} is not a finite number")
     for name, exponent in term.powers.items():
@@ -241,7 +251,7 @@ def _checked_term(term: Term, numbers: tuple[str, ...], where: str, impulses: bo
     return Term(coefficient, powers, None if term.when is None else (term.when[0], int(term.when[1])))
 
 
-def _number(value: object) -> float:
+def number_of(value: object) -> float:
     """A float, NaN for what is none."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return math.nan

@@ -1,7 +1,8 @@
 """What a face shows: unsent FAPs filled in, visemes and expressions turned into low-level FAPs.
 
 ISO/IEC 14496-2, FBA object decoding: a FAP keeps the last value that was sent; one that never was is
-estimated from its mate or lip contour, else from the viseme and expression in force.
+estimated: by the face's interpolation table, else from its mate or lip contour, else from the viseme
+and expression in force.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import numpy.typing as npt
 from fba.animation import FaceTrack
 from fba.face.expressions import Definitions
 from fba.face.interpolation import fill
+from fba.face.interpolation_functions import evaluate
+from fba.face.interpolation_table import InterpolationTable
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
 
 Float32 = npt.NDArray[np.float32]
@@ -28,11 +31,12 @@ MOUTH_GROUPS = (2, 6, 8)
 class Resolver:
     """`resolve` for a track that comes in pieces; remembers what earlier pieces sent.
 
-    model: a face that brings `definitions` of its own, or None.
+    model: a face that brings `definitions` or a `fit` of its own, or None.
     """
 
     def __init__(self, model: Any = None) -> None:
         definitions: Definitions = getattr(model, "definitions", None) or Definitions.default()
+        self._fit: InterpolationTable | None = getattr(model, "fit", None)
         self._held = _Held()
         self._visemes = definitions.visemes.copy()
         self._expressions = definitions.expressions.copy()
@@ -40,6 +44,7 @@ class Resolver:
     def copy(self) -> Resolver:
         """An independent resolver in the same state."""
         other = Resolver.__new__(Resolver)
+        other._fit = self._fit
         other._held = self._held.copy()
         other._visemes = self._visemes.copy()
         other._expressions = self._expressions.copy()
@@ -55,11 +60,16 @@ class Resolver:
     def _push_block(self, track: FaceTrack) -> Float32:
         low, sent = self._held.low_level(track)
         viseme, expression = self._held.high_level(track)
-        filled, known = fill(low, sent)
+        alone = expression[:, 4:5] == 0  # else init_face: the expression is the new neutral face
+        filled: npt.NDArray[Any] = low
+        if self._fit is not None:
+            filled, sent, from_high_level = evaluate(self._fit, low, sent, viseme, expression)
+            # What the table makes of the expression is not put on top of the expression again.
+            alone = alone | fill(from_high_level, sent)[0].astype(bool)
+        filled, known = fill(filled, sent)
         shown: Float32 = filled.astype(np.float32)
         base = self._visemes_shown(track, viseme) + self._expressions_shown(track, expression)
-        beneath = known & (expression[:, 4:5] == 0)  # init_face: the expression is the new neutral face
-        shown += np.where(beneath, np.float32(0), base)
+        shown += np.where(known & alone, np.float32(0), base)
         shown[:, :2] = 0
         return shown
 
@@ -88,8 +98,9 @@ class Resolver:
 def resolve(track: FaceTrack, model: Any = None) -> Float32:
     """What the face shows at every frame: float32 (T, 68) in FAPU, columns 0 and 1 zero.
 
-    - A FAP keeps its last value after it was sent. One never sent copies its left/right mate; an outer
-      lip FAP its inner one and the other way round.
+    - A FAP keeps its last value after it was sent. One never sent follows from others by the model's
+      interpolation table (`FaceModel.fit`), where a link leads to it whose sources are there; else it
+      copies its left/right mate, an outer lip FAP its inner one and the other way round.
     - viseme = definition(select1) x blend/63 + definition(select2) x (1 - blend/63);
       expression = definition(select1) x intensity1/63 + definition(select2) x intensity2/63, one
       expression in both places never above its full intensity. Their sum shows where nothing was sent;
@@ -97,7 +108,8 @@ def resolve(track: FaceTrack, model: Any = None) -> Float32:
     - viseme_def and expression_def make the low-level FAPs sent in the same frame (of a viseme: the
       mouth's) the definition of select1 from that frame on; without such FAPs nothing changes.
 
-    model: a face with `definitions` of its own (`Definitions`), or None for the built-in ones.
+    model: a face with `definitions` (`Definitions`) and a `fit` (`InterpolationTable`) of its own, such
+    as a `FaceModel`, or None for the built-in definitions and no table.
     """
     return Resolver(model).push(track)
 
@@ -115,13 +127,9 @@ class _Held:
         return _Held(self.values.copy(), self.sent.copy(), self.viseme.copy(), self.expression.copy())
 
     def low_level(self, track: FaceTrack) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]:
-        mask = track.mask.copy()
-        mask[:, :2] = False
-        if mask[:, 2:].all():
-            values, sent = track.values, mask
-        else:
-            values = hold(track.values, mask, self.values)
-            sent = np.asarray(np.logical_or.accumulate(mask, axis=0)) | self.sent
+        """Values in force, (T, 68), and which of all 68 FAPs were ever sent."""
+        values = track.values if track.mask[:, 2:].all() else hold(track.values, track.mask, self.values)
+        sent = np.asarray(np.logical_or.accumulate(track.mask, axis=0)) | self.sent
         self.values, self.sent = values[-1].copy(), sent[-1].copy()
         return values, sent
 
