@@ -28,6 +28,8 @@ Int32 = npt.NDArray[np.int32]
 PART_KINDS = ("skin", "eye", "teeth", "tongue", "mouth", "brow", "lash", "hair", "other")
 """What a part is. "mouth" is the inside of the mouth where it is not part of the skin; "eye" a whole
 eyeball, left or right by the side of its centre."""
+NORMAL_TOLERANCE = 1e-4
+"""Lengths of normals within this of 1 are taken as 1."""
 SHARED_POINT = 1e-4
 """A bound feature point may stand this far from its vertex, as a share of the face's height."""
 
@@ -47,8 +49,8 @@ class Part:
     """One mesh of a face.
 
     name: unique in its model. kind: one of `PART_KINDS`. vertices: float32 (V, 3), metres, neutral face.
-    triangles: int32 (F, 3), counter-clockwise from outside. normals: float32 (V, 3), unit, or None to
-    have them computed. texcoords: float32 (V, 2), origin at the picture's top left, or None. colours:
+    triangles: int32 (F, 3), counter-clockwise from outside. normals: float32 (V, 3), made unit, or None
+    to have them computed. texcoords: float32 (V, 2), origin at the picture's top left, or None. colours:
     float32 (V, 4), linear light, the fourth how glossy, or None for the material's.
 
     Arrays are read-only copies. ModelError for other shapes, indices out of range, numbers not finite.
@@ -85,7 +87,7 @@ class Part:
         arrays["normals"] = (
             vertex_normals(vertices, arrays["triangles"])
             if self.normals is None
-            else _array(self.normals, (count, 3), f"{where}: normals")
+            else _unit(_array(self.normals, (count, 3), f"{where}: normals"))
         )
         if self.texcoords is not None:
             arrays["texcoords"] = _array(self.texcoords, (count, 2), f"{where}: texture coordinates")
@@ -303,6 +305,16 @@ def _array(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
         row = int(np.argwhere(~np.isfinite(array))[0, 0])
         raise ModelError(f"{what}: number {row} is {array[row].tolist()}, which is not finite")
     return array
+
+
+def _unit(normals: Float32) -> Float32:
+    """The same with length 1; those that have it already stay exactly as they are."""
+    length = np.linalg.norm(normals.astype(np.float64), axis=1)
+    off = np.abs(length - 1.0) > NORMAL_TOLERANCE
+    if off.any():
+        turned = normals[off] / np.maximum(length[off], 1e-30)[:, None]
+        normals[off] = np.where(length[off, None] > 1e-20, turned, (0.0, 0.0, 1.0))
+    return normals
 
 
 def _joined(arrays: list[Float32]) -> Float32:

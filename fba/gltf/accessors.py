@@ -15,7 +15,6 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 """Component types by number, as NumPy knows them."""
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 """How many components an element has."""
-FLOAT = 5126
 UNSIGNED = (5121, 5123, 5125)
 MAX_ELEMENTS = 1 << 22
 """Most elements of one accessor: 4 million vertices or indices."""

@@ -1,0 +1,135 @@
+"""The extension object FBA_face of a glTF file, written: what makes its meshes a face that FAPs move.
+
+`fba_face.schema.json` says what it may hold, docs/face-models.md what that means.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES
+from fba.face.feature_points import names
+from fba.face.gltf.morphs import morph_values
+from fba.face.model import FaceModel
+from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.gltf.values import MAX_TEXT
+from fba.gltf.writer import Builder
+from fba.parameters import faps
+
+NAME = "FBA_face"
+VERSION = 1
+AXES = "xyz"
+
+
+def extension(builder: Builder, model: FaceModel, nodes: list[int]) -> dict[str, Any]:
+    """The extension object; arrays go to accessors of `builder`. nodes: one a part."""
+    place = {part.name: number for number, part in enumerate(model.parts)}
+    content: dict[str, Any] = {
+        "version": VERSION,
+        "name": _text(model.name, "the model's name"),
+        "notes": {_text(k, "a note"): _text(v, f"note {k!r}") for k, v in model.notes.items()},
+        "parts": [_part(model, number, node) for number, node in enumerate(nodes)],
+        "featurePoints": _points(model),
+        "tables": [_table(builder, table, place) for table in model.tables],
+        "lost": {_fap(n): _text(model.lost[n], f"reason for FAP {n}") for n in sorted(model.lost)},
+        "visemes": _definitions(model.definitions.visemes, VISEME_NAMES),
+        "expressions": _definitions(model.definitions.expressions, EXPRESSION_NAMES),
+        "morphValues": {_fap(table.fap): morph_values()[table.fap] for table in model.tables},
+    }
+    if model.fit is not None:
+        content["fit"] = model.fit.to_dict()
+    return content
+
+
+def _part(model: FaceModel, number: int, node: int) -> dict[str, Any]:
+    part = model.parts[number]
+    entry: dict[str, Any] = {"node": node, "kind": part.kind}
+    if part.colours is not None:
+        entry["colour"] = [float(value) for value in part.material.colour]
+    _text(part.name, "a part's name")
+    _text(part.material.name, f"part {part.name!r}: its material's name")
+    return entry
+
+
+def _points(model: FaceModel) -> dict[str, Any]:
+    starts = np.array(list(model.starts.values()))
+    found: dict[str, Any] = {}
+    for row, name in enumerate(names()):
+        if np.isnan(model.points[row]).any():
+            continue
+        found[name] = {"position": model.points[row].tolist()}
+        vertex = int(model.bound[row])
+        if vertex >= 0:
+            part = int(np.searchsorted(starts, vertex, side="right")) - 1
+            found[name] |= {"part": part, "vertex": vertex - int(starts[part])}
+    return found
+
+
+def _table(builder: Builder, table: FaceDefTables, place: dict[str, int]) -> dict[str, Any]:
+    entry: dict[str, Any] = {"fap": _fap(table.fap)}
+    if table.meshes:
+        entry["meshes"] = [_mesh(builder, mesh, place) for mesh in table.meshes]
+    if table.transforms:
+        entry["transforms"] = [_transform(transform, place) for transform in table.transforms]
+    return entry
+
+
+def _mesh(builder: Builder, mesh: FaceDefMesh, place: dict[str, int]) -> dict[str, Any]:
+    entry: dict[str, Any] = {"part": place[mesh.part], "borders": mesh.borders.tolist()}
+    if not len(mesh.vertices):
+        return entry  # an accessor cannot be empty
+    entry["vertices"] = builder.indices(mesh.vertices)
+    moves = mesh.displacements
+    stored, intervals = _distinct(moves)
+    if len(stored) < len(intervals):
+        entry["intervals"] = intervals
+    axes = [axis for axis in range(3) if moves[:, :, axis].any()] or [0]
+    if len(axes) < 3:
+        entry["axes"] = "".join(AXES[axis] for axis in axes)
+    kept = moves[:, stored][:, :, axes]
+    entry["displacements"] = builder.data(kept.reshape(-1, len(axes)))
+    return entry
+
+
+def _distinct(moves: npt.NDArray[np.float32]) -> tuple[list[int], list[int]]:
+    """Intervals that differ from all before them, and for each interval which of those it equals."""
+    stored: list[int] = []
+    which: list[int] = []
+    for interval in range(moves.shape[1]):
+        same = (n for n, other in enumerate(stored) if np.array_equal(moves[:, interval], moves[:, other]))
+        number = next(same, len(stored))
+        if number == len(stored):
+            stored.append(interval)
+        which.append(number)
+    return stored, which
+
+
+def _transform(transform: FaceDefTransform, place: dict[str, int]) -> dict[str, Any]:
+    entry: dict[str, Any] = {} if transform.part == HEAD else {"part": place[transform.part]}
+    return entry | {
+        "kind": transform.kind,
+        "amount": list(transform.amount),
+        "centre": list(transform.centre),
+    }
+
+
+def _definitions(table: npt.NDArray[np.float32], words: tuple[str, ...]) -> list[dict[str, Any]]:
+    """FAPs of select 1, 2, ...; those at 0 are left out."""
+    return [
+        {"name": word, "faps": {_fap(int(n) + 1): float(row[n]) for n in np.flatnonzero(row)}}
+        for word, row in zip(words[1:], table[1:], strict=True)
+    ]
+
+
+def _fap(number: int) -> str:
+    return faps()[number - 1].name
+
+
+def _text(text: str, what: str) -> str:
+    if not isinstance(text, str) or len(text) > MAX_TEXT:
+        raise ModelError(f"{what} must be a text of at most {MAX_TEXT} characters")
+    return text

@@ -1,0 +1,48 @@
+"""What a plain glTF viewer shows of the FAPs: a morph target each, at a typical value.
+
+`morph_values.csv` lists the value of each FAP at which its target has weight 1, in the FAP's own unit:
+lids close, the jaw opens by some 16 mm on an adult, brows rise by some 9 mm, eyes and head turn by 0.3
+radians. What turns or bends on the way there is drawn as a straight line.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.deformer import Deformer
+from fba.face.model import FaceModel
+from fba.parameters import FAP_COUNT, fap_numbers, faps
+
+Float32 = npt.NDArray[np.float32]
+
+
+@cache
+def morph_values() -> dict[int, int]:
+    """FAP value at weight 1, by FAP number, 3..68."""
+    with (files(__package__) / "morph_values.csv").open(encoding="utf-8") as file:
+        return {fap_numbers()[row["fap"]]: int(row["value"]) for row in csv.DictReader(file)}
+
+
+def displacements(model: FaceModel) -> Iterator[tuple[int, Float32]]:
+    """FAP number, and float32 (V, 3) by which it moves the model's vertices at its value, for every table.
+
+    Raises ModelError where that is not finite.
+    """
+    move = Deformer(model)
+    neutral = move(np.zeros(FAP_COUNT))
+    for table in model.tables:
+        values = np.zeros(FAP_COUNT)
+        values[table.fap - 1] = morph_values()[table.fap]
+        shift = move(values) - neutral
+        if not np.isfinite(shift).all():
+            raise ModelError(
+                f"{faps()[table.fap - 1].label} moves vertices beyond all numbers at {values.max():g}"
+            )
+        yield table.fap, shift

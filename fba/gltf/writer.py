@@ -1,0 +1,188 @@
+"""glTF 2.0 files written: arrays to accessors, sparse where that says the same in fewer bytes."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.atomic import atomic
+from fba.errors import ModelError
+from fba.gltf.accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
+from fba.gltf.document import MAX_JSON
+from fba.gltf.glb import MAX_BYTES, join
+from fba.gltf.materials import media_type
+from fba.source import Path
+
+ATTRIBUTES, ELEMENTS = 34962, 34963
+"""Targets of buffer views: vertex attributes, and indices of triangles."""
+RESTART = 65535
+"""An index of 16 bits that has a meaning of its own."""
+
+_TYPES = {width: word for word, width in WIDTHS.items()}
+_CODES = {np.dtype(kind).newbyteorder("="): code for code, kind in COMPONENTS.items()}
+
+
+class Builder:
+    """Collects a document and its bytes, then writes them as one .glb.
+
+    root: the JSON object, to which callers add what they like; lists grow by `add`. Arrays are stored as
+    they are, in the fewest bytes that hold integers and in float32. The same calls give the same bytes.
+    """
+
+    def __init__(self) -> None:
+        self.root: dict[str, Any] = {"asset": {"version": "2.0", "generator": "fba"}}
+        self._views: dict[tuple[int | None, int | None], tuple[int, bytearray]] = {}
+        self._blobs: list[tuple[int, bytes]] = []
+        self._pictures: dict[bytes, int] = {}
+
+    def add(self, key: str, entry: dict[str, Any]) -> int:
+        """Append to a list of the document, such as "nodes"; the entry's index."""
+        entries: list[dict[str, Any]] = self.root.setdefault(key, [])
+        entries.append(entry)
+        return len(entries) - 1
+
+    def attribute(self, values: npt.ArrayLike, *, bounds: bool = False) -> int:
+        """Accessor of a vertex attribute, (V, width); floats become float32.
+
+        bounds: with the smallest and largest of each component, as positions need them.
+        """
+        array = _native(values)
+        stride = array.shape[1] * array.dtype.itemsize
+        view, offset = self._append(array, (ATTRIBUTES, stride))
+        return self._accessor(array, bounds, view, offset)
+
+    def triangles(self, triangles: npt.ArrayLike) -> int:
+        """Accessor of the corners of triangles, (F, 3)."""
+        corners = _unsigned(np.asarray(triangles).reshape(-1, 1), RESTART - 1)
+        view, offset = self._append(corners, (ELEMENTS, None))
+        return self._accessor(corners, False, view, offset)
+
+    def data(self, values: npt.ArrayLike, *, bounds: bool = False) -> int:
+        """Accessor of numbers that are no vertex attribute: keys, matrices, tables; (N, width) or (N,)."""
+        array = _native(values)
+        array = array[:, None] if array.ndim == 1 else array
+        view, offset = self._append(array, (None, None))
+        return self._accessor(array, bounds, view, offset)
+
+    def indices(self, indices: npt.ArrayLike) -> int:
+        """Accessor of whole numbers from 0 on, (N,), in the fewest bytes that hold them."""
+        return self.data(_unsigned(np.asarray(indices), 65535))
+
+    def displacements(self, values: npt.NDArray[np.floating[Any]]) -> int:
+        """Accessor of a morph target, (V, 3): sparse where most vertices stay."""
+        array = np.asarray(values, dtype=np.float32)
+        rows = np.flatnonzero(array.any(axis=1))
+        index_bytes = 2 if len(array) <= RESTART + 1 else 4
+        if len(rows) * (12 + index_bytes) >= array.nbytes:
+            return self.attribute(array, bounds=True)
+        entry = _entry(array, True)
+        if len(rows):
+            places = _unsigned(rows[:, None], 65535)
+            where, start = self._append(places, (None, None))
+            values_view, values_start = self._append(array[rows], (None, None))
+            entry["sparse"] = {
+                "count": len(rows),
+                "indices": _at({"componentType": _CODES[places.dtype]}, where, start),
+                "values": _at({}, values_view, values_start),
+            }
+        return self.add("accessors", entry)
+
+    def image(self, data: bytes, name: str = "") -> int:
+        """Picture in PNG or JPEG, kept in the file once; ModelError for another content."""
+        if data not in self._pictures:
+            kind = media_type(data)
+            if kind is None:
+                raise ModelError(f"the picture {name!r} is neither PNG nor JPEG")
+            view = self.add("bufferViews", {})
+            self._blobs.append((view, data))
+            entry: dict[str, Any] = {"bufferView": view, "mimeType": kind}
+            self._pictures[data] = self.add("images", entry | ({"name": name} if name else {}))
+        return self._pictures[data]
+
+    def glb(self) -> bytes:
+        """The whole file. Raises ModelError where it would be too large, or a text is no Unicode."""
+        chunks: list[bytes] = []
+        at = 0
+        views = self.root.get("bufferViews", [])
+        streams = [(number, bytes(content), key) for key, (number, content) in self._views.items()]
+        for number, content, (target, stride) in (
+            *streams,
+            *((number, content, (None, None)) for number, content in self._blobs),
+        ):
+            view: dict[str, Any] = {"buffer": 0, "byteOffset": at, "byteLength": len(content)}
+            if stride is not None:
+                view["byteStride"] = stride
+            if target is not None:
+                view["target"] = target
+            views[number] = view
+            padding = -len(content) % 4
+            chunks += [content, b"\0" * padding]
+            at += len(content) + padding
+        if at:
+            self.root["buffers"] = [{"byteLength": at}]
+        try:
+            text = json.dumps(self.root, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+        except UnicodeEncodeError:
+            raise ModelError("a name or note holds half a character (a lone surrogate)") from None
+        except ValueError as error:
+            raise ModelError(f"a number cannot be written: {error}") from None
+        if len(text) > MAX_JSON:
+            raise ModelError(
+                f"the file would have {len(text)} bytes of JSON, more than the {MAX_JSON} allowed"
+            )
+        return join(text, b"".join(chunks))
+
+    def save(self, path: Path) -> None:
+        """Write the file, whole or not at all. Raises ModelError as `glb`, FormatError as `atomic`."""
+        data = self.glb()
+        with atomic(path) as file:
+            file.write(data)
+
+    def _append(self, array: npt.NDArray[Any], key: tuple[int | None, int | None]) -> tuple[int, int]:
+        """Add to the stream of that target and stride; its buffer view, and the offset in it."""
+        if key not in self._views:
+            self._views[key] = (self.add("bufferViews", {}), bytearray())
+        view, content = self._views[key]
+        content += b"\0" * (-len(content) % 4)
+        start = len(content)
+        if start + array.nbytes > MAX_BYTES:
+            raise ModelError(f"the file would be larger than {MAX_BYTES} bytes; simplify the model")
+        content += array.astype(array.dtype.newbyteorder("<")).tobytes()
+        return view, start
+
+    def _accessor(self, array: npt.NDArray[Any], bounds: bool, view: int, offset: int) -> int:
+        return self.add("accessors", _at(_entry(array, bounds), view, offset))
+
+
+def _entry(array: npt.NDArray[Any], bounds: bool) -> dict[str, Any]:
+    if not 1 <= len(array) <= MAX_ELEMENTS:
+        raise ModelError(f"a glTF accessor holds 1 to {MAX_ELEMENTS} elements, not {len(array)}")
+    entry = {
+        "componentType": _CODES[array.dtype],
+        "count": len(array),
+        "type": _TYPES[array.shape[1]],
+    }
+    if bounds:
+        entry |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+    return entry
+
+
+def _at(entry: dict[str, Any], view: int, offset: int) -> dict[str, Any]:
+    return entry | {"bufferView": view} | ({"byteOffset": offset} if offset else {})
+
+
+def _native(values: npt.ArrayLike) -> npt.NDArray[Any]:
+    array = np.asarray(values)
+    if array.dtype.kind == "f":
+        return np.ascontiguousarray(array, dtype=np.float32)
+    if array.dtype not in _CODES:
+        raise TypeError(f"glTF has no numbers of type {array.dtype}")
+    return np.ascontiguousarray(array)
+
+
+def _unsigned(array: npt.NDArray[Any], most_short: int) -> npt.NDArray[Any]:
+    kind = np.uint16 if not array.size or int(array.max()) <= most_short else np.uint32
+    return np.ascontiguousarray(array, dtype=kind)
