@@ -87,5 +87,6 @@ def test_deform(benchmark: Any, deformer: Deformer, report: Callable[[str], None
     report(
         f"deform {model.name}, {len(out)} vertices, {len(model.triangles)} triangles, 66 FAPs: "
         f"{whole * 1e3:.2f} ms a frame with normals, {bare * 1e3:.2f} without (goal 0.5); "
-        f"ratio to a copy of both {whole / copy:.0f}; one FAP {one * 1e3:.2f}; feature points alone {points * 1e3:.3f}"
+        f"ratio to a copy of both {whole / copy:.0f}; one FAP {one * 1e3:.2f}; "
+        f"feature points alone {points * 1e3:.3f}"
     )
