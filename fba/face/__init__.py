@@ -2,22 +2,34 @@
 
 shown = fba.face.resolve(animation.face)       # float32 (T, 68): every FAP of every frame
 points = fba.face.FeaturePointFace()(shown)    # float32 (T, 84, 3): feature points in metres
+vertices = fba.face.Deformer(model)(shown)     # float32 (T, V, 3): a whole face, metres
 """
 
+from fba.face.deformer import Deformer
 from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names as feature_point_names
 from fba.face.feature_points import neutral_points
+from fba.face.model import FaceModel, Material, Part
 from fba.face.points import Eyeballs, FeaturePointFace
 from fba.face.resolve import Resolver, resolve
+from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 
 __all__ = [
     "EXPRESSION_NAMES",
+    "HEAD",
     "VISEME_NAMES",
     "Definitions",
+    "Deformer",
     "Eyeballs",
+    "FaceDefMesh",
+    "FaceDefTables",
+    "FaceDefTransform",
+    "FaceModel",
     "Fapu",
     "FeaturePointFace",
+    "Material",
+    "Part",
     "Resolver",
     "feature_point_names",
     "neutral_points",
