@@ -152,8 +152,8 @@ class FaceModel:
     def load(cls, path: str | os.PathLike[str]) -> FaceModel:
         """A face from a glTF 2.0 file (.glb or .gltf) with the FBA extension, as `save` writes it.
 
-        Raises ModelError where it is damaged or brings no feature points; FileNotFoundError and other
-        OSError as `open` does.
+        Raises FormatError where the file cannot be opened, ModelError, which names the place in it,
+        where it is damaged, contradicts itself or brings no such extension.
         """
         from fba.face.storage import load
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+
+from fba.errors import ModelError
 from fba.face.model import FaceModel
 from fba.source import Path
 
@@ -25,6 +28,8 @@ def save(model: FaceModel, path: Path) -> None:
     ModelError where glTF cannot hold the model (a part without triangles, a texture that is neither PNG
     nor JPEG), FormatError where the file cannot be written.
     """
+    if os.fspath(path).lower().endswith(".gltf"):
+        raise ModelError(f"{os.fspath(path)}: face models are written in one file; name it .glb")
     from fba.face.gltf.writing import build
 
     build(model).save(path)

@@ -30,9 +30,11 @@ def read_animations(
             sampler = samplers[each.member("sampler").index(len(samplers), "sampler")]
             if node is not None and path in TYPES:
                 where = node.index(len(nodes), "node")
-                channels.append(
-                    _channel(accessors, sampler, where, path, _width(target, path, nodes[where], meshes))
-                )
+                width = _width(target, path, nodes[where], meshes)
+                channel = _channel(accessors, sampler, where, path, width)
+                # many channels may share keys: what is looked through has a limit too
+                document.budget.charge(channel.times.nbytes + channel.values.nbytes, each)
+                channels.append(channel)
         found.append(Animation(f"animation {number}" if name is None else name.text(), tuple(channels)))
     return tuple(found)
 

@@ -7,6 +7,7 @@ import binascii
 import json
 import os
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -79,9 +80,9 @@ def parse_document(data: bytes, file: str, folder: str | None = None) -> Documen
     text = memoryview(data)
     if data[:4] == glb.MAGIC:
         text, binary = glb.split(data, file)
-    elif data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
+    elif data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
         raise ModelError(f"{file}: is no glTF 2.0: neither a .glb container nor the JSON of a .gltf")
-    root = Value(parse_json(bytes(text), file), file)
+    root = Value(parse_json(text, file), file)
     asset = root.member("asset")
     version = asset.member("version").text(100)
     if not re.fullmatch(r"2\.\d+", version):
@@ -93,7 +94,7 @@ def parse_document(data: bytes, file: str, folder: str | None = None) -> Documen
     return Document(root, tuple(buffers), folder, opened.budget)
 
 
-def parse_json(text: bytes, file: str) -> Any:
+def parse_json(text: memoryview, file: str) -> Any:
     """The JSON object in UTF-8 text; ModelError where it is none, too long or nested too deeply."""
     if len(text) > MAX_JSON:
         raise ModelError(
@@ -102,7 +103,7 @@ def parse_json(text: bytes, file: str) -> Any:
         )
     try:
         data = json.loads(
-            text.decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_unique
+            bytes(text).decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_unique
         )
     except RecursionError:
         raise ModelError(f"{file}: the JSON is nested too deeply; no glTF needs that") from None
@@ -122,8 +123,7 @@ def _refuse_constant(word: str) -> float:
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) != len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
+        twice, _ = Counter(name for name, _ in pairs).most_common(1)[0]
         raise ValueError(f"an object names {ascii(twice)[:60]} twice")
     return found
 

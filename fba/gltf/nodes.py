@@ -32,6 +32,7 @@ def read_nodes(
         if not np.isfinite(world[number]).all():
             raise entries[number].error("the transform to the scene overflows")
         own.flags.writeable = world[number].flags.writeable = False
+    highest = [_highest_joint(mesh) for mesh in meshes]
     nodes = []
     for number, entry in enumerate(entries):
         name, mesh, skin = entry.get("name"), entry.get("mesh"), entry.get("skin")
@@ -48,7 +49,12 @@ def read_nodes(
             mesh=None if mesh is None else mesh.index(len(meshes), "mesh"),
             skin=None if skin is None else skin.index(len(skins), "skin"),
         )
-        _check_skin(entry, node, meshes, skins)
+        if node.mesh is not None and node.skin is not None:
+            count = len(skins[node.skin].joints)
+            if highest[node.mesh] >= count:
+                raise entry.error(
+                    f"mesh {node.mesh} names joint {highest[node.mesh]}, but skin {node.skin} has {count}"
+                )
         nodes.append(node)
     return tuple(nodes), tuple(order)
 
@@ -134,12 +140,5 @@ def rotation_matrix(quaternion: Float64) -> Float64:
     )
 
 
-def _check_skin(entry: Value, node: Node, meshes: tuple[Mesh, ...], skins: tuple[Skin, ...]) -> None:
-    if node.mesh is None or node.skin is None:
-        return
-    count = len(skins[node.skin].joints)
-    for primitive in meshes[node.mesh].primitives:
-        if primitive.joints is not None and int(primitive.joints.max()) >= count:
-            raise entry.error(
-                f"mesh {node.mesh} names joint {primitive.joints.max()}, but skin {node.skin} has {count}"
-            )
+def _highest_joint(mesh: Mesh) -> int:
+    return max((int(p.joints.max()) for p in mesh.primitives if p.joints is not None), default=-1)

@@ -56,7 +56,8 @@ def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
             each = 200 + 12 * moving + (0 if node.skin is None else 600)
             budget.charge(len(primitive.positions) * each, gltf.document)
             name = _unique(node.name if not node.name.startswith("node ") else mesh.name, taken)
-            found.append(_surface(gltf, node, number, primitive, mesh.morph_names, name))
+            with np.errstate(all="ignore"):  # what overflows is found at the end
+                found.append(_surface(gltf, node, number, primitive, mesh.morph_names, name))
     return tuple(found)
 
 
@@ -74,13 +75,12 @@ def _surface(
 ) -> Surface:
     matrices = _frames(gltf, node, primitive)
     linear = matrices[..., :3, :3]
-    with np.errstate(all="ignore"):
-        positions = _moved(linear, primitive.positions) + matrices[..., :3, 3]
-        morphs = {
-            word: _moved(linear, morph).astype(np.float32)
-            for word, morph in zip(names, primitive.morphs, strict=True)
-            if morph is not None
-        }
+    positions = _moved(linear, primitive.positions) + matrices[..., :3, 3]
+    morphs = {
+        word: _moved(linear, morph).astype(np.float32)
+        for word, morph in zip(names, primitive.morphs, strict=True)
+        if morph is not None
+    }
     if len(set(names)) < len(names):
         warnings.warn(f"{gltf.file}: {name}: two morph targets have one name", FbaWarning, stacklevel=3)
     placed = positions.astype(np.float32)
@@ -108,14 +108,13 @@ def _frames(gltf: Gltf, node: Node, primitive: Primitive) -> Float64:
     if node.skin is None or primitive.joints is None or primitive.weights is None:
         return node.world
     skin = gltf.skins[node.skin]
-    with np.errstate(all="ignore"):
-        joints = np.stack([gltf.nodes[joint].world for joint in skin.joints]) @ skin.inverse_bind
-        total = primitive.weights.sum(axis=1, dtype=np.float64)
-        held = total > 0
-        matrices = np.zeros((len(primitive.positions), 4, 4))
-        for slot in range(primitive.joints.shape[1]):
-            share = primitive.weights[:, slot] / np.where(held, total, 1.0)
-            matrices += share[:, None, None] * joints[primitive.joints[:, slot]]
+    joints = np.stack([gltf.nodes[joint].world for joint in skin.joints]) @ skin.inverse_bind
+    total = primitive.weights.sum(axis=1, dtype=np.float64)
+    held = total > 0
+    matrices = np.zeros((len(primitive.positions), 4, 4))
+    for slot in range(primitive.joints.shape[1]):
+        share = primitive.weights[:, slot] / np.where(held, total, 1.0)
+        matrices += share[:, None, None] * joints[primitive.joints[:, slot]]
     matrices[~held] = node.world  # carried by no joint
     return matrices
 
@@ -131,8 +130,7 @@ def _turned(linear: Float64, normals: Float32) -> Float32:
         [np.cross(linear[..., (i + 1) % 3, :], linear[..., (i + 2) % 3, :]) for i in range(3)], axis=-2
     )
     sign = np.sign(np.linalg.det(linear))[..., None]
-    with np.errstate(all="ignore"):
-        turned = _moved(cofactors, normals) * sign
-        length = np.linalg.norm(turned, axis=1, keepdims=True)
-        unit = np.where(length > 0, turned / length, (0.0, 0.0, 1.0))
+    turned = _moved(cofactors, normals) * sign
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    unit = np.where(length > 0, turned / length, (0.0, 0.0, 1.0))
     return np.nan_to_num(unit).astype(np.float32)

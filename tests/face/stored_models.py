@@ -125,7 +125,7 @@ def part(draw: st.DrawFn, title: str) -> Part:
             draw(TEXTS),
             draw(st.tuples(*[st.floats(0, 1)] * 3)),
             draw(st.floats(0, 1)),
-            draw(st.sampled_from([None, picture("PNG"), picture("JPEG")])),
+            draw(st.sampled_from([None, picture("PNG"), picture("JPEG")])) if looks[1] else None,
         ),
     )
 

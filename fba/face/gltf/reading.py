@@ -24,7 +24,7 @@ from fba.gltf.accessors import Accessors
 from fba.gltf.document import Document
 from fba.gltf.reader import read_document
 from fba.gltf.scene import Gltf
-from fba.gltf.values import Value, optional
+from fba.gltf.values import Budget, Value, optional
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
 MAX_PARTS = 1000
@@ -45,10 +45,10 @@ def read_model(document: Document) -> FaceModel:
         raise content.error(f"is version {version}; version {VERSION} is read here")
     accessors = Accessors(document)
     gltf = read_document(document, accessors)
-    parts = _parts(content.member("parts"), gltf)
+    parts = _parts(content.member("parts"), gltf, document.budget)
     points, bound = _points(content.member("featurePoints"), parts)
     fit = content.get("fit")
-    with located(content):
+    with located(content), np.errstate(all="ignore"):  # absurd sizes overflow; no harm comes of it
         return FaceModel(
             parts=parts,
             points=points,
@@ -73,7 +73,7 @@ def located(value: Value) -> Iterator[None]:
         raise value.error(str(error)) from error
 
 
-def _parts(listed: Value, gltf: Gltf) -> tuple[Part, ...]:
+def _parts(listed: Value, gltf: Gltf, budget: Budget) -> tuple[Part, ...]:
     entries = listed.elements(MAX_PARTS)
     parts = []
     taken: set[int] = set()
@@ -83,17 +83,19 @@ def _parts(listed: Value, gltf: Gltf) -> tuple[Part, ...]:
         if number in taken:
             raise where.error(f"node {number} is another part already")
         taken.add(number)
-        parts.append(_part(entry, where, gltf, number))
+        parts.append(_part(entry, where, gltf, number, budget))
     return tuple(parts)
 
 
-def _part(entry: Value, where: Value, gltf: Gltf, number: int) -> Part:
+def _part(entry: Value, where: Value, gltf: Gltf, number: int, budget: Budget) -> Part:
     node = gltf.nodes[number]
     if node.mesh is None or len(gltf.meshes[node.mesh].primitives) != 1:
         raise where.error(f"node {number} must have a mesh of one primitive")
     if node.skin is not None or not np.array_equal(node.world, np.eye(4)):
         raise where.error(f"node {number} must stand where it is modelled: no transform, no skin")
     primitive = gltf.meshes[node.mesh].primitives[0]
+    # copies here and in the joined arrays of the face
+    budget.charge(len(primitive.positions) * 120 + len(primitive.triangles) * 36, entry)
     with located(entry):
         return Part(
             name=node.name,

@@ -48,6 +48,7 @@ def _mesh(document: Document, accessors: Accessors, entry: Value, parts: tuple[P
     displacements: Float32 = np.zeros((0, max(len(borders) - 1, 0), 3), dtype=np.float32)
     if reference is not None:
         raw = accessors.integers(reference, "SCALAR")[:, 0]
+        document.budget.charge(len(raw) * 16, reference)
         if int(raw.max()) >= len(part.vertices):
             raise reference.error(
                 f"element {raw.argmax()} names vertex {raw.max()}, "

@@ -43,6 +43,10 @@ def build(model: FaceModel) -> Builder:
 def _primitive(builder: Builder, part: Part, materials: _Materials) -> dict[str, Any]:
     if not len(part.triangles):
         raise ModelError(f"part {part.name!r} has no triangles; a glTF mesh needs some: leave the part out")
+    if part.material.texture is not None and part.texcoords is None:
+        raise ModelError(
+            f"part {part.name!r} has a texture, but no texture coordinates; leave the texture out"
+        )
     attributes = {"POSITION": builder.attribute(part.vertices, bounds=True)}
     for key, array in (("NORMAL", part.normals), ("TEXCOORD_0", part.texcoords), ("COLOR_0", part.colours)):
         if array is not None:
