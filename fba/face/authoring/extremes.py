@@ -1,0 +1,91 @@
+"""How far a motion can go before triangles fold over or tear."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+
+LEAST_AREA = 0.12
+"""A triangle seen along its neutral normal keeps this share of its area."""
+MOST_STRETCH = 5.0
+"""No edge gets longer than this many times its neutral length..."""
+TINY_EDGE = 0.25
+"""... or, where edges are short, of this share of the typical edge of what moves."""
+DEGENERATE = 1e-5
+"""Triangles of less than this share of the typical area have no front to turn."""
+
+
+class Limiter:
+    """Measures motions of a mesh. vertices: (N, 3) neutral. triangles: (F, 3)."""
+
+    def __init__(self, vertices: Float64, triangles: Int) -> None:
+        self._vertices = vertices
+        first, second = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
+        areas = np.linalg.norm(np.cross(first, second), axis=1)
+        typical = float(np.median(areas)) if len(areas) else 0.0
+        self._triangles = triangles[areas > DEGENERATE * typical]
+
+    def __len__(self) -> int:
+        return len(self._vertices)
+
+    def touched(self, vertices: Int) -> Int:
+        """(M, 3) triangles with a vertex among those given."""
+        moving = np.zeros(len(self._vertices), dtype=bool)
+        moving[vertices] = True
+        touched: Int = self._triangles[moving[self._triangles].any(axis=1)]
+        return touched
+
+    def reach(self, field: Float64, triangles: Int) -> Float64:
+        """(M,) for each triangle the largest s up to which vertices + s * field (N, 3) keeps it sound."""
+        p, d = self._vertices, field
+        e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
+        d1, d2 = (d[triangles[:, k]] - d[triangles[:, 0]] for k in (1, 2))
+        normal = np.cross(e1, e2)
+        area = (normal**2).sum(axis=1)
+        linear = ((np.cross(e1, d2) + np.cross(d1, e2)) * normal).sum(axis=1) / area
+        square = (np.cross(d1, d2) * normal).sum(axis=1) / area
+        result = _first_root(square, linear, np.full(len(area), 1 - LEAST_AREA))
+        lengths = np.stack([np.linalg.norm(e, axis=1) for e in (e1, e2, e2 - e1)])
+        typical = float(np.median(lengths)) if lengths.size else 0.0
+        for edge, move in ((e1, d1), (e2, d2), (e2 - e1, d2 - d1)):
+            base = (edge**2).sum(axis=1)
+            longest = MOST_STRETCH**2 * np.maximum(base, (TINY_EDGE * typical) ** 2)
+            stretch = _first_root(-(move**2).sum(axis=1), -2 * (edge * move).sum(axis=1), longest - base)
+            result = np.minimum(result, stretch)
+        return result
+
+    def sound(self, shifts: Float64, triangles: Int) -> bool:
+        """Whether vertices + shifts (N, 3) keeps all these triangles sound."""
+        return self.soundness(shifts, triangles).all()  # type: ignore[no-any-return]
+
+    def soundness(self, shifts: Float64, triangles: Int) -> npt.NDArray[np.bool_]:
+        """(M,) which triangles stay sound under shifts."""
+        p = self._vertices
+        q = p + shifts
+        e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
+        f1, f2 = (q[triangles[:, k]] - q[triangles[:, 0]] for k in (1, 2))
+        normal = np.cross(e1, e2)
+        kept = (np.cross(f1, f2) * normal).sum(axis=1) / (normal**2).sum(axis=1)
+        fine: npt.NDArray[np.bool_] = kept >= 0.8 * LEAST_AREA
+        lengths = np.linalg.norm(np.stack([e1, e2, e2 - e1]), axis=2)
+        typical = float(np.median(lengths)) if lengths.size else 0.0
+        now = np.linalg.norm(np.stack([f1, f2, f2 - f1]), axis=2)
+        fine &= (now <= 1.1 * MOST_STRETCH * np.maximum(lengths, TINY_EDGE * typical)).all(axis=0)
+        return fine
+
+
+def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:
+    """Smallest positive x with square x² + linear x + constant = 0, inf where there is none; constant > 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        below = linear**2 - 4 * square * constant
+        root = np.sqrt(np.maximum(below, 0.0))
+        # the numerically stable pair of roots
+        q = -0.5 * (linear + np.where(linear >= 0, root, -root))
+        roots = np.stack([q / square, constant / q])
+    roots[:, below < 0] = np.inf
+    roots[~(roots > 0)] = np.inf
+    result: Float64 = roots.min(axis=0)
+    return result

@@ -1,0 +1,212 @@
+"""The lower jaw: FAP 3 open_jaw, a hinge about the ears, and FAPs 14 and 15, which slide it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.landmarks import Landmarks
+from fba.face.authoring.motion import limits
+from fba.face.authoring.weights import region, smooth_step, spread, without_hem
+from fba.face.model import Part
+from fba.face.points import OPEN_JAW
+
+Float64 = npt.NDArray[np.float64]
+
+CHIN = ("2.1", "2.10", "2.11", "2.12")
+EARS = ("10.7", "10.8", "10.9", "10.10")
+"""Where the ears meet the face; the hinge lies between them."""
+STILL = (
+    "5.3",
+    "5.4",
+    "9.1",
+    "9.2",
+    "9.3",
+    "9.15",
+    "3.9",
+    "3.10",
+    "10.5",
+    "10.6",
+    "10.7",
+    "10.8",
+    "10.9",
+    "10.10",
+    "8.1",
+)
+REACH = 1.5
+"""How far the jaw pulls at cheeks and neck, in ES0."""
+CORNER = 0.6
+"""How much of the jaw's turn the skin over its corners makes."""
+WIDEST = np.radians(32.0)
+"""Nobody opens further."""
+INTERVAL = np.radians(3.0)
+"""The arc is cut into intervals no longer than this."""
+LIP_RIDE = 0.5
+"""The lower lip rides on a jaw that slides, but not on one that opens: it has FAPs of its own for that."""
+SLACK = 0.2
+HEM = 0.004
+TEETH_MARGIN = 0.12
+"""Behind the lips the jaw's share goes from 0 to 1 within this height about the teeth's edge, in MNS0."""
+LIP_DEPTH = 0.16
+"""From this far behind the lips on, in ES0, the inside of the mouth belongs to the jaws."""
+
+
+@dataclass(frozen=True, eq=False)
+class Jaw:
+    """share: (N,) of the surface, 1 on the chin. sliding: the same for FAPs 14 and 15, with the lower lip.
+    hinge: (y, z) of the axis. chin: (3,), the point that sinks by exactly value x MNS.
+    """
+
+    share: Float64
+    sliding: Float64
+    hinge: Float64
+    chin: Float64
+
+
+def jaw(marks: Landmarks) -> Jaw | str:
+    """The jaw of a face, or why it has none."""
+    if not marks.has("2.1"):
+        return "feature point 2.1 is not on the skin"
+    ears = np.array([marks.guess(name) for name in EARS])
+    hinge = ears.mean(axis=0)[1:]
+    chin = marks.place("2.1")
+    if chin[2] - hinge[1] <= 0 or chin[1] >= hinge[0]:
+        return "the chin (2.1) is not below and before the ears"
+    share = _share(marks, hinge)
+    return Jaw(share, _with_lip(marks, share), hinge, chin)
+
+
+def opening(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
+    """(values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
+    low, high = limits(OPEN_JAW)
+    arm = jaw.chin[1:] - jaw.hinge
+    radius, rest = float(np.hypot(*arm)), float(np.arctan2(arm[0], arm[1]))
+    # the chin cannot sink below the lowest point of its circle
+    angle = min(WIDEST, rest + np.pi / 2 - 0.05)
+    deepest = (arm[0] - radius * np.sin(rest - angle)) / unit
+    count = max(5, int(np.ceil(angle / INTERVAL)))
+    values = np.unique(np.round(np.linspace(0, min(deepest, high), count + 1)))
+    angles = rest - np.arcsin(np.clip((arm[0] - values * unit) / radius, -1, 1))
+    values, angles = np.append(values, [high]), np.append(angles, angles[-1])
+    if values[-2] == high:
+        values, angles = values[:-1], angles[:-1]
+    # a closed jaw does not close further
+    return np.append([low if low < 0 else -1.0], values), np.append([0.0], angles)
+
+
+def turned(points: Float64, hinge: Float64, angles: Float64) -> Float64:
+    """(K, N, 3) shifts of points (N, 3) turned about the hinge, +z down, by each angle (K,)."""
+    y, z = points[:, 1] - hinge[0], points[:, 2] - hinge[1]
+    cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    zero = np.zeros((len(angles), len(points)))
+    return np.stack([zero, y * cos - z * sin - y, y * sin + z * cos - z], axis=-1)
+
+
+def bite(marks: Landmarks) -> float:
+    """Height at which upper and lower teeth meet."""
+    heights = [marks.place(name)[1] for name in ("9.10", "9.11")]
+    known = [h for h in heights if np.isfinite(h)]
+    lips = [marks.place(name)[1] for name in ("2.2", "2.3")]
+    return float(np.mean(known or [h for h in lips if np.isfinite(h)] or [marks.guess("9.10")[1]]))
+
+
+def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
+    """(N,) 1 for what lies below the plane through the hinge and the teeth's edge, 0 above."""
+    front = marks.guess("9.10")
+    reach = max(front[2] - hinge[1], 1e-6)
+    ahead = np.clip((points[:, 2] - hinge[1]) / reach, 0.2, None)
+    plane = hinge[0] + (bite(marks) - hinge[0]) * ahead
+    margin = TEETH_MARGIN * marks.fapu.MNS * 1024
+    return smooth_step((plane - points[:, 1]) / (2 * margin) + 0.5)
+
+
+def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
+    """(V,) how much each vertex of a part inside the mouth turns with the jaw.
+
+    Each connected piece that lies on one side of the teeth's edge goes as one: a tooth does not bend.
+    """
+    from fba.face.authoring.surface import Surface
+
+    if part.kind == "tongue":
+        return np.ones(len(part.vertices))
+    shape = Surface([part])
+    each = below_bite(marks, shape.vertices, hinge)
+    if part.kind == "teeth":
+        count = np.bincount(shape.component)
+        mean = np.bincount(shape.component, each) / count
+        extent = np.array([each[shape.component == k].std() for k in range(len(count))])
+        whole = np.where(mean > 0.5, 1.0, 0.0)
+        each = np.where((np.minimum(mean, 1 - mean) < 0.4) | (extent < 0.2), whole[:], mean)[shape.component]
+    result: Float64 = each[shape.number]
+    return result
+
+
+def _share(marks: Landmarks, hinge: Float64) -> Float64:
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    one = {marks.vertex[name]: 1.0 for name in CHIN if marks.has(name)}
+    line = marks.contour("jaw line")
+    values: dict[int, float] = {}
+    if len(line):
+        values |= dict(zip(line.tolist(), _along_jaw(marks, line).tolist(), strict=True))
+    values |= {marks.vertex[name]: CORNER for name in ("2.13", "2.14") if marks.has(name)}
+    values |= one
+    source = np.array(sorted(values))
+    lips = marks.on("lower outer lip", "upper outer lip", "lower inner lip", "upper inner lip") | marks.lips
+    still = np.unique([*np.flatnonzero(lips), *(marks.vertex[name] for name in STILL if marks.has(name))])
+    inside = marks.inside_mouth
+    near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
+    free = region(near, far, REACH * es) & ~inside & ~lips
+    fixed = np.concatenate([source, np.flatnonzero(lips)])
+    given = np.concatenate([[values[int(v)] for v in source], np.zeros(int(lips.sum()))])
+    if inside.any():
+        depth = surface.distances(np.flatnonzero(lips | marks.on_inner_lips))
+        jaws = np.flatnonzero(inside & (depth > LIP_DEPTH * es))
+        fixed = np.concatenate([fixed, jaws])
+        given = np.concatenate([given, below_bite(marks, surface.vertices[jaws], hinge)])
+        free |= inside
+    order = np.unique(fixed, return_index=True)[1]
+    field = spread(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
+    return without_hem(np.clip(field[:, 0], 0.0, 1.0), HEM)
+
+
+def _along_jaw(marks: Landmarks, line: npt.NDArray[np.intp]) -> Float64:
+    """Shares along the jaw line: 1 between the corners of the chin, less towards the corners of the jaw."""
+    chin = [k for k, v in enumerate(line) if v in {marks.vertex.get(name) for name in CHIN}]
+    steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    first, last = length[chin[0]], length[chin[-1]]
+    left = np.where(length < first, (first - length) / max(first, 1e-9), 0.0)
+    right = np.where(length > last, (length - last) / max(length[-1] - last, 1e-9), 0.0)
+    return 1 - (1 - CORNER) * smooth_step(np.maximum(left, right))
+
+
+def _with_lip(marks: Landmarks, share: Float64) -> Float64:
+    """The share of a sliding jaw: the lower lip goes half way, the upper one stays."""
+    lower = marks.on("lower outer lip", "lower inner lip")
+    upper = marks.on("upper outer lip", "upper inner lip")
+    lower &= ~upper
+    if not lower.any():
+        return share
+    # lips and skin around take what lies between the given: chin, lower lip, upper lip
+    es = marks.fapu.ES * 1024
+    surface = marks.surface
+    close = surface.distances(np.flatnonzero(lower), 0.6 * es) < 0.5 * es
+    along = _from_corners(marks, np.flatnonzero(lower))
+    fixed = np.flatnonzero(lower | upper | ~close)
+    given = share.copy()
+    given[upper] = 0.0
+    given[np.flatnonzero(lower)] = LIP_RIDE * along
+    near_jaw = close & (share > 0.9)
+    fixed = np.union1d(fixed, np.flatnonzero(near_jaw))
+    field = spread(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
+    return without_hem(np.clip(field, 0.0, 1.0), HEM)
+
+
+def _from_corners(marks: Landmarks, vertices: npt.NDArray[np.intp]) -> Float64:
+    """(M,) 0 at the corners of the mouth, 1 in its middle half."""
+    x = marks.surface.vertices[vertices, 0]
+    left, right = marks.guess("8.3")[0], marks.guess("8.4")[0]
+    across = (x - right) / (left - right)
+    return smooth_step(4 * np.minimum(across, 1 - across))

@@ -1,0 +1,240 @@
+"""Eyelids: FAPs 19-22. Every vertex of a lid stays in its own upright plane and turns about the eyeball.
+
+A lid closes column by column, each in proportion to its own opening, so that upper and lower margin meet
+along their whole length however the way is split between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.extremes import Limiter
+from fba.face.authoring.eyes import Eye
+from fba.face.authoring.landmarks import Landmarks
+from fba.face.authoring.motion import Motion, limits
+from fba.face.authoring.saturation import guarded
+from fba.face.authoring.weights import region, smooth_step, spread, without_hem
+from fba.face.model import Part
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+
+LIDS = {19: ("left", "upper"), 20: ("right", "upper"), 21: ("left", "lower"), 22: ("right", "lower")}
+CLOSED = 1024
+STEP = 128
+"""Values between two borders of the tables: an eighth of the way."""
+REACH = {"upper": 0.6, "lower": 0.4}
+"""How far a lid pulls at the skin around it, in ES0."""
+STILL = {
+    "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
+    "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
+}
+SLACK = 0.12
+HEM = 0.006
+CLEARANCE = 0.012
+"""Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
+FREED = 0.3
+"""Share of the way after which a lid has its full clearance."""
+BULGE = np.radians(12.0)
+"""The cornea bulges by this much beyond where it is now: the eye may look elsewhere."""
+COLUMNS = 65
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """The opening of one eye by columns. x: (C,) rising. upper, lower: (C, 2) height and depth of the
+    margins there, from the eyeball's centre, metres.
+    """
+
+    x: Float64
+    upper: Float64
+    lower: Float64
+
+
+def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Sequence[Part]) -> Motion | str:
+    """The motion of the surface, or why there is none."""
+    side, lid = LIDS[fap]
+    own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
+    if not len(own) or not len(other):
+        return f"the margin of the {side} {lid if not len(own) else _other(lid)} lid is not on the skin"
+    opening = measure(marks, eye)
+    if opening is None:
+        return f"the lids of the {side} eye are not one above the other"
+    share = _share(marks, side, lid, own, other)
+    vertices = np.flatnonzero(share > 0)
+    points = marks.surface.vertices[vertices]
+    values = lid_values(fap)
+    shifts = slid(points, share[vertices], opening, eye, lid, values / CLOSED)
+    profile = Profile(eye, parts)
+    for k, value in enumerate(values):
+        freed = float(smooth_step(np.array([abs(value) / CLOSED / FREED]))[0])
+        shifts[k] += profile.lift(points, shifts[k]) * freed
+    return guarded(limiter, Motion(values, vertices, shifts))
+
+
+def lid_values(fap: int) -> Float64:
+    """Borders: the range of the FAP, and in any case all of the way to the other lid."""
+    low, high = limits(fap)
+    high = max(high, float(CLOSED))
+    between = np.arange(np.ceil(low / STEP) * STEP, high + 1, STEP)
+    return np.unique(np.concatenate([[low, 0.0, high], between[(between > low) & (between < high)]]))
+
+
+def measure(marks: Landmarks, eye: Eye) -> Opening | None:
+    """The columns of an eye's opening, or None where its lids are not one above the other."""
+    lines = []
+    for lid in ("upper", "lower"):
+        walk = marks.surface.vertices[marks.contour(f"{eye.side} {lid} lid")]
+        lines.append(walk[np.argsort(walk[:, 0], kind="stable")])
+    left = max(line[0, 0] for line in lines)
+    right = min(line[-1, 0] for line in lines)
+    if not right > left:
+        return None
+    x = np.linspace(left, right, COLUMNS)
+    x = np.unique(
+        np.concatenate([x, *(line[(line[:, 0] > left) & (line[:, 0] < right), 0] for line in lines)])
+    )
+    margins = [
+        np.stack([np.interp(x, line[:, 0], line[:, axis] - eye.centre[axis]) for axis in (1, 2)], axis=1)
+        for line in lines
+    ]
+    if not (margins[0][1:-1, 0] > margins[1][1:-1, 0]).mean() > 0.7:
+        return None
+    return Opening(x, *margins)
+
+
+def slid(
+    points: Float64, share: Float64, opening: Opening, eye: Eye, lid: str, way: Float64, lash: bool = False
+) -> Float64:
+    """(K, N, 3): shifts of points (N, 3) when a lid has gone some shares (K,) of the way to the other.
+
+    share: (N,), how much each goes with the margin of its column.
+    """
+    own, other = (opening.upper, opening.lower) if lid == "upper" else (opening.lower, opening.upper)
+    column = np.clip(points[:, 0], opening.x[0], opening.x[-1])
+    here, there = (
+        np.stack([np.interp(column, opening.x, line[:, axis]) for axis in (0, 1)], axis=1)
+        for line in (own, other)
+    )
+    radius, across = np.hypot(*here.T), np.hypot(*there.T)
+    height = points[:, 1] - eye.centre[1]
+    depth = points[:, 2] - eye.centre[2]
+    distance = np.hypot(height, depth)
+    # what is further out than the margin turns less: it moves no further than the margin does
+    part = share if lash else share * np.minimum(1.0, radius / np.maximum(distance, 1e-12))
+    start = np.arcsin(np.clip(here[:, 0] / np.maximum(radius, 1e-12), -1, 1))
+    shifts = np.zeros((len(way), len(points), 3))
+    for k, t in enumerate(way):
+        goal = here[:, 0] + t * (there[:, 0] - here[:, 0])
+        size = radius + np.clip(t, 0, 1) * (across - radius)
+        size = np.maximum(size, np.abs(goal) * 1.0001)
+        turn = (np.arcsin(goal / np.maximum(size, 1e-12)) - start) * part
+        grown = 1 + share * (size / np.maximum(radius, 1e-12) - 1)
+        cos, sin = np.cos(turn), np.sin(turn)
+        shifts[k, :, 1] = (height * cos + depth * sin) * grown - height
+        shifts[k, :, 2] = (depth * cos - height * sin) * grown - depth
+    shifts[way == 0] = 0.0
+    return shifts
+
+
+class Profile:
+    """How far the front of an eyeball reaches out in every direction, the cornea included."""
+
+    def __init__(self, eye: Eye, parts: Sequence[Part]) -> None:
+        self._eye = eye
+        self._angles = np.linspace(0, np.pi, 73)
+        self._radii = np.full(73, eye.radius)
+        for part in parts:
+            if part.name not in eye.parts:
+                continue
+            arms = part.vertices.astype(np.float64) - eye.centre
+            reach = np.linalg.norm(arms, axis=1)
+            angle = np.arccos(np.clip(arms @ eye.gaze / np.maximum(reach, 1e-12), -1, 1))
+            for k, at in enumerate(self._angles):
+                near = np.abs(angle - at) < BULGE
+                if near.any():
+                    self._radii[k] = max(self._radii[k], float(reach[near].max()))
+
+    def radius(self, points: Float64) -> Float64:
+        """(N,) how far the eyeball reaches in the directions of points (N, 3)."""
+        arms = points - self._eye.centre
+        reach = np.linalg.norm(arms, axis=1)
+        angle = np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1))
+        result: Float64 = np.interp(angle, self._angles, self._radii)
+        return result
+
+    def lift(self, points: Float64, shifts: Float64) -> Float64:
+        """(N, 3): what must be added, forwards, so that what was outside the eyeball stays outside."""
+        at = points + shifts
+        needed = self.radius(at) + CLEARANCE * self._eye.radius
+        arms = at - self._eye.centre
+        level = (arms[:, :2] ** 2).sum(axis=1)
+        outside = np.linalg.norm(points - self._eye.centre, axis=1) >= 0.98 * self.radius(points)
+        before = np.sqrt(np.maximum(needed**2 - level, 0.0))
+        moved = np.linalg.norm(shifts, axis=1) > 1e-9
+        push = np.where(outside & moved & (arms[:, 2] > 0), np.maximum(before - arms[:, 2], 0.0), 0.0)
+        result = np.zeros_like(at)
+        result[:, 2] = push
+        return result
+
+
+def _other(lid: str) -> str:
+    return "lower" if lid == "upper" else "upper"
+
+
+def _share(marks: Landmarks, side: str, lid: str, own: Int, other: Int) -> Float64:
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    stays = np.setdiff1d(other, own)
+    still = [marks.vertex[name] for name in STILL[side] if marks.has(name)]
+    reach = REACH[lid] * es
+    near = surface.distances(own, reach)
+    far = surface.distances(still, 4 * reach)
+    free = region(near, far, reach, 0.85)
+    fixed = np.concatenate([own, stays])
+    given = np.concatenate([np.ones(len(own)), np.zeros(len(stays))])
+    field = spread(surface, free, fixed, given[:, None], slack=SLACK * es)[:, 0]
+    return without_hem(np.clip(field, 0.0, 1.0), HEM)
+
+
+def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -> Motion:
+    """Lashes turn with the margin that they grow on, each connected piece with the nearer one."""
+    from fba.face.authoring.surface import Surface
+
+    side, name = LIDS[fap]
+    opening = measure(marks, eye)
+    assert opening is not None  # the lid moves, so there is one
+    shape = Surface([part])
+    reach = [
+        _distance(shape.vertices, marks.surface.vertices[marks.contour(f"{side} {which} lid")])
+        for which in ("upper", "lower")
+    ]
+    pieces = shape.component
+    closest = [np.full(pieces.max() + 1, np.inf) for _ in reach]
+    for best, away in zip(closest, reach, strict=True):
+        np.minimum.at(best, pieces, away)
+    wide = opening.x[-1] - opening.x[0]
+    mean = np.bincount(pieces, shape.vertices[:, 1]) / np.bincount(pieces)
+    middle = float((opening.upper[:, 0] + opening.lower[:, 0]).mean()) / 2 + eye.centre[1]
+    upper = np.where(np.abs(closest[0] - closest[1]) < 0.1 * wide, mean > middle, closest[0] < closest[1])
+    grows = (upper == (name == "upper")) & (np.minimum(*closest) < 0.25 * wide)
+    moving = np.flatnonzero(grows[pieces][shape.number])
+    points = part.vertices[moving].astype(np.float64)
+    ways = np.clip(lid.values, *_sound_range(lid)) / CLOSED
+    return Motion(lid.values, moving, slid(points, np.ones(len(points)), opening, eye, name, ways, lash=True))
+
+
+def _sound_range(lid: Motion) -> tuple[float, float]:
+    """Where a lid comes to rest on both sides."""
+    moved = np.abs(np.diff(lid.shifts, axis=0)).max(axis=(1, 2)) > 0
+    used = np.flatnonzero(moved)
+    return (float(lid.values[used[0]]), float(lid.values[used[-1] + 1])) if len(used) else (0.0, 0.0)
+
+
+def _distance(points: Float64, line: Float64) -> Float64:
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(line).query(points)[0], dtype=np.float64)

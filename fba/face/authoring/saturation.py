@@ -1,0 +1,103 @@
+"""Motions that go as far as the mesh can follow and then come to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.extremes import Limiter
+from fba.face.authoring.motion import Motion
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+
+EASE = (0.75, 1.25)
+"""A motion slows down to half at this share of what the mesh can take, and stops at that one."""
+HALVINGS = 7
+FULL = 0.98
+"""Values are left alone where the mesh can take this share of them."""
+
+
+def held_back(value: float, most: float) -> float:
+    """A value that eases out towards `most` instead of passing it."""
+    size = abs(value)
+    slow, stop = EASE[0] * most, EASE[1] * most
+    result = min(size, slow) + 0.5 * max(min(size, stop) - slow, 0.0)
+    return float(np.copysign(result, value)) if value else 0.0
+
+
+def knots(most: float, limit: float) -> list[float]:
+    """The values between 0 and the limit where `held_back` bends."""
+    return [round(share * most) for share in EASE if 1 <= share * most + 0.5 < limit]
+
+
+def values_between(low: float, high: float, *bends: float) -> Float64:
+    """Rising whole values from low to high with 0 and the given bends that lie between."""
+    inner = {0, *(round(bend) for bend in bends if low < round(bend) < high)}
+    return np.array(sorted({round(low), round(high)} | inner), dtype=np.float64)
+
+
+def linear(limiter: Limiter, vertices: Int, field: Float64, low: float, high: float) -> Motion:
+    """A straight motion by value x field (N, 3) metres, held back where triangles would fold."""
+    whole = np.zeros((len(limiter), 3))
+    whole[vertices] = field
+    triangles = limiter.touched(vertices)
+    most = [_most(limiter, whole * sign, triangles, abs(end)) for sign, end in ((-1, low), (1, high))]
+    bends = [-bend for bend in knots(most[0], -low)] + knots(most[1], high)
+    values = values_between(low, high, *bends)
+    held = np.array([held_back(value, most[int(value > 0)]) for value in values])
+    return guarded(limiter, Motion(values, vertices, held[:, None, None] * field))
+
+
+def _most(limiter: Limiter, field: Float64, triangles: Int, limit: float) -> float:
+    reach = float(limiter.reach(field, triangles).min(initial=np.inf))
+    return np.inf if FULL * reach >= limit else max(reach, 1.0)
+
+
+def guarded(limiter: Limiter, motion: Motion) -> Motion:
+    """The same motion, stopped on each side where it would fold triangles on its way out."""
+    triangles = limiter.touched(motion.vertices)
+    zero = int(np.flatnonzero(motion.values == 0)[0])
+    down = _stopped(limiter, motion, range(zero - 1, -1, -1), triangles)
+    up = _stopped(limiter, motion, range(zero + 1, len(motion.values)), triangles)
+    steps = [*down[::-1], (0.0, motion.shifts[zero]), *up]
+    return Motion(np.array([v for v, _ in steps]), motion.vertices, np.array([s for _, s in steps]))
+
+
+def _stopped(limiter: Limiter, motion: Motion, side: range, triangles: Int) -> list[tuple[float, Float64]]:
+    """(value, shifts) going out from 0, up to where a triangle folds, and from there at rest."""
+    steps: list[tuple[float, Float64]] = []
+    value, shifts = 0.0, np.zeros_like(motion.shifts[0])
+    for k in side:
+        if _sound(limiter, motion, motion.shifts[k], triangles):
+            value, shifts = float(motion.values[k]), motion.shifts[k]
+            steps.append((value, shifts))
+            continue
+        share = _last_sound(limiter, motion, shifts, motion.shifts[k], triangles)
+        end = float(np.round(value + (motion.values[k] - value) * share))
+        if end != value:
+            # rounded to a whole value, so that the slope up to here stays what it was
+            share = (end - value) / (motion.values[k] - value)
+            shifts = shifts * (1 - share) + motion.shifts[k] * share
+            steps.append((end, shifts))
+        if motion.values[side[-1]] != end:
+            steps.append((float(motion.values[side[-1]]), shifts))
+        break
+    return steps
+
+
+def _sound(limiter: Limiter, motion: Motion, shifts: Float64, triangles: Int) -> bool:
+    whole = np.zeros((len(limiter), 3))
+    whole[motion.vertices] = shifts
+    return limiter.sound(whole, triangles)
+
+
+def _last_sound(limiter: Limiter, motion: Motion, start: Float64, end: Float64, triangles: Int) -> float:
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        if _sound(limiter, motion, start * (1 - middle) + end * middle, triangles):
+            low = middle
+        else:
+            high = middle
+    return low

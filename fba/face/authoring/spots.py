@@ -1,0 +1,138 @@
+"""Brows, cheeks, chin, nose and ears: FAPs whose feature points pull at the skin around them.
+
+Which points share a region, what bounds it and what a FAP takes along is in `regions.csv` and
+`handles.csv`; the right side mirrors the left.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.extremes import Limiter
+from fba.face.authoring.landmarks import Landmarks
+from fba.face.authoring.motion import Motion, limits
+from fba.face.authoring.saturation import linear
+from fba.face.authoring.weights import region, spread, without_hem
+from fba.face.feature_points import MIRRORED
+from fba.face.points import DIRECTIONS
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+
+SLACK = 0.2
+"""Distance in ES0 beyond which the skin does not spring back."""
+HEM = 0.006
+
+
+@dataclass(frozen=True)
+class Region:
+    """Points that pull at the same skin; reach in ES0; share of the way to what stays that moves."""
+
+    name: str
+    points: tuple[str, ...]
+    still: tuple[str, ...]
+    contours: tuple[str, ...]
+    reach: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Handle:
+    """What one FAP does to the points of its region. bulge: how far the skin beside swells outwards."""
+
+    fap: int
+    region: str
+    values: dict[str, float]
+    bulge: float
+
+
+@cache
+def regions() -> dict[str, Region]:
+    """The regions by name."""
+    return {
+        row["region"]: Region(
+            row["region"],
+            tuple(row["points"].split()),
+            tuple(row["still"].split()),
+            tuple(c for c in row["contours"].split("|") if c),
+            float(row["reach"]),
+            float(row["share"]),
+        )
+        for row in _rows("regions.csv")
+    }
+
+
+@cache
+def handles() -> tuple[Handle, ...]:
+    """What each FAP pulls at, right mates included."""
+    found = []
+    mirror = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
+    for row in _rows("handles.csv"):
+        pairs = (pair.split("=") for pair in row["values"].split())
+        left = {name: float(value) for name, value in pairs}
+        found.append(Handle(int(row["fap"]), row["region"], left, float(row["bulge"])))
+        mate = faps()[int(row["fap"]) - 1].left_right_mate
+        if mate is not None:
+            right = {mirror.get(name, name): value for name, value in left.items()}
+            found.append(Handle(mate, row["region"], right, float(row["bulge"])))
+    return tuple(found)
+
+
+def spot_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
+    """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
+    found: dict[int, Motion] = {}
+    lost: dict[int, str] = {}
+    for area in regions().values():
+        own = []
+        for handle in handles():
+            if handle.region != area.name:
+                continue
+            point = faps()[handle.fap - 1].feature_points[0]
+            if marks.has(point):
+                own.append(handle)
+            else:
+                lost[handle.fap] = f"feature point {point} is not on the skin"
+        if own:
+            fields = _fields(marks, area, own)
+            for k, handle in enumerate(own):
+                found[handle.fap] = _motion(marks, limiter, handle, fields[:, k])
+    return found, lost
+
+
+def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> Float64:
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    points = [name for name in area.points if marks.has(name)]
+    held = np.unique(np.concatenate([np.zeros(0, np.intp), *(marks.contour(name) for name in area.contours)]))
+    pulled = np.array([marks.vertex[name] for name in points])
+    still = [marks.vertex[name] for name in area.still if marks.has(name)]
+    stays = np.setdiff1d(np.union1d(held, np.array(still, dtype=np.intp)), pulled)
+    reach = area.reach * es
+    near = surface.distances(pulled, reach)
+    far = surface.distances(stays, 4 * reach)
+    free = region(near, far, reach, area.share) & ~marks.inside_mouth
+    pulled, first = np.unique(pulled, return_index=True)
+    given = np.array([[handle.values.get(points[k], 0.0) for handle in own] for k in first])
+    fixed = np.concatenate([pulled, stays])
+    values = np.concatenate([given, np.zeros((len(stays), len(own)))])
+    return without_hem(spread(surface, free, fixed, values, slack=SLACK * es), HEM)
+
+
+def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64) -> Motion:
+    fap = faps()[handle.fap - 1]
+    low, high = limits(handle.fap)
+    vertices = np.flatnonzero(field)
+    weight = field[vertices][:, None]
+    direction = np.array(DIRECTIONS[fap.positive])
+    swell = handle.bulge * np.clip(weight * (1 - weight), 0, None) * marks.surface.normals[vertices]
+    return linear(limiter, vertices, (weight * direction + swell) * marks.fapu[fap.unit], low, high)
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with (files(__package__) / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
