@@ -1,3 +1,65 @@
 """Faces made by others: MakeHuman, FDP files, OBJ and PLY meshes, glTF heads with morph targets."""
 
 from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from fba.errors import OptionError
+from fba.face.importers.sniffing import KINDS, sniff
+from fba.face.model import FaceModel
+
+__all__ = ["KINDS", "import_model"]
+
+
+def import_model(
+    path: str | os.PathLike[str],
+    *,
+    kind: str | None = None,
+    points: object = None,
+    unit: float | None = None,
+    up: str = "y",
+    kinds: Mapping[str, str] | None = None,
+    name: str | None = None,
+) -> FaceModel:
+    """A face model from a file that knows nothing of FAPs, with tables for all FAPs that it can serve.
+
+    path: a file, or MakeHuman's folder. kind: one of `KINDS`, found from the content where None.
+    points: the feature points, as the path of a CSV, JSON or FDP file, an array (84, 3) in the file's
+    unit with NaN where unknown, or a mapping from names to a position or a vertex number; without them
+    a file of the mesh's name beside it (.points.csv, .points.json, .fdp) is looked for, and on a glTF
+    head with ARKit's shapes they are found. unit: metres per unit, else judged by the distance of the
+    pupils. up: the file's vertical axis, "y" or "z". kinds: kind of part (or "none", left out) by the
+    name of a group, object, mesh or material, where the names do not tell. name: of the model.
+
+    Raises ModelError for a file that is damaged, unknown (it lists what is read) or lacks what a face
+    needs; OptionError for options that do not fit. FAPs that cannot be served are in `lost`.
+    """
+    chosen = sniff(path) if kind is None else kind
+    if chosen not in KINDS:
+        raise OptionError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    named = name or Path(path).stem or "face"
+    if chosen == "makehuman":
+        from fba.face.importers.makehuman import import_makehuman
+
+        _no_more("MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=None if up == "y" else up)
+        return import_makehuman(path, name=name or "MakeHuman")
+    if chosen == "fdp":
+        from fba.face.importers.fdp_model import import_fdp
+
+        _no_more("an FDP file", points=points)
+        return import_fdp(path, unit=unit, up=up, kinds=kinds, name=named)
+    if chosen == "gltf":
+        from fba.face.importers.gltf import import_gltf
+
+        return import_gltf(path, points=points, unit=unit, up=up, kinds=kinds, name=named)
+    from fba.face.importers.mesh import import_mesh
+
+    return import_mesh(path, chosen, points=points, unit=unit, up=up, kinds=kinds, name=named)
+
+
+def _no_more(what: str, **options: object) -> None:
+    for option, value in options.items():
+        if value is not None:
+            raise OptionError(f"{option} does not apply to {what}, which brings its own")

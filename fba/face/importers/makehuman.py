@@ -23,7 +23,7 @@ from fba.face.importers.files import beside, whole
 from fba.face.importers.mhclo import fitted
 from fba.face.importers.obj import read_obj
 from fba.face.importers.polygons import Polygons, Source, make_part
-from fba.face.model import Material, Part
+from fba.face.model import FaceModel, Material, Part
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -239,3 +239,16 @@ def _moved(part: Part, shift: Float64) -> Part:
         part.colours,
         part.material,
     )
+
+
+def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> FaceModel:
+    """The head of MakeHuman's base mesh with tables; ModelError as `makehuman_parts`."""
+    from fba.face.authoring import author
+
+    head = read_makehuman(path)
+    notes = {
+        "source": "MakeHuman base mesh hm08, head and neck",
+        "licence": "CC0, as stated in the file",
+        "origin": "shifted between the pupils",
+    }
+    return author(head.parts, head.points, bound=head.bound, name=name, notes=notes)

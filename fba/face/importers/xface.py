@@ -99,7 +99,7 @@ def xface_submeshes(fdp: Fdp) -> dict[str, tuple[Path, int]]:
             found[submesh] = (mesh, int(place))
     if missing:
         raise ModelError(
-            f"{fdp.path}: this Xface file needs {', '.join(sorted(missing))}, whose vertices it names, beside it; "
+            f"{fdp.path}: needs {', '.join(sorted(missing))}, whose vertices it names, beside it; "
             "without the mesh it holds no positions"
         )
     return found

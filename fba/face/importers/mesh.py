@@ -1,0 +1,125 @@
+"""OBJ, PLY and WFM meshes with the feature points that lie in another file, as faces."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import FbaWarning, ModelError
+from fba.face.feature_points import names, row_of
+from fba.face.importers.files import lines
+from fba.face.importers.fitting import finished
+from fba.face.importers.materials import read_mtl
+from fba.face.importers.obj import read_obj
+from fba.face.importers.pieces import Piece
+from fba.face.importers.ply import read_ply
+from fba.face.importers.points_file import GivenPoints, given_points
+from fba.face.importers.polygons import Polygons, make_part
+from fba.face.importers.wfm import read_wfm
+from fba.face.model import FaceModel, Material
+
+Float64 = npt.NDArray[np.float64]
+
+READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
+    "obj": read_obj,
+    "ply": read_ply,
+    "wfm": read_wfm,
+}
+POINT_FILES = (".points.csv", ".points.json", ".fdp", ".csv", ".json")
+"""Ends of the names of files beside a mesh in which its feature points are looked for."""
+
+
+def import_mesh(
+    path: str | os.PathLike[str],
+    form: str,
+    *,
+    points: object = None,
+    unit: float | None = None,
+    up: str = "y",
+    kinds: Mapping[str, str] | None = None,
+    name: str | None = None,
+) -> FaceModel:
+    """A face from a mesh file without motion; form: "obj", "ply" or "wfm"; the rest as `import_model`."""
+    polygons = READERS[form](path)
+    given = given_points(points) if points is not None else _beside(path)
+    pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {})
+    places = _places(polygons, given, os.fspath(path))
+    return finished(pieces, places, given.vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
+
+
+def polygon_pieces(polygons: Polygons, materials: Mapping[str, Material]) -> list[Piece]:
+    """A piece for each group and material of a mesh file; those without triangles are left out."""
+    pieces = []
+    taken: set[str] = set()
+    for index, (group, material) in enumerate(polygons.groups):
+        faces = polygons.group == index
+        if not (np.diff(polygons.starts)[faces] >= 3).any():
+            continue
+        name, count = group or material or "mesh", 1
+        while name in taken or name == "head":
+            count += 1
+            name = f"{group or material or 'mesh'} {count}"
+        taken.add(name)
+        source = make_part(
+            polygons, faces, name, "other", material=materials.get(material, Material(material or "plain"))
+        )
+        pieces.append(Piece(source.part, material, source.origin))
+    return pieces
+
+
+def _beside(path: str | os.PathLike[str]) -> GivenPoints:
+    """Feature points from a file of the same name beside the mesh."""
+    place = Path(path)
+    for end in POINT_FILES:
+        candidate = place.with_name(place.stem + end)
+        if candidate.is_file():
+            return given_points(candidate)
+    raise ModelError(
+        f"{place}: a mesh needs its feature points; give them as points=FILE, or put them beside it as "
+        f"{place.stem}.points.csv with lines 'name,x,y,z' or 'name,vertex' (vertices count from 0), for "
+        "instance '9.3,297' for the tip of the nose"
+    )
+
+
+def _places(polygons: Polygons, given: GivenPoints, path: str) -> Float64:
+    """Positions (84, 3) of the points in the mesh's unit; a vertex says more than a position."""
+    places = given.points.copy()
+    scale = float(np.ptp(polygons.vertices, axis=0).max()) or 1.0
+    away: list[str] = []
+    for name, vertex in given.vertices.items():
+        if vertex >= len(polygons.vertices):
+            if np.isfinite(places[row_of()[name]]).all():
+                continue
+            raise ModelError(
+                f"{path}: feature point {name} is vertex {vertex}, but the mesh has {len(polygons.vertices)}"
+            )
+        position = polygons.vertices[vertex]
+        if np.linalg.norm(places[row_of()[name]] - position) > 1e-3 * scale:
+            away.append(name)
+        places[row_of()[name]] = position
+    if away:
+        warnings.warn(
+            f"{path}: {len(away)} feature points do not lie where their vertices are "
+            f"({', '.join(away[:6])}{', ...' if len(away) > 6 else ''}); the vertices are taken",
+            FbaWarning,
+            stacklevel=4,
+        )
+    return places
+
+
+def _materials(path: str | os.PathLike[str]) -> dict[str, Material]:
+    found: dict[str, Material] = {}
+    for line, text in lines(path):
+        if text.startswith("mtllib") and line < 10000:
+            found |= read_mtl(path, text[6:].strip())
+    return found
+
+
+def unknown_points(points: Float64) -> tuple[str, ...]:
+    """Names of the points without a position."""
+    return tuple(n for n, p in zip(names(), points, strict=True) if np.isnan(p).any())
