@@ -7,18 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fba.body.conventions import convention_names
+    from fba.body.limits import Excess, Limit, Limits
     from fba.body.skeleton import Skeleton
     from fba.body.solver import BapSolver
     from fba.body.wrapping import wrapped
 
 _PLACES = {
     "BapSolver": "fba.body.solver",
+    "Excess": "fba.body.limits",
+    "Limit": "fba.body.limits",
+    "Limits": "fba.body.limits",
     "Skeleton": "fba.body.skeleton",
     "convention_names": "fba.body.conventions",
     "wrapped": "fba.body.wrapping",
 }
 
-__all__ = ["BapSolver", "Skeleton", "convention_names", "wrapped"]
+__all__ = ["BapSolver", "Excess", "Limit", "Limits", "Skeleton", "convention_names", "wrapped"]
 
 
 def __getattr__(name: str) -> Any:

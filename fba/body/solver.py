@@ -7,8 +7,9 @@ from collections.abc import Collection
 import numpy as np
 import numpy.typing as npt
 
-from fba.body import kinematics
+from fba.body import posing, solving
 from fba.body.conventions import NO_BAP, Convention, convention
+from fba.body.limits import widest
 from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT
@@ -40,12 +41,27 @@ class BapSolver:
                 self._sign[number] = rules.sign[row]
         self.missing = tuple(joint for joint in rules.joints if joint not in self.skeleton)
 
-    def pose(self, baps: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        used = self._bap != NO_BAP
+        self._counts = used.sum(axis=1)
+        self._columns = self._bap[used]
+        self._radians = self._sign[used] * posing.UNIT
+        self._turns = np.zeros((count, 3), dtype=np.int64)
+        self._turns[used] = np.arange(len(self._columns))
+        self._offsets = self.skeleton.offsets
+        self._metres = rules.translation_sign * posing.MILLIMETRE
+        ranges = np.radians(widest())
+        self._limits = np.zeros((count, 3, 2))
+        self._limits[used] = ranges[self._columns]
+
+    def pose(
+        self, baps: npt.ArrayLike, out: npt.NDArray[np.float64] | None = None
+    ) -> npt.NDArray[np.float64]:
         """Joint matrices of a pose: float64 (J, 4, 4) for baps (296,), (T, J, 4, 4) for (T, 296).
 
         186 columns do too. A matrix takes points of the default posture's frame, relative to the
         joint's centre, into the world: its translation is where the joint is, its rotation is the
-        identity in the default posture. ValueError on other shapes or values that are not finite.
+        identity in the default posture. out: a C-contiguous float64 array of the result's shape to write
+        into, which is then returned. ValueError on other shapes or values that are not finite.
         """
         values = np.asarray(baps)
         if values.dtype == object or not np.issubdtype(values.dtype, np.number):
@@ -55,16 +71,28 @@ class BapSolver:
                 f"BapSolver.pose: baps must have shape ({BAP_COUNT},) or (T, {BAP_COUNT}), "
                 f"or {BAP_STANDARD_COUNT} columns, not {values.shape}"
             )
-        frames = np.ascontiguousarray(np.atleast_2d(values), dtype=np.float64)
-        if not np.isfinite(frames).all():
-            raise ValueError("BapSolver.pose: baps must be finite")
-        rules = self.convention
-        result = np.zeros((len(frames), len(self.skeleton), 4, 4))
-        kinematics.pose(
-            frames, self.skeleton.parents, self.skeleton.offsets, self._bap, self._axis, self._sign,
-            rules.translation, rules.translation_sign, result,
+        frames = values if values.ndim == 2 else values[None]
+        if frames.dtype != np.int32:
+            frames = np.asarray(frames, dtype=np.float64)
+            if not (np.abs(frames) <= VALUE_LIMIT).all():
+                raise ValueError("BapSolver.pose: baps must be finite, and fit 32 bits")
+        shape = (*values.shape[:-1], len(self.skeleton), 4, 4)
+        if out is None:
+            out = np.empty(shape)  # the loop below writes every number
+        elif not (
+            isinstance(out, np.ndarray)
+            and out.shape == shape
+            and out.dtype == np.float64
+            and out.flags.c_contiguous
+            and out.flags.writeable
+        ):
+            raise ValueError(f"BapSolver.pose: out must be a writeable, C-contiguous float64 array {shape}")
+        posing.pose(
+            np.ascontiguousarray(frames), self.skeleton.parents, self._offsets, self._turns, self._axis,
+            self._radians, self._columns, self._counts, self.convention.translation, self._metres,
+            out.reshape(-1),
         )  # fmt: skip
-        return result if values.ndim == 2 else result[0]
+        return out
 
     def solve(
         self,
@@ -75,9 +103,13 @@ class BapSolver:
         """BAPs that reach these joint matrices: int32 (296,) for (J, 4, 4), (T, 296) for (T, J, 4, 4).
 
         Only the rotations count, and the root's translation. Where a joint lacks a freedom, it comes as
-        close as it can, and its children make up for the rest as far as they can. Angles go on
-        without a jump from frame to frame (so they may leave +-pi, see `wrapped`), beginning close to
-        those of previous, (296,), or to 0. joints: the joints to solve, by name; others stay unturned.
+        close as it can, and its children make up for the rest as far as they can. joints: the joints to
+        solve, by name; others stay unturned.
+
+        Of the angles that make a rotation, each frame takes those closest to the frame before, and the first
+        frame those closest to previous, (296,): a smooth motion has smooth angles, which may leave +-pi (see
+        `wrapped`). Without previous, the first frame keeps within human limits (`fba.body.Limits`) where it
+        can, and as close to 0. At gimbal lock the outermost angle stays as it was.
 
         ValueError on a wrong shape or values that are not finite; ModelError where a value does not
         fit 32 bits; KeyError for an unknown joint.
@@ -96,11 +128,11 @@ class BapSolver:
         if joints is not None:
             wanted[:] = False
             wanted[[self.skeleton.number(name) for name in joints]] = True
-        rules = self.convention
         values = np.zeros((len(frames), BAP_COUNT), dtype=np.int32)
-        fits = kinematics.solve(
-            frames, self.skeleton.parents, self.skeleton.centres[0], self._bap, self._axis, self._sign,
-            rules.translation, rules.translation_sign, wanted, self._angles(previous), VALUE_LIMIT, values,
+        fits = solving.solve(
+            frames, self.skeleton.parents, self.skeleton.centres[0], self._counts, self._bap, self._axis,
+            self._sign, self.convention.translation, self._metres, wanted, self._angles(previous),
+            self._limits, previous is None, VALUE_LIMIT, values,
         )  # fmt: skip
         if not fits:
             raise ModelError("BapSolver.solve: the pose lies beyond what 32 bits of mm or 1e-5 rad can say")
@@ -113,5 +145,5 @@ class BapSolver:
             if values.shape != (BAP_COUNT,) or not np.isfinite(values).all():
                 raise ValueError(f"BapSolver.solve: previous must be {BAP_COUNT} finite BAPs")
             used = self._bap >= 0
-            angles[used] = values[self._bap[used]] * kinematics.UNIT
+            angles[used] = values[self._bap[used]] * posing.UNIT
         return angles

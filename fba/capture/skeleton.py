@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack
 from fba.body import BapSolver, wrapped
-from fba.body.kinematics import joint_angles
+from fba.body.solving import joint_angles
 from fba.capture import aiming, hinges, matching, rest, rotations
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning, ModelError
@@ -163,9 +163,10 @@ class _Retarget:
 
     def _closest(self, joint: str, local: Float) -> Float:
         axes, numbers, signs = self._turns(joint)
-        angles = np.zeros((len(local), 3))
-        joint_angles(np.ascontiguousarray(local), len(axes), numbers, signs, angles)
-        return angles[:, : len(axes)]
+        angles = np.zeros((3, len(local)))
+        frames_last = np.ascontiguousarray(np.moveaxis(local, 0, -1))
+        joint_angles(frames_last, len(axes), numbers[None], signs[None], angles)
+        return angles[: len(axes)].T
 
     def _swing(self, joint: str, bone: Float | None = None) -> None:
         """Joints with two freedoms: the bone's direction comes before its twist."""

@@ -1,0 +1,181 @@
+"""How far joints go: the limits of normal human motion, off by default, to report or to clamp by.
+
+The standard sets no limits to joints. `Limits.human()` is the table of typical limits of the digest
+bodies-and-gait.md, 5.7 (Table 4-1): there X is the subject's left, Z the long axis of the segment and
+Y = Z x X, so that a hanging limb flexes about -X, abducts about Y, forward, and twists about Z, down.
+limits.csv has it in BAPs, for the left side; `Limits.iso()` are the ranges of the standard's BAP table.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_numbers, baps
+
+DEGREES = np.degrees(1e-5)
+"""Degrees in one unit of a rotational BAP."""
+WHOLE = 360.0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What one segment may do in one way. baps: 0-based columns, whose sum lies in low..high, degrees."""
+
+    segment: str
+    motion: str
+    baps: tuple[int, ...]
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.segment} {self.motion}"
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Where a motion leaves a limit: in how many frames, first in which, and by how many degrees at worst."""
+
+    limit: Limit
+    frames: int
+    first: int
+    worst: float
+
+    def __str__(self) -> str:
+        low, high = self.limit.low, self.limit.high
+        return (
+            f"{self.limit.name}: beyond {low:g}..{high:g} degrees in {self.frames} frames, "
+            f"by {self.worst:.1f} at worst, first in frame {self.first}"
+        )
+
+
+class Limits:
+    """A set of limits. `limits`: the rows; a BAP that stands in none is free."""
+
+    def __init__(self, limits: tuple[Limit, ...]) -> None:
+        self.limits = limits
+
+    @staticmethod
+    def human() -> Limits:
+        """Typical limits of normal human motion, by segment; vertebrae share some, which their sum keeps."""
+        return Limits(_human())
+
+    @staticmethod
+    def iso() -> Limits:
+        """The ranges of the standard's BAP table at its own quantiser steps, joint by joint."""
+        return Limits(_iso())
+
+    def check(self, values: npt.ArrayLike) -> tuple[Excess, ...]:
+        """Where BAPs (T, 296) or (296,), 1e-5 rad, leave the limits; empty where they do not.
+
+        Whole turns do not count. ValueError on another shape or values that are not finite.
+        """
+        array = _frames(values)
+        found = []
+        for limit in self.limits:
+            _, excess = _excess(limit, array)
+            out = np.abs(excess) > DEGREES * len(limit.baps)  # rounding is none
+            if out.any():
+                worst = float(np.abs(excess).max())
+                found.append(Excess(limit, int(out.sum()), int(np.argmax(out)), worst))
+        return tuple(found)
+
+    def clamp(self, values: npt.ArrayLike) -> npt.NDArray[np.int32]:
+        """The same BAPs within the limits, int32. Where several share a limit, all shrink by one factor.
+
+        What keeps within a limit is left as it is. ValueError as `check`.
+        """
+        array = _frames(values)
+        result = np.rint(array).astype(np.int32)
+        for limit in self.limits:
+            total, excess = _excess(limit, array)
+            out = np.abs(excess) > DEGREES * len(limit.baps)
+            if not out.any():
+                continue
+            wanted = (total - excess)[out]
+            columns = list(limit.baps)
+            if len(columns) == 1:
+                result[out, columns[0]] = np.rint(wanted / DEGREES)
+            else:
+                share = wanted / total[out]
+                result[np.ix_(out, columns)] = np.rint(array[np.ix_(out, columns)] * share[:, None])
+        return result if np.ndim(values) == 2 else result[0]
+
+
+@cache
+def widest() -> npt.NDArray[np.float64]:
+    """float64 (296, 2), degrees: what the human limits or the standard's ranges allow to each BAP alone.
+
+    Body turn, roll and tilt, which a person has no limits for, have half a turn either way (roll a quarter).
+    """
+    result = np.zeros((BAP_COUNT, 2))
+    for limit in (*_iso(), *_human()):
+        for column in limit.baps:
+            low, high = result[column]
+            result[column] = min(low, limit.low), max(high, limit.high)
+    for name, most in (("turn", 180.0), ("roll", 90.0), ("tilt", 180.0)):
+        result[bap_numbers()[f"HumanoidRoot_rt_body_{name}"] - 1] = -most, most
+    result.flags.writeable = False
+    return result
+
+
+def _frames(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    array = np.atleast_2d(np.asarray(values, dtype=np.float64))
+    if array.ndim != 2 or array.shape[1] not in (BAP_STANDARD_COUNT, BAP_COUNT):
+        raise ValueError(f"Limits: needs BAPs of shape (T, {BAP_COUNT}), not {np.shape(values)}")
+    if not np.isfinite(array).all():
+        raise ValueError("Limits: BAPs must be finite")
+    return array
+
+
+def _excess(
+    limit: Limit, array: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Total (T,) in degrees, by whole turns as close to the range as can be, and what of it is too much."""
+    total = array[:, list(limit.baps)].sum(axis=1) * DEGREES
+    if len(limit.baps) == 1:
+        total = total - WHOLE * np.rint((total - (limit.low + limit.high) / 2) / WHOLE)
+    return total, total - np.clip(total, limit.low, limit.high)
+
+
+@cache
+def _human() -> tuple[Limit, ...]:
+    text = (files(__package__) / "limits.csv").read_text(encoding="utf-8")
+    numbers = bap_numbers()
+    result = []
+    for row in csv.DictReader(text.splitlines()):
+        low, high = float(row["low"]), float(row["high"])
+        for side, word in (("l", "left "), ("r", "right ")) if row["right_side"] else (("", ""),):
+            names = row["baps"].replace("?", side).split()
+            flipped = side == "r" and row["right_side"] == "mirrored"
+            result.append(
+                Limit(
+                    word + row["segment"],
+                    row["motion"],
+                    tuple(numbers[name] - 1 for name in names),
+                    -high if flipped else low,
+                    -low if flipped else high,
+                )
+            )
+    return tuple(result)
+
+
+@cache
+def _iso() -> tuple[Limit, ...]:
+    return tuple(
+        Limit(
+            bap.joint,
+            bap.freedom,
+            (bap.number - 1,),
+            bap.i_limits[0] * bap.step_iso * DEGREES,
+            bap.i_limits[1] * bap.step_iso * DEGREES,
+        )
+        for bap in baps()
+        if bap.i_limits is not None and bap.unit == "1e-5 rad"
+    )
