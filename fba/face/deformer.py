@@ -158,8 +158,8 @@ class Deformer:
             _check_target(normals, shape, "normals")
             if np.may_share_memory(out, normals):
                 raise ValueError("out and normals share memory; give each an array of its own")
-        placed = out.reshape(-1, count, 3)
-        upright = placed[:0] if normals is None else normals.reshape(-1, count, 3)
+        placed = out[None] if single else out
+        upright = placed[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
             for start in range(0, len(values), BLOCK):
                 stop = start + BLOCK

@@ -106,27 +106,21 @@ def _seams(model: FaceModel) -> npt.NDArray[np.int64]:
     same = (vertices[order][1:] == vertices[order][:-1]).all(axis=1) & (part[order][1:] == part[order][:-1])
     leader = np.arange(len(vertices))
     if same.any():
-        starts = np.flatnonzero(np.concatenate([[True], ~same]))
-        sizes = np.diff(np.append(starts, len(order)))
-        first = np.empty_like(leader)
-        first[order] = np.repeat(order[starts], sizes)  # lexsort is stable: the lowest number of them
+        place = np.concatenate([[0], np.cumsum(~same)])  # of each vertex in `order`
+        rest = np.flatnonzero(np.bincount(place)[place] > 1)
         alike = _Alike(model)
-        agree = alike(leader, first)
-        leader[agree] = first[agree]
-        whole = np.logical_and.reduceat(agree[order], starts)
-        for start, size in zip(starts[~whole], sizes[~whole], strict=True):
-            _sort_out(order[start : start + size], alike, leader)
+        for _ in range(HEADS_MAX):
+            # The first vertex left in each place leads those that are like it. Within a place, `order`
+            # keeps the vertices' own: lexsort is stable.
+            left = place[rest]
+            first = np.concatenate([[True], left[1:] != left[:-1]])
+            heads = order[rest[first]][np.cumsum(first) - 1]
+            agree = alike(order[rest], heads)
+            leader[order[rest[agree]]] = heads[agree]
+            rest = rest[~agree]
+            if not len(rest):
+                break
     return np.asarray(np.unique(leader, return_inverse=True)[1], dtype=np.int64)
-
-
-def _sort_out(together: npt.NDArray[np.intp], alike: _Alike, leader: npt.NDArray[np.intp]) -> None:
-    """Vertices in one place that are not all one: each joins the first that it agrees with."""
-    heads: list[int] = []
-    for vertex in together.tolist():
-        joined = np.flatnonzero(alike(np.full(len(heads), vertex), np.array(heads, dtype=np.intp)))
-        leader[vertex] = heads[int(joined[0])] if len(joined) else vertex
-        if not len(joined) and len(heads) < HEADS_MAX:
-            heads.append(vertex)
 
 
 class _Alike:

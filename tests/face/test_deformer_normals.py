@@ -133,6 +133,32 @@ def test_an_edge_stays_sharp_and_what_parts_is_no_seam() -> None:
         np.testing.assert_allclose(normals[3:], np.tile(tilted, (3, 1)), atol=1e-6)
 
 
+def test_several_surfaces_that_meet_in_one_place() -> None:
+    """Four triangles with a corner each in one place: two look forward, nearly, and two to the left."""
+    vertices, triangles, faces = [], [], [(0, 0.2, 1), (1, 0, 0), (0, -0.2, 1), (1, 0.1, 0)]
+    for number, upright in enumerate(np.array(faces)):
+        aside = np.cross(upright, (0.3, 1, 0.2))
+        vertices += [np.zeros(3), aside, np.cross(upright, aside) / np.linalg.norm(upright)]
+        triangles.append(3 * number + np.arange(3))
+    _, normals = shaded(Deformer(model(Part("skin", "skin", vertices, triangles))), np.zeros(68))
+    areas = [np.cross(*(np.array(vertices)[3 * n + 1 : 3 * n + 3])) for n in range(4)]
+    for number in range(4):
+        both = areas[number % 2] + areas[number % 2 + 2]
+        np.testing.assert_allclose(normals[3 * number], both / np.linalg.norm(both), atol=1e-6)
+        alone = areas[number] / np.linalg.norm(areas[number])
+        np.testing.assert_allclose(normals[3 * number + 1], alone, atol=1e-6)
+
+
+def test_parts_without_vertices() -> None:
+    empty = Part("nothing", "other", np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
+    skin = sphere()
+    deformer = Deformer(model(empty, skin, Part("none", "eye", empty.vertices, empty.triangles)))
+    assert deformer.part_matrices(np.zeros(68)).shape == (3, 4, 4)
+    np.testing.assert_array_equal(shaded(deformer, np.zeros(68))[0], skin.vertices)
+    assert Deformer(model(empty))(np.zeros((2, 68))).shape == (2, 0, 3)
+    assert Deformer(model(empty))(np.zeros(68)).shape == (0, 3)
+
+
 def test_only_what_moves_is_shaded_anew_and_the_rest_stays() -> None:
     """Two balls: one's nose is pulled out, the other is another part and only turns."""
     skin = sphere()
