@@ -57,19 +57,21 @@ class Limiter:
             result = np.minimum(result, stretch)
         return result
 
-    def sound(self, shifts: Float64, triangles: Int) -> bool:
+    def sound(self, shifts: Float64, triangles: Int, least: float = LEAST_AREA) -> bool:
         """Whether vertices + shifts (N, 3) keeps all these triangles sound."""
-        return self.soundness(shifts, triangles).all()  # type: ignore[no-any-return]
+        return bool(self.soundness(shifts, triangles, least).all())
 
-    def soundness(self, shifts: Float64, triangles: Int) -> npt.NDArray[np.bool_]:
-        """(M,) which triangles stay sound under shifts."""
+    def soundness(
+        self, shifts: Float64, triangles: Int, least: float = LEAST_AREA
+    ) -> npt.NDArray[np.bool_]:
+        """(M,) which triangles stay sound under shifts. least: share of its area that each keeps."""
         p = self._vertices
         q = p + shifts
         e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
         f1, f2 = (q[triangles[:, k]] - q[triangles[:, 0]] for k in (1, 2))
         normal = np.cross(e1, e2)
         kept = (np.cross(f1, f2) * normal).sum(axis=1) / (normal**2).sum(axis=1)
-        fine: npt.NDArray[np.bool_] = kept >= 0.8 * LEAST_AREA
+        fine: npt.NDArray[np.bool_] = kept >= 0.8 * least
         lengths = np.linalg.norm(np.stack([e1, e2, e2 - e1]), axis=2)
         typical = float(np.median(lengths)) if lengths.size else 0.0
         now = np.linalg.norm(np.stack([f1, f2, f2 - f1]), axis=2)

@@ -16,6 +16,7 @@ from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.eyes import Eye
 from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion, limits
+from fba.face.authoring.relax import relaxed
 from fba.face.authoring.saturation import guarded
 from fba.face.authoring.weights import region, smooth_step, spread, without_hem
 from fba.face.model import Part
@@ -35,6 +36,10 @@ STILL = {
 }
 SLACK = 0.12
 HEM = 0.006
+LEAST_AREA = 0.03
+"""A lid turns and unfolds: a triangle seen along its neutral normal keeps only this share of its area."""
+CORNER = 0.2
+"""Where the opening is lower than this share of its height, the margins give way to folds."""
 CLEARANCE = 0.012
 """Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
 FREED = 0.3
@@ -73,7 +78,13 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     for k, value in enumerate(values):
         freed = float(smooth_step(np.array([abs(value) / CLOSED / FREED]))[0])
         shifts[k] += profile.lift(points, shifts[k]) * freed
-    return guarded(limiter, Motion(values, vertices, shifts))
+    pinned = np.zeros(len(marks.surface), dtype=bool)
+    for line in (own, other):
+        at = marks.surface.vertices[line, 0]
+        gap = opening.upper[:, 0] - opening.lower[:, 0]
+        pinned[line[np.interp(at, opening.x, gap) > CORNER * gap.max()]] = True
+    motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), pinned, LEAST_AREA)
+    return guarded(limiter, motion, LEAST_AREA)
 
 
 def lid_values(fap: int) -> Float64:
