@@ -1,0 +1,288 @@
+"""What a glTF file says, as arrays: numbers follow from the description of the format."""
+
+from __future__ import annotations
+
+import base64
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gltf_documents import Sheet
+
+from fba.errors import FbaWarning, ModelError
+from fba.gltf import Primitive, read_gltf
+
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+def read_primitive(sheet: Sheet, tmp_path: Path) -> Primitive:
+    (mesh,) = read_gltf(sheet.save(tmp_path / "a.glb")).meshes
+    (primitive,) = mesh.primitives
+    return primitive
+
+
+def test_a_triangle(tmp_path: Path) -> None:
+    sheet = Sheet()
+    primitive = read_primitive(sheet.show(sheet.triangle()), tmp_path)
+    assert primitive.positions.tolist() == CORNERS
+    assert (primitive.positions.dtype, primitive.triangles.dtype) == (np.float32, np.int32)
+    assert primitive.triangles.tolist() == [[0, 1, 2]]
+    assert not primitive.positions.flags.writeable
+    assert not primitive.triangles.flags.writeable
+    assert (primitive.normals, primitive.texcoords, primitive.colours, primitive.joints) == (
+        None,
+        (),
+        None,
+        None,
+    )
+    assert (primitive.material, primitive.morphs) == (None, ())
+
+
+def test_attributes_may_be_interleaved(tmp_path: Path) -> None:
+    sheet = Sheet()
+    rows = np.array([[0, 0, 0, 9, 8, 7], [1, 0, 0, 6, 5, 4], [0, 1, 0, 3, 2, 1]], dtype="<f4")
+    view = sheet.bytes(rows.tobytes(), byteStride=24)
+    common = {"bufferView": view, "componentType": 5126, "count": 3, "type": "VEC3"}
+    sheet.json["accessors"] = [common, common | {"byteOffset": 12}]
+    primitive = read_primitive(sheet.show({"attributes": {"POSITION": 0, "NORMAL": 1}}), tmp_path)
+    assert primitive.positions.tolist() == CORNERS
+    assert primitive.normals is not None
+    assert primitive.normals.tolist() == [[9, 8, 7], [6, 5, 4], [3, 2, 1]]
+    assert primitive.triangles.tolist() == [[0, 1, 2]]  # no indices: as they come
+
+
+@pytest.mark.parametrize(
+    ("kind", "raw", "meant"),
+    [
+        ("u1", [0, 51, 255, 255], [0, 0.2, 1, 1]),
+        ("u2", [0, 13107, 65535, 65535], [0, 0.2, 1, 1]),
+        ("i1", [-128, -127, 127, 0], [-1, -1, 1, 0]),
+        ("i2", [-32768, -32767, 32767, 0], [-1, -1, 1, 0]),
+    ],
+)
+def test_scaled_integers(tmp_path: Path, kind: str, raw: list[int], meant: list[float]) -> None:
+    sheet = Sheet()
+    primitive = sheet.triangle()
+    primitive["attributes"]["COLOR_0"] = sheet.array([raw] * 3, kind, normalized=True)
+    colours = read_primitive(sheet.show(primitive), tmp_path).colours
+    assert colours is not None
+    assert colours.tolist() == [pytest.approx(meant, abs=1e-7)] * 3
+
+
+def test_plain_integers_stay_as_large_as_they_are(tmp_path: Path) -> None:
+    sheet = Sheet()  # KHR_mesh_quantization: the node's scale makes metres of them
+    primitive = {"attributes": {"POSITION": sheet.array([[0, 0, 0], [500, 0, 0], [0, -500, 7]], "i2")}}
+    sheet.json["extensionsRequired"] = ["KHR_mesh_quantization"]
+    positions = read_primitive(sheet.show(primitive), tmp_path).positions
+    assert positions.tolist() == [[0, 0, 0], [500, 0, 0], [0, -500, 7]]
+
+
+def test_sparse_values_replace_those_below(tmp_path: Path) -> None:
+    sheet = Sheet()
+    base = sheet.array([[1, 1, 1]] * 4)
+    sheet.json["accessors"][base]["sparse"] = {
+        "count": 2,
+        "indices": {"bufferView": sheet.bytes(b"\1\3"), "componentType": 5121},
+        "values": {"bufferView": sheet.bytes(np.array([5, 6, 7, 8, 9, 10], "<f4").tobytes())},
+    }
+    corners = sheet.array([0, 1, 3], "u1")
+    primitive = read_primitive(sheet.show({"attributes": {"POSITION": base}, "indices": corners}), tmp_path)
+    assert primitive.positions.tolist() == [[1, 1, 1], [5, 6, 7], [1, 1, 1], [8, 9, 10]]
+    assert primitive.triangles.tolist() == [[0, 1, 3]]
+
+
+@pytest.mark.parametrize(
+    ("mode", "triangles"),
+    [(4, [[0, 1, 2], [3, 4, 5]]), (5, [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]]),
+     (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0], [4, 5, 0]])],
+)  # fmt: skip
+def test_lists_strips_and_fans(tmp_path: Path, mode: int, triangles: list[list[int]]) -> None:
+    sheet = Sheet()
+    primitive = {"attributes": {"POSITION": sheet.array(np.arange(18).reshape(6, 3))}, "mode": mode}
+    assert read_primitive(sheet.show(primitive), tmp_path).triangles.tolist() == triangles
+
+
+def test_points_and_lines_are_left_out(tmp_path: Path) -> None:
+    sheet = Sheet()
+    sheet.show(sheet.triangle(mode=1))
+    with pytest.warns(FbaWarning, match=r"a\.glb: meshes\[0\]\.primitives\[0\]: points or lines"):
+        (mesh,) = read_gltf(sheet.save(tmp_path / "a.glb")).meshes
+    assert mesh.primitives == ()
+
+
+def test_morph_targets_have_the_names_of_the_extras(tmp_path: Path) -> None:
+    sheet = Sheet()
+    sparse = {"componentType": 5126, "count": 3, "type": "VEC3"}
+    sheet.json["accessors"].append(
+        sparse
+        | {
+            "sparse": {
+                "count": 1,
+                "indices": {"bufferView": sheet.bytes(b"\2\0"), "componentType": 5123},
+                "values": {"bufferView": sheet.bytes(np.array([0, 0, 4], "<f4").tobytes())},
+            }
+        }
+    )
+    sheet.show(sheet.triangle(targets=[{"POSITION": 0}, {"NORMAL": 0}]))
+    mesh: dict[str, Any] = sheet.json["meshes"][0]
+    for holder in (mesh, mesh["primitives"][0]):
+        holder["extras"] = {"targetNames": ["jawOpen", "mouthClose"]}
+        (found,) = read_gltf(sheet.save(tmp_path / "a.glb")).meshes
+        assert found.morph_names == ("jawOpen", "mouthClose")
+        del holder["extras"]
+    mesh["weights"] = [0.25, 1]
+    (found,) = read_gltf(sheet.save(tmp_path / "a.glb")).meshes
+    assert found.morph_names == ("target 0", "target 1")
+    assert found.weights == (0.25, 1.0)
+    first, second = found.primitives[0].morphs
+    assert first is not None
+    assert first.tolist() == [[0, 0, 0], [0, 0, 0], [0, 0, 4]]
+    assert second is None
+    mesh["extras"] = {"targetNames": ["one"]}
+    with pytest.warns(FbaWarning, match="1 names for 2 morph targets"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
+
+
+def test_transforms_of_nodes(tmp_path: Path) -> None:
+    half = 0.5**0.5
+    sheet = Sheet()
+    sheet.json["nodes"] = [
+        {
+            "children": [2],
+            "name": "arm",
+            "translation": [10, 0, 0],
+            "rotation": [0, 0, half, half],
+            "scale": [2, 2, 2],
+        },
+        {"matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 7, 8, 9, 1]},  # column by column
+        {"translation": [1, 0, 0]},
+    ]
+    gltf = read_gltf(sheet.save(tmp_path / "a.glb"))
+    arm, moved, hand = gltf.nodes
+    # a quarter turn about z takes x to y; sizes double; then 10 along x
+    assert (arm.world @ [1, 0, 0, 1]).tolist() == pytest.approx([10, 2, 0, 1])
+    assert (hand.world @ [1, 0, 0, 1]).tolist() == pytest.approx([10, 4, 0, 1])
+    assert (moved.world @ [0, 0, 0, 1]).tolist() == [7, 8, 9, 1]
+    assert (arm.parent, arm.children, hand.parent, moved.translation) == (None, (2,), 0, None)
+    assert (arm.name, moved.name) == ("arm", "node 1")
+    assert gltf.roots == (0, 1)  # no scene: all that have no parent
+    assert gltf.order.index(0) < gltf.order.index(2)
+    sheet.json |= {"scenes": [{"nodes": [1]}, {"nodes": [0]}], "scene": 1}
+    gltf = read_gltf(sheet.save(tmp_path / "a.glb"))
+    assert (gltf.roots, gltf.shown()) == ((0,), (0, 2))
+
+
+def test_skins(tmp_path: Path) -> None:
+    sheet = Sheet()
+    primitive = sheet.triangle()
+    primitive["attributes"] |= {
+        "JOINTS_0": sheet.array([[1, 0, 0, 0]] * 3, "u1"),
+        "WEIGHTS_0": sheet.array([[255, 0, 0, 0]] * 3, "u1", normalized=True),
+    }
+    matrix = np.eye(4)
+    matrix[:3, 3] = 1, 2, 3
+    sheet.show(primitive, skin=0)
+    sheet.json["nodes"] += [{}, {}]
+    bind = sheet.array([np.eye(4).T.ravel(), matrix.T.ravel()])
+    sheet.json["skins"] = [{"joints": [1, 2], "inverseBindMatrices": bind, "name": "rig"}]
+    gltf = read_gltf(sheet.save(tmp_path / "a.glb"))
+    (skin,) = gltf.skins
+    assert (skin.name, skin.joints) == ("rig", (1, 2))
+    assert skin.inverse_bind.tolist() == [np.eye(4).tolist(), matrix.tolist()]
+    found = gltf.meshes[0].primitives[0]
+    assert found.joints is not None
+    assert found.weights is not None
+    assert (found.joints[0].tolist(), found.weights[0].tolist()) == ([1, 0, 0, 0], [1, 0, 0, 0])
+    sheet.json["nodes"][0] |= {"skin": 0}
+    sheet.json["skins"][0] = {"joints": [1]}
+    with pytest.raises(ModelError, match=r"nodes\[0\]: mesh 0 names joint 1, but skin 0 has 1"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
+
+
+def test_animations(tmp_path: Path) -> None:
+    sheet = Sheet()
+    sheet.show(sheet.triangle(targets=[{}, {}]))
+    times, turns = sheet.array([0, 0.5]), sheet.array([[0, 0, 0, 1], [0, 1, 0, 0]])
+    cubic, weights = sheet.array(np.arange(18).reshape(6, 3)), sheet.array([1, 2, 3, 4])
+    samplers = [
+        {"input": times, "output": turns},
+        {"input": times, "output": cubic, "interpolation": "CUBICSPLINE"},
+        {"input": times, "output": weights, "interpolation": "STEP"},
+    ]
+    targets = [("rotation", 0), ("translation", 1), ("weights", 2)]
+    sheet.json["animations"] = [
+        {
+            "name": "wave",
+            "samplers": samplers,
+            "channels": [
+                *({"sampler": n, "target": {"node": 0, "path": path}} for path, n in targets),
+                {"sampler": 0, "target": {"path": "rotation"}},
+            ],
+        }
+    ]
+    (animation,) = read_gltf(sheet.save(tmp_path / "a.glb")).animations
+    turn, shift, morph = animation.channels  # the fourth animates no node
+    assert (animation.name, turn.node, turn.path, turn.interpolation) == ("wave", 0, "rotation", "LINEAR")
+    assert turn.times.tolist() == [0, 0.5]
+    assert turn.values.tolist() == [[0, 0, 0, 1], [0, 1, 0, 0]]
+    assert shift.values.tolist()[1] == [[9, 10, 11], [12, 13, 14], [15, 16, 17]]
+    assert (morph.interpolation, morph.values.tolist()) == ("STEP", [[1, 2], [3, 4]])
+
+
+def test_materials_and_pictures(tmp_path: Path) -> None:
+    png, gif = b"\x89PNG\r\n\x1a\nrest", b"GIF89a"
+    sheet = Sheet()
+    sheet.show(sheet.triangle(material=1))
+    sheet.json["images"] = [{"bufferView": sheet.bytes(png), "mimeType": "image/png"}, {"uri": "b.gif"}]
+    (tmp_path / "b.gif").write_bytes(gif)
+    sheet.json["textures"] = [{"source": 0}, {"source": 1}, {}]
+    texture = {"baseColorTexture": {"index": 0, "texCoord": 1}}
+    sheet.json["materials"] = [
+        {},
+        {
+            "name": "skin",
+            "pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1], "roughnessFactor": 0.25} | texture,
+        },
+    ]
+    plain, skin = read_gltf(sheet.save(tmp_path / "a.glb")).materials
+    assert (plain.name, plain.colour, plain.metallic, plain.roughness) == ("material 0", (1, 1, 1, 1), 1, 1)
+    assert (skin.name, skin.colour, skin.roughness, skin.texcoord) == ("skin", (1, 0.5, 0, 1), 0.25, 1)
+    assert (plain.texture, skin.texture) == (None, png)
+    for number, text in ((1, "is neither PNG nor JPEG"), (2, "has no PNG or JPEG picture")):
+        sheet.json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": number}
+        with pytest.warns(FbaWarning, match=text):
+            assert read_gltf(sheet.save(tmp_path / "a.glb")).materials[1].texture is None
+
+
+def test_text_documents_with_buffers_elsewhere(tmp_path: Path) -> None:
+    sheet = Sheet()
+    sheet.show(sheet.triangle())
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "mesh 1.bin").write_bytes(sheet.data + b"more than is needed")
+    inline = "data:application/octet-stream;base64," + base64.b64encode(sheet.data).decode()
+    for uri in ("parts/mesh%201.bin", "./parts/../parts/mesh 1.bin", inline):
+        document = sheet.json | {"buffers": [{"byteLength": len(sheet.data), "uri": uri}]}
+        (tmp_path / "a.gltf").write_text(json.dumps(document), encoding="utf-8")
+        gltf = read_gltf(tmp_path / "a.gltf")
+        assert gltf.meshes[0].primitives[0].positions.tolist() == CORNERS
+
+
+def test_extensions_that_are_required(tmp_path: Path) -> None:
+    sheet = Sheet()
+    sheet.show(sheet.triangle())
+    sheet.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    with pytest.raises(ModelError, match=r"extensionsRequired\[0\]: .*Draco.* without compression"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
+    sheet.json["extensionsRequired"] = ["ACME_shape"]
+    with pytest.raises(ModelError, match="needs the extension ACME_shape"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
+    sheet.json["extensionsRequired"] = ["KHR_texture_basisu"]
+    with pytest.warns(FbaWarning, match="KHR_texture_basisu is not read"):
+        read_gltf(sheet.save(tmp_path / "a.glb"))
+    sheet.json["extensionsRequired"] = ["KHR_materials_unlit", "KHR_texture_transform"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_gltf(sheet.save(tmp_path / "a.glb"))
