@@ -8,7 +8,7 @@ import numpy.typing as npt
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 
-AROUND = 48
+AROUND = 40
 SCLERA = np.array([0.80, 0.76, 0.72])
 """Linear light."""
 LIMBUS = np.array([0.055, 0.050, 0.045])
@@ -25,8 +25,8 @@ def eyeball(centre: Float64, radius: float, iris: float) -> tuple[Float64, Int64
     """
     edge, pupil = np.arcsin(iris / 2 / radius), np.arcsin(iris / 6 / radius)
     polar = np.concatenate([
-        np.linspace(0, pupil, 4)[1:], np.linspace(pupil, edge, 9)[1:], edge + np.array([0.02, 0.05, 0.09]),
-        np.linspace(edge + 0.09, np.pi, 14)[1:-1],
+        np.linspace(0, pupil, 3)[1:], np.linspace(pupil, edge, 7)[1:], edge + np.array([0.02, 0.05, 0.09]),
+        np.linspace(edge + 0.09, np.pi, 12)[1:-1],
     ])  # fmt: skip
     turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     ring = np.stack(np.broadcast_arrays(

@@ -39,6 +39,7 @@ class Surface:
     def edges(self) -> Int64:
         """(E, 2) the edges, each once, smaller vertex first."""
         sides = np.stack([self.quads, np.roll(self.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+        sides = sides[sides[:, 0] != sides[:, 1]]
         return np.unique(np.sort(sides, axis=1), axis=0)
 
     def kept(self, faces: npt.NDArray[np.bool_]) -> Surface:

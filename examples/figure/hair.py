@@ -32,7 +32,8 @@ def scalp(places: Float64, soft: float = 0.004) -> Float64:
     height = PchipInterpolator(line[:, 0], line[:, 1])
     slope = height.derivative()(around) * 180 / np.pi / 0.08
     above = (places[:, 1] - height(around)) / np.sqrt(1 + slope**2)
-    ear = (np.abs(places[:, 0]) > 0.0735) & (places[:, 1] < 0.018) & (places[:, 2] < -0.07)
+    ear = (np.abs(places[:, 0]) > 0.0765) & (places[:, 1] < 0.006)
+    ear &= (places[:, 2] > -0.122) & (places[:, 2] < -0.072)
     return np.where(ear, 0.0, smooth(above / soft + 0.5))
 
 

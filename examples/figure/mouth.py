@@ -22,7 +22,7 @@ HALF_WIDTH, DEPTH = 0.0272, 0.0400
 """The outer edge of the upper arch of teeth: half an ellipse."""
 LOWER_INSET = 0.0004
 """How much smaller the lower arch is: the incisors' edges touch."""
-AROUND, ROWS = 14, 6
+AROUND = 12
 
 
 def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
@@ -130,7 +130,7 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
     widths = np.array([float(row["width"]) for row in rows]) / 1000
     heights = np.array([float(row["height"]) for row in rows]) / 1000
     ends = np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
-    half = np.linspace(0, ends[-1] - 0.0005, 43)
+    half = np.linspace(0, ends[-1] - 0.0005, 36)
     low = np.zeros(len(half))
     for k, length in enumerate(half):
         tooth = min(int(np.searchsorted(ends, length, side="right")) - 1, len(widths) - 1)
@@ -139,7 +139,7 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
     places = [_arch(length, inset) for length in half]
     profile = [  # out of the arch (mm), above the scallop (mm)
         (-3.0, -0.6), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), (0.9, 4.0), (0.2, 7.5), (-2.0, 9.5),
-        (-6.0, 9.0), (-9.5, 5.0), (-9.8, 0.5), (-8.0, -0.6),
+        (-8.5, 6.0), (-9.0, -0.6),
     ]  # fmt: skip
     band = np.zeros((len(profile), len(half), 3))
     for k, (place, turn) in enumerate(places):

@@ -19,13 +19,13 @@ SKIN = np.array([217, 168, 142.0])
 BLUSH = np.array([214, 138, 118.0])
 SOCKET = np.array([186, 128, 112.0])
 WATERLINE = np.array([203, 138, 126.0])
-CARUNCLE = np.array([206, 118, 110.0])
+CARUNCLE = np.array([222, 148, 138.0])
 LIP = np.array([184, 104, 96.0])
 LIP_LINE = np.array([132, 62, 58.0])
 MOUTH = np.array([96, 34, 34.0])
 NECK = np.array([206, 158, 131.0])
 HAIR = np.array([52, 38, 30.0])
-SCALP = np.array([158, 122, 104.0])
+SCALP = np.array([112, 86, 73.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,11 +187,11 @@ def _strokes(picture: Image.Image, lay: Chart) -> None:
     layers = []
     hair = scalp(p, 0.012)
     weight = area[rows, columns] * np.clip(hair * 1.15 - 0.1, 0, 1)
-    chosen = random.choice(len(p), 90000, p=weight / weight.sum())
+    chosen = random.choice(len(p), 130000, p=weight / weight.sum())
     away = p[chosen] - CROWN
     swirl = np.cross(away, (0.0, 1.0, 0.0)) * 0.35
     direction = _unit(away + swirl + random.normal(0, 0.018, away.shape)) * random.uniform(0.002, 0.0045, (len(chosen), 1))
-    layers.append((chosen, direction, 0.62))
+    layers.append((chosen, direction, 0.66))
     along, density = brow(p)
     weight = area[rows, columns] * density**1.2
     chosen = random.choice(len(p), 2600, p=weight / weight.sum())

@@ -160,20 +160,26 @@ def _cut(
                     ring_uv.append(mid_uvs[k])
             polygons = [(ring, ring_uv)]
         for ring, ring_uv in polygons:
-            for a, b, c in _triangulated(ring, vertices):
+            straight = [not chosen[face] and vertex in middles for vertex in ring]
+            for a, b, c in _triangulated(ring, vertices, straight):
                 triangles.append([ring[a], ring[b], ring[c]])
                 corners.append([ring_uv[a], ring_uv[b], ring_uv[c]])
                 owner.append(face)
     return np.array(triangles), np.array(corners), np.array(uvs), np.array(owner)
 
 
-def _triangulated(ring: list[int], vertices: Float64) -> list[tuple[int, int, int]]:
-    """A polygon as triangles, always across its shortest diagonal; ties alike on both sides of a face."""
+def _triangulated(
+    ring: list[int], vertices: Float64, straight: list[bool]
+) -> list[tuple[int, int, int]]:
+    """A polygon as triangles, always across its shortest diagonal; ties alike on both sides of a face.
+
+    straight: corners that are none, in the middle of a side; cutting them off would leave slivers.
+    """
     left = list(range(len(ring)))
     found = []
     while len(left) > 3:
         best = min(
-            range(len(left)),
+            [k for k in range(len(left)) if not straight[left[k]]] or range(len(left)),
             key=lambda k: round(
                 float(np.linalg.norm(vertices[ring[left[k - 1]]] - vertices[ring[left[(k + 1) % len(left)]]])), 9
             ),

@@ -1,0 +1,114 @@
+"""A plain shirt over the figure's shoulders, so that the head does not end in the air."""
+
+from __future__ import annotations
+
+import figure
+import numpy as np
+import numpy.typing as npt
+from sculpt import smooth
+from subdivide import refine
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+COLOUR = np.array([0.052, 0.088, 0.125])
+"""Linear light."""
+AXIS = -0.088
+THICK = 0.0038
+LOWEST = -0.44
+WIDEST = 0.235
+
+
+def neckline(places: Float64) -> Float64:
+    """(N,) height of the neckline in the direction of places (N, 3), metres, head frame."""
+    turn = np.arctan2(np.abs(places[:, 0]), places[:, 2] - AXIS)
+    return np.interp(np.degrees(turn), [0, 40, 75, 110, 180], [-0.181, -0.174, -0.150, -0.136, -0.131])
+
+
+def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
+    """Vertices, triangles and colours (V, 4) of the shirt. origin: of the head, in the frame of `figure.head`."""
+    whole, _ = figure.load()
+    surface = figure.Surface(
+        whole.vertices - (0.0, figure.EYE_LEVEL, 0.0) - origin, whole.quads, whole.corners, whole.uvs
+    )
+    middle = surface.vertices[surface.quads].mean(axis=1)
+    trunk = (middle[:, 1] > LOWEST) & (np.abs(middle[:, 0]) < WIDEST) & (surface.tile != 1)
+    whole_skin = surface.vertices[np.unique(surface.quads[trunk])]
+    torso = _finer(surface.kept(trunk & (middle[:, 1] < neckline(middle) + 0.004)))
+    triangles = torso.quads[:, :3]
+    from fba.face.normals import vertex_normals
+
+    outward = vertex_normals(torso.vertices, triangles).astype(np.float64)
+    for _ in range(6):  # cloth does not follow every hollow
+        outward = _averaged(outward, torso.edges)
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    rim = _rim(torso)
+    top = rim[torso.vertices[rim, 1] > -0.21]
+    turn = np.arctan2(torso.vertices[top, 0], torso.vertices[top, 2] - AXIS)
+    outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
+    vertices = torso.vertices.copy()
+    vertices[top] = _on_neckline(torso.vertices[top], whole_skin)
+    for _ in range(4):  # the rows below follow
+        eased = _averaged(vertices, torso.edges)
+        near = smooth(1 - (neckline(vertices) - vertices[:, 1]) / 0.05)[:, None]
+        near[top] = 0
+        vertices = vertices + (eased - vertices) * near * 0.6
+    hang = np.clip((-0.19 - vertices[:, 1]) / 0.12, 0, 1)[:, None]
+    vertices = vertices + outward * (THICK + 0.004 * hang)
+    fallen = vertices.copy()
+    for _ in range(5):
+        smoothed = _averaged(fallen, torso.edges)
+        fallen = np.where(hang > 0, fallen * (1 - 0.7 * hang) + smoothed * 0.7 * hang, fallen)
+    # The collar turns in at its edge.
+    edges = [tuple(edge) for edge in _open_edges(torso) if edge[0] in set(top) and edge[1] in set(top)]
+    inner = {vertex: len(fallen) + k for k, vertex in enumerate(top.tolist())}
+    band = fallen[top] - outward[top] * (THICK + 0.003) + (0.0, -0.002, 0.0)
+    strip = [[a, b, inner[b]] for a, b in edges] + [[a, inner[b], inner[a]] for a, b in edges]
+    colours = np.tile([*COLOUR, 0.06], (len(fallen) + len(band), 1))
+    return np.concatenate([fallen, band]), np.concatenate([triangles, np.array(strip)[:, ::-1]]), colours
+
+
+def _on_neckline(places: Float64, skin: Float64) -> Float64:
+    """Places moved up or down the skin onto the neckline."""
+    from scipy.interpolate import LinearNDInterpolator
+
+    def around(points: Float64) -> Float64:
+        return np.arctan2(points[:, 0], points[:, 2] - AXIS)
+
+    neck = skin[(skin[:, 1] > -0.24) & (np.hypot(skin[:, 0], skin[:, 2] - AXIS) < 0.13)]
+    chart = np.stack([around(neck), neck[:, 1]], axis=1)
+    chart = np.concatenate([chart + (turn, 0) for turn in (-2 * np.pi, 0, 2 * np.pi)])
+    away = np.tile(np.hypot(neck[:, 0], neck[:, 2] - AXIS), 3)
+    turn, height = around(places), neckline(places)
+    radius = LinearNDInterpolator(chart, away)(turn, height)
+    radius = np.where(np.isfinite(radius), radius, np.hypot(places[:, 0], places[:, 2] - AXIS))
+    return np.stack([radius * np.sin(turn), height, AXIS + radius * np.cos(turn)], axis=1)
+
+
+def _finer(surface: figure.Surface) -> figure.Surface:
+    """Every quad cut into four where the shirt hangs near the neck."""
+    middle = surface.vertices[surface.quads].mean(axis=1)
+    refined = refine(surface, middle[:, 1] > neckline(middle) - 0.045)
+    # As quads again: each triangle counts as one with a doubled corner.
+    quads = np.concatenate([refined.triangles, refined.triangles[:, 2:]], axis=1)
+    return figure.Surface(refined.vertices, quads, quads * 0, refined.uvs)
+
+
+def _averaged(values: Float64, edges: Int64) -> Float64:
+    total, count = values.copy(), np.ones((len(values), 1))
+    for a, b in (edges.T, edges[:, ::-1].T):
+        np.add.at(total, a, values[b])
+        np.add.at(count, a, 1)
+    return total / count
+
+
+def _open_edges(surface: figure.Surface) -> Int64:
+    """(E, 2) edges of one face only, in that face's direction."""
+    corners = surface.quads[:, :3]
+    sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+    _, inverse, counts = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return sides[counts[inverse.ravel()] == 1]
+
+
+def _rim(surface: figure.Surface) -> Int64:
+    return np.unique(_open_edges(surface))

@@ -1,0 +1,68 @@
+"""Eyelashes: thin bent blades that stand on the margins of the lids."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+Mesh = tuple[Float64, Int64, Float64]
+
+COLOUR = np.array([0.012, 0.008, 0.006])
+"""Linear light."""
+UPPER = 76
+SEGMENTS = 3
+LENGTH = 0.0076
+
+
+def lashes(margin: Float64, centre: Float64) -> Mesh:
+    """Upper lashes of the left eye: vertices, triangles, colours (V, 4); one connected piece each.
+
+    margin: (N, 3) places along the upper lid's from the inner to the outer corner. centre: the eyeball's.
+    """
+    random = np.random.default_rng(23)
+    blades = []
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(margin, axis=0), axis=1))])
+    at = np.linspace(0.16, 0.985, UPPER) + random.normal(0, 0.003, UPPER)
+    for share in np.clip(at, 0.02, 0.99):
+        root = np.array([np.interp(share * run[-1], run, margin[:, axis]) for axis in range(3)])
+        full = LENGTH * (0.55 + 0.45 * np.sin(np.pi * np.clip(share * 1.05 - 0.12, 0, 1)) ** 0.8)
+        full *= 0.86 + 0.28 * random.random()
+        blades.append(_blade(root, centre, full, share, random))
+    starts = np.cumsum([0, *(len(blade) for blade in blades)])[:-1]
+    pattern = _pattern()
+    vertices = np.concatenate(blades)
+    triangles = np.concatenate([pattern + start for start in starts])
+    return vertices, triangles, np.tile([*COLOUR, 0.35], (len(vertices), 1))
+
+
+def _pattern() -> Int64:
+    """Triangles of one blade: pairs of vertices along it, one at its tip."""
+    found = []
+    for k in range(SEGMENTS - 1):
+        a, b, c, d = 2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 3
+        found += [[a, b, d], [a, d, c]]
+    last = 2 * (SEGMENTS - 1)
+    return np.array([*found, [last, last + 1, last + 2]])
+
+
+def _blade(
+    root: Float64, centre: Float64, length: float, share: float, random: np.random.Generator
+) -> Float64:
+    outward = root - centre
+    outward /= np.linalg.norm(outward)
+    # They fan out: inner ones lean to the nose, outer ones to the temple.
+    fan = np.array([(share - 0.42) * 1.25 + random.normal(0, 0.10), 0.0, 0.0])
+    start = outward * 0.92 + fan + np.array([0, -0.35, 0.40])
+    end = outward * 0.25 + fan * 1.15 + np.array([0, 0.75, 0.55])
+    side = np.array([1.0, 0.0, -0.25 * np.sign(outward[0])])
+    side /= np.linalg.norm(side)
+    place, points = root.copy(), []
+    for k in range(SEGMENTS + 1):
+        t = k / SEGMENTS
+        width = 0.00044 * (1 - 0.72 * t)
+        points += [place - side * width / 2, place + side * width / 2] if k < SEGMENTS else [place]
+        way = start * (1 - t) + end * t
+        place = place + way / np.linalg.norm(way) * length / SEGMENTS
+    return np.array(points)

@@ -1,0 +1,19 @@
+"""The built-in head: `head.glb`, made by `examples/figure/make_head.py`; see NOTICE.txt for its origin."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fba.face.model import FaceModel
+
+
+@cache
+def default() -> FaceModel:
+    """The built-in head; read on first use."""
+    from fba.face.storage import load
+
+    with as_file(files(__package__) / "head.glb") as path:
+        return load(path)
