@@ -172,10 +172,15 @@ def _head(base: Polygons) -> Bool:
 def _eyes(file: Path, base: Polygons) -> list[Source]:
     """Left and right eyeball, of the fitted eyes where they are there."""
     clothes = beside(file, EYES)
-    eyes = fitted(clothes, base.vertices) if clothes is not None else None
-    if clothes is None or eyes is None:
+    if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
         return [make_part(base, _group(base, g), n, "eye", scale=METRES, material=WHITE) for n, g in sides]
+    return eye_pieces(clothes, base.vertices)
+
+
+def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
+    """Left and right eyeball of the eyes in an .mhclo file, fitted to a base mesh (V, 3)."""
+    eyes = fitted(clothes, base)
     picture = beside(clothes, "brown_eye.png")
     material = Material("eye", (1.0, 1.0, 1.0), 0.1, whole(picture)) if picture is not None else WHITE
     sources = []

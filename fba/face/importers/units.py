@@ -22,7 +22,7 @@ def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, 
 
     points: (84, 3). unit: what the user says, taken as it is. Otherwise the unit with which the pupils
     (3.5, 3.6; without them the eyes) stand as far apart as on a real head; where none does, as with
-    Candide, the mesh is scaled to an adult's 62 mm. ModelError where neither is known or `unit` is not positive.
+    Candide, the mesh is scaled to an adult's 62 mm. ModelError where that is unknown or `unit` not positive.
     """
     if unit is not None:
         if not (np.isfinite(unit) and unit > 0):

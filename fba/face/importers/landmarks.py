@@ -1,0 +1,240 @@
+"""Feature points of a head that nobody marked, found by its eyes and its shapes.
+
+Reliable are the eyeballs (round parts), the lids (what a blink moves most), the lips (where an opening
+jaw parts the midline), the corners of the mouth (what a smile moves most), the tip of the nose and the
+edges on the profile. All other points are those of the adult head in `neutral.csv`, bent so that these
+fit, and put on the skin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.authoring.shape_names import canonical, fap_of
+from fba.face.eyeball import sphere
+from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
+from fba.face.importers.pieces import Piece
+from fba.face.importers.profile import profile_points
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+
+NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
+"""Shapes without which the points of the FAPU are not found."""
+FREE = ("7.1", "11.5")
+"""Points that stand on no surface."""
+SMOOTHING = 0.1
+"""How little the bending minds single points: some lie at one place on the adult head, apart on another."""
+FEWEST_FAPS = 20
+"""From so many shapes named after FAPs on, the points are where these move most."""
+
+
+def find_points(pieces: Sequence[Piece], path: str) -> Float64:
+    """Feature points (84, 3) of a head, in its own unit; +y up, looking to +z.
+
+    Raises ModelError that says which eyes or shapes are missing, and how to give the points instead.
+    """
+    eyes = _eyes(pieces, path)
+    skin = [piece for piece in pieces if piece.part.kind == "skin"]
+    if not skin:
+        raise ModelError(f"{path}: no part is skin; name the kinds of the parts{_how(path)}")
+    shapes = _Shapes(skin[0])
+    found = _from_faps(shapes) if shapes.faps >= FEWEST_FAPS else _from_arkit(shapes, eyes, path)
+    for name, side in (("3.5", "left"), ("3.6", "right")):
+        found[name] = eyes[side][2]
+    found |= profile_points(skin[0].part, found)
+    return _warped(pieces, found)
+
+
+class _Shapes:
+    """The skin and its shapes by ARKit's names, or by FAPs."""
+
+    def __init__(self, skin: Piece) -> None:
+        self.vertices: Float64 = skin.part.vertices.astype(np.float64)
+        self.arkit = {shape: skin.morphs[name] for shape, name in canonical(skin.morphs).items()}
+        self.by_fap = {fap_of(name): morph for name, morph in skin.morphs.items() if fap_of(name)}
+        self.faps = len(self.by_fap)
+
+    def __getitem__(self, shape: str) -> Float64:
+        return np.asarray(self.arkit[shape], dtype=np.float64)
+
+
+def _eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, float, Float64]]:
+    """Centre, radius and pupil of each eyeball."""
+    found = {}
+    for piece in pieces:
+        if piece.part.kind == "eye":
+            ball = sphere(piece.part)
+            if ball is not None:
+                centre, radius = ball[0], ball[1]
+                vertices = piece.part.vertices.astype(np.float64)
+                away = np.hypot(vertices[:, 0] - centre[0], vertices[:, 1] - centre[1])
+                away[vertices[:, 2] < centre[2]] = np.inf
+                side = "left" if "left" in piece.part.name else "right"
+                found[side] = (centre, radius, vertices[int(away.argmin())])
+    missing = [f"the {side} eye" for side in ("left", "right") if side not in found]
+    if missing:
+        raise ModelError(
+            f"{path}: {' and '.join(missing)} (feature points 3.5 and 3.6) not found: no part is named "
+            f"as an eyeball, none is a round shell{_how(path)}"
+        )
+    return found
+
+
+def _how(path: str) -> str:
+    return (
+        "; give the feature points, as points=FILE or as a file beside the head, with lines 'name,x,y,z' "
+        "or 'name,vertex'"
+    )
+
+
+def _from_faps(shapes: _Shapes) -> dict[str, Float64]:
+    """Each point is where the shape named after its FAP moves the skin furthest."""
+    found: dict[str, Float64] = {}
+    for fap in faps():
+        morph = shapes.by_fap.get(fap.number)
+        if morph is None or len(fap.feature_points) != 1 or fap.number in (3, 14, 15):
+            continue
+        name = fap.feature_points[0]
+        if name.split(".")[0] in ("6", "7") or name in ("3.5", "3.6") or name in found:
+            continue
+        found[name] = shapes.vertices[int(np.linalg.norm(morph, axis=1).argmax())]
+    return found
+
+
+def _from_arkit(
+    shapes: _Shapes, eyes: Mapping[str, tuple[Float64, float, Float64]], path: str
+) -> dict[str, Float64]:
+    missing = [shape for shape in NEEDED if shape not in shapes.arkit]
+    if missing:
+        raise ModelError(
+            f"{path}: the shapes {', '.join(missing)} are missing, by which the lids (3.1 to 3.4) and lips "
+            f"(2.2, 2.3, 8.3, 8.4) would be found{_how(path)}"
+        )
+    found: dict[str, Float64] = {}
+    for side in ("left", "right"):
+        found |= _lids(shapes, eyes[side], side)
+    found |= _mouth(shapes, eyes, path)
+    return found
+
+
+def _lids(shapes: _Shapes, eye: tuple[Float64, float, Float64], side: str) -> dict[str, Float64]:
+    """The margins: near the eyeball, what a blink lowers most, and what it then meets."""
+    centre, radius, _ = eye
+    blink = shapes["eyeBlinkLeft" if side == "left" else "eyeBlinkRight"]
+    vertices = shapes.vertices
+    near = np.linalg.norm(vertices - centre, axis=1) < 1.6 * radius
+    column = near & (np.abs(vertices[:, 0] - centre[0]) < 0.35 * radius) & (vertices[:, 2] > centre[2])
+    upper_side = column & (vertices[:, 1] > centre[1] - 0.2 * radius)
+    fall = np.where(upper_side, -blink[:, 1], -np.inf)
+    # several rows of a margin fall as far; the lowest of those is the edge
+    far = fall > 0.9 * fall.max()
+    off = np.abs(vertices[:, 0] - centre[0])
+    upper = int(np.where(far, vertices[:, 1] + 0.5 * off, np.inf).argmin())
+    closed = vertices[upper] + blink[upper]
+    rest = column & (vertices[:, 1] < vertices[upper, 1]) & (-blink[:, 1] < 0.4 * fall.max())
+    meets = np.where(rest, np.linalg.norm(vertices + blink - closed, axis=1), np.inf)
+    lower = int(meets.argmin())
+    names_ = ("3.1", "3.3") if side == "left" else ("3.2", "3.4")
+    found = {names_[0]: vertices[upper], names_[1]: vertices[lower]}
+    opening = vertices[upper, 1] - vertices[lower, 1]
+    if not opening > 0:
+        raise ModelError(f"the lids of the {side} eye were not found: the shape of its blink opens it")
+    return found
+
+
+def _mouth(
+    shapes: _Shapes, eyes: Mapping[str, tuple[Float64, float, Float64]], path: str
+) -> dict[str, Float64]:
+    vertices = shapes.vertices
+    left, right = eyes["left"][0], eyes["right"][0]
+    apart = left[0] - right[0]
+    if not apart > 0:
+        raise ModelError(
+            f"{path}: the left eye is right of the right eye; the head must look to +z, up is +y"
+        )
+    middle = (left + right) / 2
+    drop = -shapes["jawOpen"][:, 1]
+    ahead = vertices[:, 2] > middle[2]
+    centre = (np.abs(vertices[:, 0] - middle[0]) < 0.04 * apart) & ahead
+    moved = centre & (drop > 0.5 * drop[centre].max())
+    if not moved.any():
+        raise ModelError(f"{path}: the shape jawOpen moves nothing at the midline of the mouth")
+    lower = int(np.where(moved, vertices[:, 1], -np.inf).argmax())
+    still = centre & (drop < 0.3 * drop[centre].max())
+    gap = np.where(still, np.linalg.norm(vertices - vertices[lower], axis=1), np.inf)
+    # the edge of the upper lip is the lowest of what stays near the lower lip
+    close = gap < gap.min() + 0.03 * apart
+    upper = int(np.where(close, vertices[:, 1], np.inf).argmin())
+    found = {"2.2": vertices[upper], "2.3": vertices[lower]}
+    for side, sign, inner, outer in (("Left", 1, "2.4", "8.3"), ("Right", -1, "2.5", "8.4")):
+        shape = next((s for s in (f"mouthSmile{side}", f"mouthStretch{side}") if s in shapes.arkit), None)
+        if shape is None:
+            continue
+        level = np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.25 * apart
+        beside = (vertices[:, 0] - middle[0]) * sign > 0.15 * apart
+        front = vertices[:, 2] > middle[2] - 0.6 * apart
+        size = np.linalg.norm(shapes[shape], axis=1)
+        place = np.where(level & beside & front, size, -1.0)
+        # of what moves nearly furthest, what is nearest to the line of the lips
+        far = place > 0.9 * place.max()
+        across = np.abs(vertices[:, 1] - vertices[upper, 1]) + 0.2 * np.abs(vertices[:, 0] - middle[0])
+        corner = vertices[int(np.where(far, across, np.inf).argmin())]
+        found[inner], found[outer] = corner, corner
+    return found
+
+
+def _warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
+    """All points: the adult head's, bent to those found, each then on the nearest surface of its kind."""
+    from scipy.interpolate import RBFInterpolator
+    from scipy.spatial import cKDTree
+
+    from fba.face.authoring.binding import kinds_of
+
+    row, adult = row_of(), neutral_points()
+    known = dict(found)
+    middle = (known["3.5"] + known["3.6"])[0] / 2
+    for left, right in MIRRORED.items():
+        if (left in known) != (right in known):
+            have, lack = (left, right) if left in known else (right, left)
+            known[lack] = known[have] * (-1, 1, 1) + (2 * middle, 0, 0)
+    # pupils lie behind the lids or before them, as the iris is made; they say nothing of the skin
+    held = [name for name in known if name not in ("3.5", "3.6")]
+    scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
+    source = np.array([adult[row[name]] for name in held])
+    target = np.array([known[name] for name in held]) / scale
+    warp = RBFInterpolator(source, target, kernel="linear", degree=1, smoothing=SMOOTHING)
+    points: Float64 = warp(adult) * scale
+    centre = points[[row["3.5"], row["3.6"], row["7.1"]]].mean(axis=0)
+    trees = {}
+    for name in names():
+        if name in known:
+            points[row[name]] = known[name]
+        if name in FREE:
+            continue
+        # what was found is a vertex, or lies on the profile between some
+        pool = (kinds_of(name), name in known)
+        if pool not in trees:
+            fit = [piece for piece in pieces if piece.part.kind in pool[0]]
+            chosen = [
+                piece.part.vertices.astype(np.float64) if pool[1] else _outside(piece, centre)
+                for piece in fit
+            ]
+            trees[pool] = cKDTree(np.concatenate(chosen)) if chosen else None
+        tree = trees[pool]
+        points[row[name]] = np.nan if tree is None else tree.data[tree.query(points[row[name]])[1]]
+    return points
+
+
+def _outside(piece: Piece, centre: Float64) -> Float64:
+    """Vertices of a part that look away from the middle of the head: not those of sockets and throat."""
+    vertices = piece.part.vertices.astype(np.float64)
+    if piece.part.kind != "skin" or piece.part.normals is None:
+        return vertices
+    looks = np.einsum("ij,ij->i", vertices - centre, piece.part.normals)
+    return vertices[looks > 0] if (looks > 0).any() else vertices

@@ -1,0 +1,117 @@
+"""Points that the outline of a head shows: nose, lips and chin on its profile, crown, back and ears."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.model import Part
+
+Float64 = npt.NDArray[np.float64]
+
+STEPS = 400
+"""Heights at which the profile is taken."""
+
+
+def profile_points(skin: Part, found: Mapping[str, Float64]) -> dict[str, Float64]:
+    """9.3, 9.15, 8.1, 8.2, 2.10 and 2.1 on the profile of a skin, and 11.4, 11.6, 10.3, 10.4 of the head.
+
+    found: at least the pupils (3.5, 3.6) and the lips (2.2, 2.3). Only those that show clearly are given.
+    """
+    pupils = (found["3.5"] + found["3.6"]) / 2
+    apart = float(found["3.5"][0] - found["3.6"][0])
+    tall = float(pupils[1] - found["2.2"][1])
+    result = _head(skin.vertices.astype(np.float64), pupils, apart)
+    heights = np.linspace(found["2.3"][1] - 1.2 * tall, pupils[1], STEPS)
+    front = _front(skin, float(pupils[0]), heights)
+    if not np.isfinite(front).any():
+        return result
+
+    def place(index: int) -> Float64:
+        return np.array([pupils[0], heights[index], front[index]])
+
+    def foremost(low: float, high: float) -> int | None:
+        inside = (heights > low) & (heights < high) & np.isfinite(front)
+        return int(np.where(inside, front, -np.inf).argmax()) if inside.any() else None
+
+    lip, tip = found["2.2"], foremost(found["2.2"][1] + 0.2 * tall, pupils[1] - 0.2 * tall)
+    if tip is None:
+        return result
+    result["9.3"] = place(tip)
+    between = (heights > lip[1] + 0.1 * (heights[tip] - lip[1])) & (np.arange(STEPS) < tip)
+    if between.any():
+        base = int(np.where(between & np.isfinite(front), front, np.inf).argmin())
+        result["9.15"] = place(base)
+        upper = foremost(lip[1], float(heights[base]))
+        if upper is not None:
+            result["8.1"] = place(upper)
+    chin = foremost(found["2.3"][1] - 0.8 * tall, found["2.3"][1] - 0.25 * tall)
+    if chin is None:
+        return result
+    result["2.10"] = place(chin)
+    dent = (heights > heights[chin]) & (heights < found["2.3"][1] - 0.02 * tall) & np.isfinite(front)
+    if dent.any():
+        # the lower lip ends half way from its foremost to the dent above the chin
+        low = int(np.where(dent, front, np.inf).argmin())
+        lower = foremost(float(heights[low]), float(found["2.3"][1]))
+        if lower is not None:
+            result["8.2"] = place((low + lower) // 2)
+    below = np.flatnonzero(
+        np.isfinite(front) & (heights < heights[chin]) & (front > front[chin] - 0.3 * apart)
+    )
+    if len(below):
+        result["2.1"] = place(int(below[0]))
+    return result
+
+
+def _front(skin: Part, x: float, heights: Float64) -> Float64:
+    """For each height the foremost z where the skin cuts the plane at x; NaN where it does not."""
+    vertices = skin.vertices.astype(np.float64)
+    # a plane through vertices cuts twice or not at all; beside them it is clean
+    beside = x + 1e-5 * float(np.ptp(vertices[:, 0]))
+    corners = vertices[skin.triangles]
+    side = corners[:, :, 0] > beside
+    corners = corners[side.any(axis=1) & ~side.all(axis=1)]
+    ends: list[Float64] = []
+    for a, b in itertools.pairwise((0, 1, 2, 0)):
+        p, q = corners[:, a], corners[:, b]
+        cuts = (p[:, 0] > beside) != (q[:, 0] > beside)
+        share = np.where(cuts, (beside - p[:, 0]) / np.where(cuts, q[:, 0] - p[:, 0], 1.0), np.nan)
+        ends.append(p[:, 1:] + share[:, None] * (q[:, 1:] - p[:, 1:]))
+    three = np.stack(ends, axis=1)
+    two = three[~np.isnan(three[:, :, 0])].reshape(-1, 2, 2)
+    result = np.full(len(heights), np.nan)
+    for start, end in two:
+        low, high = sorted((start, end), key=lambda point: float(point[0]))
+        inside = np.flatnonzero((heights >= low[0]) & (heights <= high[0]))
+        rise = max(high[0] - low[0], 1e-12)
+        depth = low[1] + (heights[inside] - low[0]) / rise * (high[1] - low[1])
+        result[inside] = np.fmax(result[inside], depth)
+    return result
+
+
+def _head(vertices: Float64, pupils: Float64, apart: float) -> dict[str, Float64]:
+    """Crown and back of a whole head, and the ears where they stand out."""
+    result: dict[str, Float64] = {}
+    crown = vertices[int(vertices[:, 1].argmax())]
+    if abs(crown[0] - pupils[0]) < 0.3 * apart and crown[1] > pupils[1] + apart:
+        result["11.4"] = np.array([pupils[0], crown[1], crown[2]])
+    level = np.abs(vertices[:, 1] - pupils[1] - 0.4 * apart) < 0.3 * apart
+    if level.any():
+        back = vertices[int(np.where(level, vertices[:, 2], np.inf).argmin())]
+        if back[2] < pupils[2] - 1.8 * apart:
+            result["11.6"] = np.array([pupils[0], back[1], back[2]])
+    ears = (np.abs(vertices[:, 1] - pupils[1] + 0.2 * apart) < 0.6 * apart) & (
+        vertices[:, 2] < pupils[2] - 0.9 * apart
+    )
+    temple = (np.abs(vertices[:, 1] - pupils[1] - apart) < 0.4 * apart) & (vertices[:, 2] < pupils[2])
+    for name, sign in (("10.3", 1.0), ("10.4", -1.0)):
+        out = (vertices[:, 0] - pupils[0]) * sign
+        if ears.any() and temple.any():
+            tip = int(np.where(ears, out, -np.inf).argmax())
+            if out[tip] > out[temple].max() + 0.05 * apart:
+                result[name] = vertices[tip]
+    return result
