@@ -23,6 +23,7 @@ Floats = npt.NDArray[Any]
 SHORTEST = np.float32(1e-30)
 """Squared length of a sum of normals below which it has no direction."""
 LONGEST = np.float32(1e30)
+ZERO, ONE = np.float32(0), np.float32(1)
 
 
 @compiled
@@ -128,9 +129,9 @@ def poses_of_frames(values: Float64, transforms: Transforms, poses: Float64) -> 
 @compiled
 def sum_normals(moved: Float32, surface: Surface, part: int) -> None:
     """Add the triangles of a part, as vectors of twice their area, to the sums of their corners."""
-    sums = surface.sums
-    for k in range(int(surface.sums_start[part]), int(surface.sums_start[part + 1])):
-        sums[k, 0] = sums[k, 1] = sums[k, 2] = 0.0
+    sum_x, sum_y, sum_z = surface.sums[0], surface.sums[1], surface.sums[2]
+    for k in range(int(surface.changing_start[part]), int(surface.changing_start[part + 1])):
+        sum_x[k] = sum_y[k] = sum_z[k] = 0.0
     start, stop = int(surface.triangles_start[part]), int(surface.triangles_start[part + 1])
     triangles, corners = surface.triangles[start:stop], surface.corners[start:stop]
     for k in range(len(triangles)):
@@ -140,15 +141,58 @@ def sum_normals(moved: Float32, surface: Surface, part: int) -> None:
         vx, vy, vz = moved[c, 0] - x, moved[c, 1] - y, moved[c, 2] - z
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         i, j, l = corners[k, 0], corners[k, 1], corners[k, 2]  # noqa: E741
-        sums[i, 0] += nx
-        sums[i, 1] += ny
-        sums[i, 2] += nz
-        sums[j, 0] += nx
-        sums[j, 1] += ny
-        sums[j, 2] += nz
-        sums[l, 0] += nx
-        sums[l, 1] += ny
-        sums[l, 2] += nz
+        sum_x[i] += nx
+        sum_y[i] += ny
+        sum_z[i] += nz
+        sum_x[j] += nx
+        sum_y[j] += ny
+        sum_z[j] += nz
+        sum_x[l] += nx
+        sum_y[l] += ny
+        sum_z[l] += nz
+
+
+@compiled
+def turn_normals(
+    turn: Float32, source: Float32, neutral: Float32, units: Float32, start: int, stop: int
+) -> None:
+    """units (3, N) from start to stop: source (3, N) turned by `turn` (3, 3) and made unit vectors.
+
+    Where triangles have no area, or no direction together, the neutral normal stands in.
+    """
+    xx, xy, xz = turn[0, 0], turn[0, 1], turn[0, 2]
+    yx, yy, yz = turn[1, 0], turn[1, 1], turn[1, 2]
+    zx, zy, zz = turn[2, 0], turn[2, 1], turn[2, 2]
+    # A row first, then a part of it: in one step it would no longer be known to be contiguous.
+    from_x, from_y, from_z = source[0][start:stop], source[1][start:stop], source[2][start:stop]
+    rest_x, rest_y, rest_z = neutral[0][start:stop], neutral[1][start:stop], neutral[2][start:stop]
+    to_x, to_y, to_z = units[0][start:stop], units[1][start:stop], units[2][start:stop]
+    for k in range(len(to_x)):
+        x, y, z = from_x[k], from_y[k], from_z[k]
+        squared = x * x + y * y + z * z
+        good = (squared > SHORTEST) & (squared < LONGEST)
+        x, y, z = x if good else rest_x[k], y if good else rest_y[k], z if good else rest_z[k]
+        nx, ny, nz = xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        scale = ONE / length if length > ZERO else ONE
+        to_x[k], to_y[k], to_z[k] = nx * scale, ny * scale, nz * scale
+
+
+@compiled
+def place_normals(
+    surface: Surface, touched: bool, part: int, turn: Float32, start: int, out: Float32
+) -> None:
+    """out (N, 3): normals of a part, whose vertices begin at `start`; touched: its sums are new."""
+    neutral, units = surface.neutral, surface.units
+    first, stop = int(surface.changing_start[part]), int(surface.changing_start[part + 1])
+    turn_normals(turn, surface.sums if touched else neutral, neutral, units, first, stop)
+    first, stop = int(surface.still_start[part]), int(surface.still_start[part + 1])
+    turn_normals(turn, neutral, neutral, units, first, stop)
+    sum_of = surface.sum_of[start : start + len(out)]
+    unit_x, unit_y, unit_z = units[0], units[1], units[2]
+    for v in range(len(out)):
+        i = sum_of[v]
+        out[v, 0], out[v, 1], out[v, 2] = unit_x[i], unit_y[i], unit_z[i]
 
 
 @compiled
@@ -162,30 +206,6 @@ def place(pose: Floats, moved: Floats, out: Floats) -> None:
         out[v, 0] = xx * x + xy * y + xz * z + x0
         out[v, 1] = yx * x + yy * y + yz * z + y0
         out[v, 2] = zx * x + zy * y + zz * z + z0
-
-
-@compiled
-def place_normals(
-    turn: Float32, sums: Float32, sum_of: npt.NDArray[np.uint32], neutral: Float32, normals: Float32
-) -> None:
-    """normals (N, 3): the sum of each vertex turned by `turn` (3, 3) and made a unit vector.
-
-    A vertex whose triangles have no area, or no direction together, keeps its neutral normal.
-    """
-    xx, xy, xz = turn[0, 0], turn[0, 1], turn[0, 2]
-    yx, yy, yz = turn[1, 0], turn[1, 1], turn[1, 2]
-    zx, zy, zz = turn[2, 0], turn[2, 1], turn[2, 2]
-    for v in range(len(normals)):
-        i = sum_of[v]
-        x, y, z = sums[i, 0], sums[i, 1], sums[i, 2]
-        if not SHORTEST < x * x + y * y + z * z < LONGEST:
-            x, y, z = neutral[v, 0], neutral[v, 1], neutral[v, 2]
-        nx, ny, nz = xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z
-        length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        if length > np.float32(0.0):
-            scale = np.float32(1.0) / length
-            nx, ny, nz = nx * scale, ny * scale, nz * scale
-        normals[v, 0], normals[v, 1], normals[v, 2] = nx, ny, nz
 
 
 @compiled
@@ -255,12 +275,10 @@ def deform_frames(
             if len(normals) == 0:
                 continue
             cofactors(scratch.whole, scratch.turn)
-            neutral, upright = surface.neutral[start:stop], normals[frame, start:stop]
-            if scratch.touched[part] == 1:
+            touched = scratch.touched[part] == 1
+            if touched:
                 sum_normals(scratch.moved, surface, part)
-                place_normals(scratch.turn, surface.sums, surface.sum_of[start:stop], neutral, upright)
-            else:
-                place_normals(scratch.turn, surface.neutral, surface.itself[start:stop], neutral, upright)
+            place_normals(surface, touched, part, scratch.turn, start, normals[frame, start:stop])
 
 
 @compiled

@@ -24,10 +24,10 @@ HEADS_MAX = 16
 class Surface(NamedTuple):
     """Triangles whose normals change, and where their sums go.
 
-    A sum belongs to one vertex, or to several along a seam. The first of a part, [sums_start[p],
-    sums_start[p + 1]), are added up anew from the triangles [triangles_start[p], triangles_start[p + 1]);
-    then come those that no FaceDefMesh reaches, which keep their neutral normal; the last is for the
-    corners that belong to such.
+    A sum belongs to one vertex, or to several along a seam. Sums come in two rows of parts: those that
+    change with some FaceDefMesh, part p's from changing_start[p] to changing_start[p + 1], then those
+    that keep their neutral normal, from still_start[p] to still_start[p + 1]. The last of all is for the
+    corners of triangles that belong to such. Part p's triangles lie from triangles_start[p] on.
     """
 
     triangles: npt.NDArray[np.uint32]
@@ -35,15 +35,20 @@ class Surface(NamedTuple):
     corners: npt.NDArray[np.uint32]
     """(F, 3) the sums that they add to."""
     triangles_start: npt.NDArray[np.int64]
-    sums_start: npt.NDArray[np.int64]
+    """(P + 1,)"""
+    changing_start: npt.NDArray[np.int64]
+    """(P + 1,)"""
+    still_start: npt.NDArray[np.int64]
+    """(P + 1,)"""
     sum_of: npt.NDArray[np.uint32]
     """(V,) the sum that a vertex takes its normal from."""
-    sums: npt.NDArray[np.float32]
-    """(C + 1, 3), scratch but for the neutral normals in it."""
     neutral: npt.NDArray[np.float32]
-    """(V, 3) unit normals of the neutral face, made in the same way."""
-    itself: npt.NDArray[np.uint32]
-    """(V,) 0, 1, 2, ...: the row of `neutral` that a vertex takes its normal from."""
+    """(3, C + 1) unit normals of the neutral face. Coordinates apart, as in the next two: a loop over
+    them takes eight at a time."""
+    sums: npt.NDArray[np.float32]
+    """(3, C + 1) scratch."""
+    units: npt.NDArray[np.float32]
+    """(3, C + 1) scratch: turned, and made unit vectors."""
 
 
 def surface(model: FaceModel, moved: npt.NDArray[np.bool_]) -> Surface:
@@ -63,24 +68,26 @@ def surface(model: FaceModel, moved: npt.NDArray[np.bool_]) -> Surface:
     needed = changing[corners].any(axis=1)
     part_of_group = np.zeros(count, dtype=np.int64)
     part_of_group[group] = np.repeat(np.arange(len(model.parts)), [len(p.vertices) for p in model.parts])
-    # Sums in the order of the parts, as the vertices are: the groups are numbered by their first vertex.
+    # Groups are numbered by their first vertex, and so in the order of the parts.
     order = np.argsort(~changing, kind="stable")
     place = np.empty(count, dtype=np.int64)
     place[order] = np.arange(count)
-    sums = np.zeros((count + 1, 3), dtype=np.float32)
-    sums[place[group]] = neutral
+    by_sum = np.zeros((3, count + 1), dtype=np.float32)
+    by_sum[:, place[group]] = neutral.T
     used = np.where(changing[corners], place[corners], count)[needed]
     parts = np.arange(len(model.parts) + 1)
-    triangle_part = part_of_group[corners[needed][:, 0]]
+    part_of_sum = part_of_group[order]
+    changing_count = int(changing.sum())
     return Surface(
         triangles=triangles[needed].astype(np.uint32),
         corners=used.astype(np.uint32),
-        triangles_start=np.searchsorted(triangle_part, parts).astype(np.int64),
-        sums_start=np.searchsorted(part_of_group[order[: int(changing.sum())]], parts).astype(np.int64),
+        triangles_start=np.searchsorted(part_of_group[corners[needed][:, 0]], parts).astype(np.int64),
+        changing_start=np.searchsorted(part_of_sum[:changing_count], parts).astype(np.int64),
+        still_start=changing_count + np.searchsorted(part_of_sum[changing_count:], parts).astype(np.int64),
         sum_of=place[group].astype(np.uint32),
-        sums=sums,
-        neutral=neutral,
-        itself=np.arange(len(neutral), dtype=np.uint32),
+        neutral=by_sum,
+        sums=np.zeros_like(by_sum),
+        units=np.zeros_like(by_sum),
     )
 
 
