@@ -20,12 +20,13 @@ def read_skins(document: Document, accessors: Accessors, nodes: int) -> tuple[Sk
 def _skin(document: Document, accessors: Accessors, entry: Value, number: int, nodes: int) -> Skin:
     name = entry.get("name")
     listed = entry.member("joints")
-    joints = tuple(value.index(nodes, "node") for value in listed.elements(MAX_ITEMS))
+    entries = listed.elements(MAX_ITEMS)
+    document.budget.charge(len(entries) * 1024, entry)
+    joints = tuple(value.index(nodes, "node") for value in entries)
     if not joints:
         raise listed.error("a skin needs at least one joint")
     if len(set(joints)) < len(joints):
         raise listed.error("a node is listed twice")
-    document.budget.charge(len(joints) * 128, entry)
     return Skin(
         name=f"skin {number}" if name is None else name.text(),
         joints=joints,
