@@ -37,10 +37,10 @@ def pose(
 ) -> None:
     """values int32 or float64 (T, 296) -> result float64 (T * J * 16,); every number of it is written.
 
-    offsets: float64 (J, 3) from the parent. counts: int64 (J,), numbers of turns; turns and axes: int64 (J, 3),
-    their places in columns and their axes, outermost first. columns: int64 (N,), the BAP columns of all
-    turns, radians: float64 (N,), signed radians of one unit. translation: int64 (3,), columns of the root's
-    translation, -1 for none; metres: float64 (3,), signed metres of one unit.
+    offsets: float64 (J, 3) from the parent. counts: int64 (J,), numbers of turns; turns and axes: int64
+    (J, 3), their places in columns and their axes, outermost first. columns: int64 (N,), the BAP columns of
+    all turns, radians: float64 (N,), signed radians of one unit. translation: int64 (3,), columns of the
+    root's translation, -1 for none; metres: float64 (3,), signed metres of one unit.
     """
     joints = parents.shape[0]
     angles = columns.shape[0]

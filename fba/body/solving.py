@@ -78,7 +78,7 @@ def _angle_about(m: Float, axis: int) -> float:
 
 @inlined
 def _closest_two(m: Float, f: int, a1: int, a2: int, start: Float, work: Float) -> None:
-    """Improves frame f of start (3, N): turns about two axes that come closest to the rotations m (3, 3, N)."""
+    """Improves frame f of start (3, N): turns about two axes that come closest to rotations m (3, 3, N)."""
     x = float(start[0, f])
     y = float(start[1, f])
     steps = STEPS if abs(m[a1, a2, f]) > ALMOST else 1
