@@ -79,6 +79,8 @@ def authored(
 ) -> FaceModel:
     """Tables from the shapes of the pieces where they have some, else from the mesh alone."""
     parts = tuple(piece.part for piece in pieces)
+    # with no vertex given, the nearest are sought, upper and lower lip told apart
+    held = bound if (bound >= 0).any() else None
     shapes = sorted({shape for piece in pieces for shape in piece.morphs})
     if shapes:
         from fba.face.authoring.morphs import from_morphs
@@ -87,10 +89,10 @@ def authored(
             shape: {piece.part.name: piece.morphs[shape] for piece in pieces if shape in piece.morphs}
             for shape in shapes
         }
-        return from_morphs(parts, points, morphs, bound=bound, name=name, notes=notes)
+        return from_morphs(parts, points, morphs, bound=held, name=name, notes=notes)
     from fba.face.authoring import author
 
-    return author(parts, points, bound=bound, name=name, notes=notes)
+    return author(parts, points, bound=held, name=name, notes=notes)
 
 
 def bound_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:

@@ -1,0 +1,108 @@
+"""Shapes (morph targets) of a face, measured at its feature points and cut into left and right halves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.model import FaceModel, Part
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+BLEND = 0.12
+"""Half the width over which a shape fades from one side to the other, as a share of ES0."""
+STILL = 1e-3
+"""A half that moves less than this share of its shape is none."""
+
+Morphs = Mapping[str, Mapping[str, npt.NDArray[np.floating]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Half:
+    """A shape, or what it does on one side of the face: side +1 left, -1 right."""
+
+    shape: str
+    side: int
+
+
+class Shapes:
+    """Shapes of a face model.
+
+    morphs: displacements (V, 3) at weight 1, in metres, by shape and part. Raises ModelError where a part
+    does not exist, has another number of vertices, or moves by numbers that are not finite.
+    """
+
+    def __init__(self, model: FaceModel, morphs: Morphs) -> None:
+        self.model = model
+        self.morphs = {shape: checked(model.parts, shape, moved) for shape, moved in morphs.items()}
+        middle = float(np.nanmean(model.points[:, 0]))
+        width = max(2 * BLEND * model.fapu.ES * 1024, 1e-9)
+        share = np.clip((model.vertices[:, 0].astype(np.float64) - middle) / width + 0.5, 0.0, 1.0)
+        self._left = share * share * (3 - 2 * share)
+        self.halves = [half for shape in self.morphs for half in self._halves(shape)]
+
+    def field(self, half: Half) -> Float64:
+        """(V, 3): what half a shape does to all vertices of the model."""
+        field = self.whole(half.shape)
+        field *= (self._left if half.side > 0 else 1.0 - self._left)[:, None]
+        return field
+
+    def whole(self, shape: str) -> Float64:
+        """(V, 3): what a shape does to all vertices of the model."""
+        field = np.zeros((len(self.model.vertices), 3))
+        for part, moved in self.morphs[shape].items():
+            start = self.model.starts[part]
+            field[start : start + len(moved)] = moved
+        return field
+
+    def mixed(self, weights: npt.ArrayLike) -> Float64:
+        """(V, 3): all halves together, each with its weight."""
+        field = np.zeros((len(self.model.vertices), 3))
+        for half, weight in zip(self.halves, np.asarray(weights, dtype=np.float64), strict=True):
+            if weight:
+                field += weight * self.field(half)
+        return field
+
+    def at(self, vertices: npt.ArrayLike) -> Float64:
+        """(H, N, 3): how far each half moves some vertices."""
+        chosen = np.asarray(vertices, dtype=np.intp)
+        found = np.zeros((len(self.halves), len(chosen), 3))
+        for number, half in enumerate(self.halves):
+            found[number] = self.field(half)[chosen]
+        return found
+
+    def _halves(self, shape: str) -> list[Half]:
+        sizes = np.linalg.norm(self.whole(shape), axis=1)
+        most = float(sizes.max(initial=0.0))
+        if not most > 0:
+            return []
+        return [
+            Half(shape, side)
+            for side, share in ((1, self._left), (-1, 1.0 - self._left))
+            if float((sizes * share).max()) > STILL * most
+        ]
+
+
+def checked(
+    parts: Sequence[Part], shape: str, moved: Mapping[str, npt.NDArray[np.floating]]
+) -> dict[str, Float32]:
+    """The displacements of one shape, checked against the parts."""
+    counts = {part.name: len(part.vertices) for part in parts}
+    result = {}
+    for name, array in moved.items():
+        where = f"shape {shape!r}, part {name!r}"
+        if name not in counts:
+            raise ModelError(f"{where}: there is no such part; there are {', '.join(counts)}")
+        displacements = np.array(array, dtype=np.float32)
+        if displacements.shape != (counts[name], 3):
+            raise ModelError(f"{where}: displacements must be ({counts[name]}, 3), not {displacements.shape}")
+        if not np.isfinite(displacements).all():
+            bad = int(np.argwhere(~np.isfinite(displacements))[0, 0])
+            raise ModelError(f"{where}: the displacement of vertex {bad} is not finite")
+        result[name] = displacements
+    return result
