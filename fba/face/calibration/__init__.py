@@ -1,0 +1,9 @@
+"""Fitting a face model to a person's feature points.
+
+model = fba.face.calibration.fit(FaceModel.default(), read_fdp("person.fdp"))
+"""
+
+from fba.face.calibration.align import UNITS
+from fba.face.calibration.fitting import FAPU_DISTANCES, fit, points_of_distances
+
+__all__ = ["FAPU_DISTANCES", "UNITS", "fit", "points_of_distances"]

@@ -1,0 +1,133 @@
+"""A smooth deformation of space that takes given points exactly to other places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+
+WELL_KNOWN = 0.02
+"""Metres: the affine part is trusted along directions in which the points are spread by more."""
+ANCHOR_DISTANCE = 0.08
+"""Metres from every point, on the scale of an adult head: beyond it the affine part alone holds."""
+ANCHORS = 60
+SAME_PLACE = 1e-5
+"""Metres between sources that are taken as one."""
+SLACK = 1e-9
+"""Smoothing of the anchors: they hold the far field, but need not be met."""
+KERNELS = ("thin_plate_spline", "cubic", "linear")
+"""From the smoothest to the tamest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A deformation: call it with places (N, 3). matrix, origin, target: its affine part."""
+
+    matrix: Float64
+    origin: Float64
+    target: Float64
+    rest: Any
+
+    def __call__(self, places: npt.NDArray[np.floating]) -> Float64:
+        flat = np.asarray(places, dtype=np.float64)
+        moved: Float64 = self.affine(flat) + self.rest(flat)
+        return moved
+
+    def affine(self, places: Float64) -> Float64:
+        moved: Float64 = (places - self.origin) @ self.matrix.T + self.target
+        return moved
+
+    def jacobians(self, places: npt.NDArray[np.floating], step: float = 1e-4) -> Float64:
+        """(N, 3, 3): how the deformation stretches and turns space at each place."""
+        flat = np.asarray(places, dtype=np.float64)
+        columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * step]
+        return np.stack(columns, axis=2) / (2 * step)
+
+
+def deformation(
+    sources: Float64, targets: Float64, mesh: npt.NDArray[np.floating], kernel: str, size: float
+) -> Field:
+    """The deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
+
+    size: how big the person is by the face. An affine part, trusted as far as the points are spread, and
+    a radial basis function (thin plate, biharmonic or triharmonic) for the rest, which anchors on the
+    mesh hold at zero far away from all points: the back of a head does not follow the tip of a nose.
+    """
+    from scipy.interpolate import RBFInterpolator
+
+    sources, targets = _distinct(sources, targets)
+    origin, target = sources.mean(axis=0), targets.mean(axis=0)
+    here, there = sources - origin, targets - target
+    spread = here.T @ here / len(here) + WELL_KNOWN**2 * np.eye(3)
+    pull = there.T @ here / len(here) + size * WELL_KNOWN**2 * np.eye(3)
+    matrix = pull @ np.linalg.inv(spread)
+    anchors = far_from(np.asarray(mesh, dtype=np.float64), sources)
+    centres = np.vstack([sources, anchors])
+    left = np.vstack([there - here @ matrix.T, np.zeros((len(anchors), 3))])
+    smoothing = np.concatenate([np.zeros(len(sources)), np.full(len(anchors), SLACK)])
+    affine = np.linalg.matrix_rank(centres - centres[0], tol=1e-4) == 3 and len(centres) > 4
+    rest = RBFInterpolator(centres, left, kernel=kernel, smoothing=smoothing, degree=1 if affine else 0)
+    return Field(matrix, origin, target, rest)
+
+
+def far_from(mesh: Float64, sources: Float64) -> Float64:
+    """Up to `ANCHORS` places spread over that part of a mesh which is far from all sources: (K, 3)."""
+    from scipy.spatial import cKDTree
+
+    away = cKDTree(sources).query(mesh)[0]
+    rest = mesh[away > ANCHOR_DISTANCE]
+    chosen: list[int] = []
+    distance = np.full(len(rest), np.inf)
+    while len(chosen) < min(ANCHORS, len(rest)):
+        nearest = int(distance.argmax()) if chosen else int(away[away > ANCHOR_DISTANCE].argmax())
+        if chosen and distance[nearest] < ANCHOR_DISTANCE / 2:
+            break
+        chosen.append(nearest)
+        distance = np.minimum(distance, np.linalg.norm(rest - rest[nearest], axis=1))
+    places: Float64 = rest[chosen]
+    return places
+
+
+def bumps(centres: Float64, shifts: Float64, width: float) -> Any:
+    """A field of shifts that are met exactly at the centres and fade within about `width` metres."""
+    centres, shifts = _distinct(centres, shifts)
+    gram = np.exp(-_squares(centres, centres) / (2 * width**2))
+    strength = np.linalg.lstsq(gram, shifts, rcond=None)[0]
+
+    def moved(places: Float64) -> Float64:
+        found: Float64 = np.exp(-_squares(places, centres) / (2 * width**2)) @ strength
+        return found
+
+    return moved
+
+
+def between(centres: Float64, shifts: Float64) -> Any:
+    """A field of shifts that are met exactly at the centres and go evenly from one to the other."""
+    from scipy.interpolate import RBFInterpolator
+
+    centres, shifts = _distinct(centres, shifts)
+    return RBFInterpolator(centres, shifts, kernel="linear", degree=0)
+
+
+def _squares(a: Float64, b: Float64) -> Float64:
+    squares: Float64 = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
+    return squares
+
+
+def _distinct(sources: Float64, targets: Float64) -> tuple[Float64, Float64]:
+    """Sources that stand on one spot (upper and lower lip) made one, going to the middle of its targets."""
+    from scipy.spatial import cKDTree
+
+    group = np.arange(len(sources))
+    for a, b in sorted(cKDTree(sources).query_pairs(SAME_PLACE)):
+        group[group == group[b]] = group[a]
+    kept, inverse = np.unique(group, return_inverse=True)
+    count = np.bincount(inverse).astype(np.float64)[:, None]
+    summed = np.zeros((len(kept), 6))
+    np.add.at(summed, inverse, np.hstack([sources, targets]))
+    mean = summed / count
+    return mean[:, :3], mean[:, 3:]
