@@ -44,10 +44,10 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     rim = _rim(torso)
     top = rim[torso.vertices[rim, 1] > -0.21]
-    turn = np.arctan2(torso.vertices[top, 0], torso.vertices[top, 2] - AXIS)
-    outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
     vertices = torso.vertices.copy()
-    vertices[top] = _on_neckline(torso.vertices[top], whole_skin)
+    vertices[top] = _on_neckline(_in_order(torso, top), whole_skin)
+    turn = np.arctan2(vertices[top, 0], vertices[top, 2] - AXIS)
+    outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
     for _ in range(4):  # the rows below follow
         eased = _averaged(vertices, torso.edges)
         near = smooth(1 - (neckline(vertices) - vertices[:, 1]) / 0.05)[:, None]
@@ -66,6 +66,27 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     strip = [[a, b, inner[b]] for a, b in edges] + [[a, inner[b], inner[a]] for a, b in edges]
     colours = np.tile([*COLOUR, 0.06], (len(fallen) + len(band), 1))
     return np.concatenate([fallen, band]), np.concatenate([triangles, np.array(strip)[:, ::-1]]), colours
+
+
+def _in_order(torso: figure.Surface, top: Int64) -> Float64:
+    """The places of the collar's vertices, at even turns about the neck in the order of its edge.
+
+    The edge climbs in steps along the quads; a collar runs round evenly.
+    """
+    after = {int(a): int(b) for a, b in _open_edges(torso) if a in set(top.tolist()) and b in set(top.tolist())}
+    chain = [int(top[torso.vertices[top, 2].argmax()])]
+    while after[chain[-1]] != chain[0]:
+        chain.append(after[chain[-1]])
+    places = torso.vertices[chain]
+    turn = np.unwrap(np.arctan2(places[:, 0], places[:, 2] - AXIS))
+    steps = np.diff(turn, append=turn[0] + np.sign(turn[-1] - turn[0]) * 2 * np.pi)
+    for _ in range(30):
+        steps = (steps + np.roll(steps, 1) + np.roll(steps, -1)) / 3
+    even = turn[0] + np.concatenate([[0.0], np.cumsum(steps)[:-1]])
+    away = np.hypot(places[:, 0], places[:, 2] - AXIS)
+    moved = np.stack([away * np.sin(even), places[:, 1], AXIS + away * np.cos(even)], axis=1)
+    row = {vertex: k for k, vertex in enumerate(chain)}
+    return moved[[row[int(vertex)] for vertex in top]]
 
 
 def _on_neckline(places: Float64, skin: Float64) -> Float64:

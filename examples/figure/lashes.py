@@ -24,7 +24,7 @@ def lashes(margin: Float64, centre: Float64) -> Mesh:
     random = np.random.default_rng(23)
     blades = []
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(margin, axis=0), axis=1))])
-    at = np.linspace(0.16, 0.985, UPPER) + random.normal(0, 0.003, UPPER)
+    at = np.linspace(0.22, 0.985, UPPER) + random.normal(0, 0.003, UPPER)
     for share in np.clip(at, 0.02, 0.99):
         root = np.array([np.interp(share * run[-1], run, margin[:, axis]) for axis in range(3)])
         full = LENGTH * (0.55 + 0.45 * np.sin(np.pi * np.clip(share * 1.05 - 0.12, 0, 1)) ** 0.8)

@@ -32,6 +32,7 @@ from fba.face.normals import vertex_normals
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
+NEUTRAL = TARGET.parents[1] / "neutral.csv"
 ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
 """Between the pupils, in the frame of `figure.head`."""
 TEETH = np.array([0.0, -0.0713, 0.0823])
@@ -133,11 +134,16 @@ def _skin_part(surface: Refined, where: sculpt.Marks) -> Part:
     ]
     vertices = np.concatenate([surface.vertices, surface.vertices[unique[:, 0]]])
     uv_rows = np.concatenate([first, unique[:, 1]])
-    texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], (0.5, 0.372))
+    source = np.concatenate([np.arange(len(surface.vertices)), unique[:, 0]])
+    # The insides take the colour of their border: of the lips, or of the corner of the eyes.
+    lips = surface.uvs[first[np.flatnonzero(carried(surface, where.mouth) == 0)]].mean(axis=0)
+    corner = surface.vertices[:, 0] * 1000 - 50 * np.abs(carried(surface, where.eye) - 1)
+    eye = surface.uvs[first[np.where(first >= 0, -np.abs(corner - 17), -np.inf).argmax()]]
+    inner_uv = np.where((vertices[:, 1] > -0.03)[:, None], eye, lips)
+    texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], inner_uv)
     texcoords = np.stack([texcoords[:, 0], 1 - texcoords[:, 1]], axis=1)
     triangles = np.array(flat).reshape(-1, 3)
     texture = paint.encoded(paint.paint(_chart(surface, where)))
-    source = np.concatenate([np.arange(len(surface.vertices)), unique[:, 0]])
     return Part(
         "skin", "skin", vertices, triangles,
         texcoords=texcoords, colours=_finish(surface, where)[source],
@@ -284,7 +290,19 @@ def head() -> FaceModel:
     return author(parts, points, bound=bound, name="built-in head", notes=notes)
 
 
+def write_neutral(model: FaceModel) -> None:
+    """The feature points of the head as the neutral face of `fba.face`: left half and midline, mm."""
+    with (HERE / "points.csv").open(encoding="utf-8") as file:
+        notes = {row["point"]: row["note"] for row in csv.DictReader(file)}
+    lines = ["point,x,y,z,note"]
+    for name, note in notes.items():
+        x, y, z = np.round(model.points[row_of()[name]] * 1000, 2) + 0.0
+        lines.append(f"{name},{x:g},{y:g},{z:g},{note}")
+    NEUTRAL.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 if __name__ == "__main__":
     made = head()
     made.save(TARGET)
+    write_neutral(made)
     print(f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs")

@@ -84,7 +84,10 @@ def paint(lay: Chart) -> Image.Image:
     hair = scalp(p, 0.011)
     speckle = 0.5 + 0.5 * noise(p, 0.0009, 31)
     cover = smooth(hair * 1.25 - 0.55 * speckle * (1 - hair))
-    colour = colour * (1 - 0.72 * cover[:, None]) + SCALP * 0.72 * cover[:, None]
+    # Hairs end at the seam of the texture, at the back of the head: a darker ground hides it.
+    seam = np.exp(-((p[:, 0] / 0.003) ** 2)) * (p[:, 2] < -0.12)
+    colour = _towards(colour, HAIR, hair * seam * 0.25)
+    colour = colour * (1 - 0.72 * (cover * (1 - 0.3 * seam))[:, None]) + SCALP * 0.72 * (cover * (1 - 0.3 * seam))[:, None]
     along, density = brow(p)
     colour = colour * (1 - 0.30 * density[:, None]) + HAIR * 0.30 * density[:, None]
     image = np.zeros((*lay.known.shape, 3))
