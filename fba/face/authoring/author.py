@@ -13,11 +13,12 @@ from fba.face.authoring.binding import SURFACE_KINDS, Binding, bind_points, face
 from fba.face.authoring.carry import NEAR, Anchors
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.eyes import Eye, eye_transforms, eyes, pupil_motions
-from fba.face.authoring.jaw import Jaw, jaw, opening, share_of_part, turned
+from fba.face.authoring.jaw import CHIN, Jaw, jaw, opening, share_of_part, turned
 from fba.face.authoring.landmarks import Landmarks, landmarks
-from fba.face.authoring.lids import LIDS, lash_motion, lid_motion
-from fba.face.authoring.lips import lip_motions
-from fba.face.authoring.motion import Motion, by_part, limits, tables
+from fba.face.authoring.lids import LEAST_AREA, LIDS, lash_motion, lid_motion
+from fba.face.authoring.lips import HANDLES, lip_motions
+from fba.face.authoring.motion import Motion, by_part, tables
+from fba.face.authoring.relax import relaxed
 from fba.face.authoring.saturation import guarded, linear
 from fba.face.authoring.spots import spot_motions
 from fba.face.authoring.surface import Surface
@@ -41,6 +42,8 @@ EYE_FAPS = {"left": (23, 25, 27), "right": (24, 26, 28)}
 PUPIL_FAPS = {"left": 29, "right": 30}
 HEAD_AXES = {48: (1.0, 0.0, 0.0), 49: (0.0, 1.0, 0.0), 50: (0.0, 0.0, 1.0)}
 JAW_FAPS = (OPEN_JAW, THRUST_JAW, SHIFT_JAW)
+LIP_CONTOURS = ("upper inner lip", "lower inner lip", "upper outer lip", "lower outer lip")
+LIP_POINTS = tuple(name for pair in HANDLES.values() for name in pair)
 CARRIED_KINDS = ("brow", "lash", "other")
 
 
@@ -194,24 +197,35 @@ class _Authoring:
         }
         points = self.marks.surface.vertices
         moving = np.flatnonzero(found.share)
-        shifts = turned(points[moving], found.hinge, angles) * found.share[moving][:, None]
-        motion = guarded(self.limiter, Motion(values, moving, shifts))
+        shifts = turned(points[moving], found, angles) * found.share[moving][:, None]
+        whole = Motion(values, moving, shifts)
+        motion = relaxed(self.marks.surface, self.limiter, whole, self._pinned(), LEAST_AREA)
+        motion = guarded(self.limiter, motion, LEAST_AREA)
         self._surface(OPEN_JAW, motion)
         # what the skin stops at, teeth and tongue stop at too
         reached = angles_at(motion, values, angles)
         for part in self.parts:
             if part.name in shares:
-                inner = turned(part.vertices.astype(np.float64), found.hinge, reached)
+                inner = turned(part.vertices.astype(np.float64), found, reached)
                 inner *= shares[part.name][:, None]
                 self.moves[OPEN_JAW][part.name] = Motion(motion.values, np.arange(len(part.vertices)), inner)
         for fap in (THRUST_JAW, SHIFT_JAW):
             self._slide(fap, found, shares)
 
+    def _pinned(self) -> npt.NDArray[np.bool_]:
+        """What goes exactly where the jaw wants it."""
+        pinned = self.marks.on(*LIP_CONTOURS)
+        pinned[[self.marks.vertex[name] for name in CHIN if self.marks.has(name)]] = True
+        return pinned
+
     def _slide(self, fap: int, found: Jaw, shares: dict[str, Float64]) -> None:
         entry = faps()[fap - 1]
         step = np.array(DIRECTIONS[entry.positive]) * self.marks.fapu[entry.unit]
         moving = np.flatnonzero(found.sliding)
-        motion = linear(self.limiter, moving, found.sliding[moving][:, None] * step, *limits(fap))
+        pinned = np.zeros(len(self.marks.surface), dtype=bool)
+        pinned[[self.marks.vertex[name] for name in (*CHIN, *LIP_POINTS) if self.marks.has(name)]] = True
+        field = found.sliding[moving][:, None] * step
+        motion = linear(self.marks.surface, self.limiter, moving, field, fap, pinned)
         self._surface(fap, motion)
         chin = int(np.flatnonzero(motion.vertices == self.marks.vertex["2.1"])[0])
         ways = motion.shifts[:, chin]

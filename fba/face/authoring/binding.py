@@ -136,7 +136,7 @@ def kinds_of(name: str) -> tuple[str, ...]:
     """Kinds of parts that a feature point can stand on."""
     if name in KINDS_OF_POINT:
         return KINDS_OF_POINT[name]
-    return KINDS_OF_GROUP.get(int(name.split(".")[0]), SURFACE_KINDS)
+    return KINDS_OF_GROUP.get(int(name.split(".", maxsplit=1)[0]), SURFACE_KINDS)
 
 
 def _pool(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:

@@ -39,8 +39,10 @@ REACH = 1.5
 """How far the jaw pulls at cheeks and neck, in ES0."""
 CORNER = 0.6
 """How much of the jaw's turn the skin over its corners makes."""
-WIDEST = np.radians(32.0)
+WIDEST = np.radians(30.0)
 """Nobody opens further."""
+SLIDE = (0.35, 0.1)
+"""How far the hinge goes forwards and down for a turn of one radian, in ES0: some 11 mm when wide open."""
 INTERVAL = np.radians(3.0)
 """The arc is cut into intervals no longer than this."""
 LIP_RIDE = 0.5
@@ -48,7 +50,9 @@ LIP_RIDE = 0.5
 SLACK = 0.2
 HEM = 0.004
 TEETH_MARGIN = 0.12
-"""Behind the lips the jaw's share goes from 0 to 1 within this height about the teeth's edge, in MNS0."""
+"""In a piece of teeth the jaw's share goes from 0 to 1 within this height about their edge, in MNS0."""
+CHEEK_MARGIN = 0.4
+"""The inside of the mouth stretches over at least this height above and below the teeth's edge, in MNS0."""
 LIP_DEPTH = 0.16
 """From this far behind the lips on, in ES0, the inside of the mouth belongs to the jaws."""
 
@@ -57,12 +61,14 @@ LIP_DEPTH = 0.16
 class Jaw:
     """share: (N,) of the surface, 1 on the chin. sliding: the same for FAPs 14 and 15, with the lower lip.
     hinge: (y, z) of the axis. chin: (3,), the point that sinks by exactly value x MNS.
+    size: ES0 in metres.
     """
 
     share: Float64
     sliding: Float64
     hinge: Float64
     chin: Float64
+    size: float
 
 
 def jaw(marks: Landmarks) -> Jaw | str:
@@ -75,33 +81,37 @@ def jaw(marks: Landmarks) -> Jaw | str:
     if chin[2] - hinge[1] <= 0 or chin[1] >= hinge[0]:
         return "the chin (2.1) is not below and before the ears"
     share = _share(marks, hinge)
-    return Jaw(share, _with_lip(marks, share), hinge, chin)
+    return Jaw(share, _with_lip(marks, share), hinge, chin, marks.fapu.ES * 1024)
 
 
 def opening(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
     """(values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
     low, high = limits(OPEN_JAW)
-    arm = jaw.chin[1:] - jaw.hinge
-    radius, rest = float(np.hypot(*arm)), float(np.arctan2(arm[0], arm[1]))
-    # the chin cannot sink below the lowest point of its circle
-    angle = min(WIDEST, rest + np.pi / 2 - 0.05)
-    deepest = (arm[0] - radius * np.sin(rest - angle)) / unit
-    count = max(5, int(np.ceil(angle / INTERVAL)))
-    values = np.unique(np.round(np.linspace(0, min(deepest, high), count + 1)))
-    angles = rest - np.arcsin(np.clip((arm[0] - values * unit) / radius, -1, 1))
-    values, angles = np.append(values, [high]), np.append(angles, angles[-1])
-    if values[-2] == high:
-        values, angles = values[:-1], angles[:-1]
+    fine = np.linspace(0, WIDEST, 400)
+    sunk = -turned(jaw.chin[None], jaw, fine)[:, 0, 1]
+    fine = fine[: int(sunk.argmax()) + 1]
+    sunk = np.maximum.accumulate(sunk[: len(fine)])
+    deepest = min(float(sunk[-1]) / unit, high)
+    count = max(5, int(np.ceil(fine[-1] / INTERVAL)))
+    values = np.unique(np.round(np.linspace(0, deepest, count + 1)))
+    angles = np.interp(values * unit, sunk, fine)
+    if values[-1] < high:
+        values, angles = np.append(values, high), np.append(angles, angles[-1])
     # a closed jaw does not close further
-    return np.append([low if low < 0 else -1.0], values), np.append([0.0], angles)
+    return np.append([min(low, -1.0)], values), np.append([0.0], angles)
 
 
-def turned(points: Float64, hinge: Float64, angles: Float64) -> Float64:
-    """(K, N, 3) shifts of points (N, 3) turned about the hinge, +z down, by each angle (K,)."""
-    y, z = points[:, 1] - hinge[0], points[:, 2] - hinge[1]
+def turned(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
+    """(K, N, 3) shifts of points (N, 3) when the jaw opens by each angle (K,).
+
+    It turns about the hinge, +z down, while the hinge itself slides forwards and a little down, as the
+    joint of a human jaw does.
+    """
+    y, z = points[:, 1] - jaw.hinge[0], points[:, 2] - jaw.hinge[1]
     cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
     zero = np.zeros((len(angles), len(points)))
-    return np.stack([zero, y * cos - z * sin - y, y * sin + z * cos - z], axis=-1)
+    forward, down = (step * jaw.size * angles[:, None] for step in SLIDE)
+    return np.stack([zero, y * cos - z * sin - y - down, y * sin + z * cos - z + forward], axis=-1)
 
 
 def bite(marks: Landmarks) -> float:
@@ -113,13 +123,13 @@ def bite(marks: Landmarks) -> float:
 
 
 def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
-    """(N,) 1 for what lies below the plane through the hinge and the teeth's edge, 0 above."""
+    """(N,) metres below the plane through the hinge and the teeth's edge."""
     front = marks.guess("9.10")
     reach = max(front[2] - hinge[1], 1e-6)
     ahead = np.clip((points[:, 2] - hinge[1]) / reach, 0.2, None)
     plane = hinge[0] + (bite(marks) - hinge[0]) * ahead
-    margin = TEETH_MARGIN * marks.fapu.MNS * 1024
-    return smooth_step((plane - points[:, 1]) / (2 * margin) + 0.5)
+    result: Float64 = plane - points[:, 1]
+    return result
 
 
 def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
@@ -132,7 +142,8 @@ def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
     if part.kind == "tongue":
         return np.ones(len(part.vertices))
     shape = Surface([part])
-    each = below_bite(marks, shape.vertices, hinge)
+    margin = TEETH_MARGIN * marks.fapu.MNS * 1024
+    each = smooth_step(below_bite(marks, shape.vertices, hinge) / (2 * margin) + 0.5)
     if part.kind == "teeth":
         count = np.bincount(shape.component)
         mean = np.bincount(shape.component, each) / count
@@ -162,9 +173,11 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
     given = np.concatenate([[values[int(v)] for v in source], np.zeros(int(lips.sum()))])
     if inside.any():
         depth = surface.distances(np.flatnonzero(lips | marks.on_inner_lips))
-        jaws = np.flatnonzero(inside & (depth > LIP_DEPTH * es))
+        below = below_bite(marks, surface.vertices, hinge)
+        clear = np.abs(below) > CHEEK_MARGIN * marks.fapu.MNS * 1024
+        jaws = np.flatnonzero(inside & (depth > LIP_DEPTH * es) & clear)
         fixed = np.concatenate([fixed, jaws])
-        given = np.concatenate([given, below_bite(marks, surface.vertices[jaws], hinge)])
+        given = np.concatenate([given, (below[jaws] > 0).astype(np.float64)])
         free |= inside
     order = np.unique(fixed, return_index=True)[1]
     field = spread(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
@@ -205,8 +218,8 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
 
 
 def _from_corners(marks: Landmarks, vertices: npt.NDArray[np.intp]) -> Float64:
-    """(M,) 0 at the corners of the mouth, 1 in its middle half."""
+    """(M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
     x = marks.surface.vertices[vertices, 0]
-    left, right = marks.guess("8.3")[0], marks.guess("8.4")[0]
+    left, right = marks.guess("2.4")[0], marks.guess("2.5")[0]
     across = (x - right) / (left - right)
-    return smooth_step(4 * np.minimum(across, 1 - across))
+    return smooth_step(3.5 * np.minimum(across, 1 - across) - 0.5)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -64,7 +65,7 @@ class Landmarks:
         if len(known) < 3 or not self.has(through[0], through[-1]):
             return np.zeros(0, dtype=np.intp)
         walk: list[int] = [known[0]]
-        for start, end in zip(known, known[1:], strict=False):
+        for start, end in pairwise(known):
             step = self.surface.path(start, end)
             if not len(step):
                 return np.zeros(0, dtype=np.intp)

@@ -16,7 +16,8 @@ from fba.face.authoring.contours import shares
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion, limits
-from fba.face.authoring.saturation import guarded, held_back, knots, linear, values_between
+from fba.face.authoring.relax import eased_field
+from fba.face.authoring.saturation import goals, guarded, held_back, knots, linear, values_between
 from fba.face.authoring.weights import region, smooth_step, spread, without_hem
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
@@ -46,6 +47,7 @@ ALONG = {
 PUSH = (16, 17)
 OUTER_PUSH = 0.9
 """How much of a push of the inner contour reaches the outer one, which has no such FAP."""
+LINES = ("upper inner lip", "lower inner lip", "upper outer lip", "lower outer lip")
 REACH = 0.75
 """How far the lips pull at the face, in ES0."""
 REACH_INSIDE = 0.3
@@ -80,14 +82,14 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
         whole = _direction(marks, number)[None] * _whole(lips, number)[:, None]
         if number in PUSH:
             share = lips.inward + OUTER_PUSH * (1 - lips.inward)
-            found[number] = _linear(limiter, whole * share[:, None], low, high)
+            found[number] = _linear(marks, limiter, whole * share[:, None], number)
         elif mate is None or mate in lost:
             share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
-            found[number] = _linear(limiter, whole * share[:, None], low, high)
+            found[number] = _linear(marks, limiter, whole * share[:, None], number)
         elif number < mate:
-            pair = _coupled(
-                limiter, whole * lips.inward[:, None], whole * (1 - lips.inward)[:, None], low, high
-            )
+            whole = eased_field(marks.surface, limiter, whole, goals(number), marks.on(*LINES))
+            inward = lips.inward[:, None]
+            pair = _coupled(limiter, whole * inward, whole * (1 - inward), low, high)
             found[number], found[mate] = pair
     return found, lost
 
@@ -162,9 +164,9 @@ def _inward(marks: Landmarks) -> Float64:
     return smooth_step(field[:, 0])
 
 
-def _linear(limiter: Limiter, field: Float64, low: float, high: float) -> Motion:
+def _linear(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:
     vertices = np.flatnonzero(np.abs(field).max(axis=1) > 0)
-    return linear(limiter, vertices, field[vertices], low, high)
+    return linear(marks.surface, limiter, vertices, field[vertices], fap, marks.on(*LINES))
 
 
 def _coupled(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.authoring.extremes import Limiter
+from fba.face.authoring.extremes import LEAST_AREA, Limiter
 from fba.face.authoring.motion import Motion
 from fba.face.authoring.surface import Surface
 
@@ -42,27 +44,68 @@ def relaxed(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, le
     return Motion(motion.values, vertices, whole[:, vertices])
 
 
+def eased_field(
+    surface: Surface, limiter: Limiter, field: Float64, goals: Sequence[float], pinned: Bool
+) -> Float64:
+    """A straight motion (N, 3) per step, eased so that some values can be reached without folds."""
+    result = field
+    for goal in goals:
+        moving = np.flatnonzero(result.any(axis=1))
+        motion = Motion(np.array([0.0, 1.0]), moving, np.stack([0 * result[moving], result[moving] * goal]))
+        again = relaxed(surface, limiter, motion, pinned, LEAST_AREA)
+        trial = np.zeros_like(field)
+        trial[again.vertices] = again.shifts[1] / goal
+        if _worst(limiter, trial, goals) > _worst(limiter, result, goals):
+            result = trial
+    return result
+
+
+def _worst(limiter: Limiter, field: Float64, goals: Sequence[float]) -> float:
+    """Smallest share of the goals that a straight motion reaches without folds."""
+    triangles = limiter.touched(np.flatnonzero(field.any(axis=1)))
+    reached = [float(limiter.reach(field * goal, triangles).min(initial=np.inf)) for goal in goals]
+    return min(*reached, 1.0)
+
+
 def _eased(
     surface: Surface, limiter: Limiter, shifts: Float64, bad: Int, pinned: Bool, least: float
 ) -> Float64:
     """Shifts (N, 3) after easing around some triangles as little as is enough, or as helps most."""
     best, fewest = shifts, len(bad)
-    region = np.zeros(len(surface), dtype=bool)
-    region[bad] = True
-    done = 0
+    core = np.zeros(len(surface), dtype=bool)
+    core[bad] = True
+    core &= ~pinned
+    as_one = _as_one(surface, shifts, bad, core)
+    region, done = core.copy(), 0
     for rings in RINGS:
         for _ in range(rings - done):
             region |= (surface.graph @ region.astype(np.float64)) > 0
         done = rings
-        free = region & ~pinned
-        trial = _harmonic(surface, shifts, free)
         touched = limiter.touched(np.flatnonzero(region))
-        left = int((~limiter.soundness(trial, touched, least)).sum())
-        if left < fewest:
-            best, fewest = trial, left
-        if not left:
+        for start, held in ((shifts, pinned), (as_one, pinned | core)):
+            trial = _harmonic(surface, start, region & ~held)
+            left = int((~limiter.soundness(trial, touched, least)).sum())
+            if left < fewest:
+                best, fewest = trial, left
+        if not fewest:
             break
     return best
+
+
+def _as_one(surface: Surface, shifts: Float64, bad: Int, core: Bool) -> Float64:
+    """Shifts where the vertices of folded triangles that hang together go together."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    ends = np.concatenate([bad[:, :2], bad[:, 1:]])
+    graph = csr_array((np.ones(len(ends)), tuple(ends.T)), shape=(len(surface),) * 2)
+    labels = connected_components(graph, directed=False)[1]
+    count = np.bincount(labels[core], minlength=labels.max() + 1)
+    result = shifts.copy()
+    for axis in range(3):
+        total = np.bincount(labels[core], shifts[core, axis], minlength=len(count))
+        result[core, axis] = (total / np.maximum(count, 1))[labels[core]]
+    return result
 
 
 def _harmonic(surface: Surface, shifts: Float64, free: Bool) -> Float64:

@@ -6,13 +6,18 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.face.authoring.extremes import LEAST_AREA, Limiter
-from fba.face.authoring.motion import Motion
+from fba.face.authoring.motion import Motion, limits
+from fba.face.authoring.relax import eased_field
+from fba.face.authoring.surface import Surface
 
 Float64 = npt.NDArray[np.float64]
 Int = npt.NDArray[np.intp]
+Bool = npt.NDArray[np.bool_]
 
 EASE = (0.75, 1.25)
 """A motion slows down to half at this share of what the mesh can take, and stops at that one."""
+MODERATE = 320.0
+"""A FAP goes straight at least up to this value (or its limit), where easing the skin around allows."""
 HALVINGS = 7
 FULL = 0.98
 """Values are left alone where the mesh can take this share of them."""
@@ -37,8 +42,28 @@ def values_between(low: float, high: float, *bends: float) -> Float64:
     return np.array(sorted({round(low), round(high)} | inner), dtype=np.float64)
 
 
-def linear(limiter: Limiter, vertices: Int, field: Float64, low: float, high: float) -> Motion:
-    """A straight motion by value x field (N, 3) metres, held back where triangles would fold."""
+def linear(
+    surface: Surface, limiter: Limiter, vertices: Int, field: Float64, fap: int, pinned: Bool
+) -> Motion:
+    """A straight motion of a FAP by value x field (N, 3) metres, held back where triangles would fold.
+
+    pinned: (N,) vertices that go exactly so; around others what folds too early is eased.
+    """
+    low, high = limits(fap)
+    whole = np.zeros((len(limiter), 3))
+    whole[vertices] = field
+    whole = eased_field(surface, limiter, whole, goals(fap), pinned)
+    vertices = np.flatnonzero(whole.any(axis=1))
+    return straight(limiter, vertices, whole[vertices], low, high)
+
+
+def goals(fap: int) -> list[float]:
+    """Values that a FAP should be able to reach."""
+    return [float(np.sign(end)) * min(MODERATE / EASE[0], abs(end)) for end in limits(fap) if abs(end) > 1]
+
+
+def straight(limiter: Limiter, vertices: Int, field: Float64, low: float, high: float) -> Motion:
+    """The same without easing."""
     whole = np.zeros((len(limiter), 3))
     whole[vertices] = field
     triangles = limiter.touched(vertices)
@@ -64,7 +89,9 @@ def guarded(limiter: Limiter, motion: Motion, least: float = LEAST_AREA) -> Moti
     return Motion(np.array([v for v, _ in steps]), motion.vertices, np.array([s for _, s in steps]))
 
 
-def _stopped(limiter: Limiter, motion: Motion, side: range, triangles: Int, least: float) -> list[tuple[float, Float64]]:
+def _stopped(
+    limiter: Limiter, motion: Motion, side: range, triangles: Int, least: float
+) -> list[tuple[float, Float64]]:
     """(value, shifts) going out from 0, up to where a triangle folds, and from there at rest."""
     steps: list[tuple[float, Float64]] = []
     value, shifts = 0.0, np.zeros_like(motion.shifts[0])

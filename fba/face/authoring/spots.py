@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.landmarks import Landmarks
-from fba.face.authoring.motion import Motion, limits
+from fba.face.authoring.motion import Motion
 from fba.face.authoring.saturation import linear
 from fba.face.authoring.weights import region, spread, without_hem
 from fba.face.feature_points import MIRRORED
@@ -24,6 +24,7 @@ from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
 Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
 
 SLACK = 0.2
 """Distance in ES0 beyond which the skin does not spring back."""
@@ -99,13 +100,13 @@ def spot_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion],
             else:
                 lost[handle.fap] = f"feature point {point} is not on the skin"
         if own:
-            fields = _fields(marks, area, own)
+            fields, fixed = _fields(marks, area, own)
             for k, handle in enumerate(own):
-                found[handle.fap] = _motion(marks, limiter, handle, fields[:, k])
+                found[handle.fap] = _motion(marks, limiter, handle, fields[:, k], fixed)
     return found, lost
 
 
-def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> Float64:
+def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64, Bool]:
     surface, es = marks.surface, marks.fapu.ES * 1024
     points = [name for name in area.points if marks.has(name)]
     held = np.unique(np.concatenate([np.zeros(0, np.intp), *(marks.contour(name) for name in area.contours)]))
@@ -120,17 +121,19 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> Float64:
     given = np.array([[handle.values.get(points[k], 0.0) for handle in own] for k in first])
     fixed = np.concatenate([pulled, stays])
     values = np.concatenate([given, np.zeros((len(stays), len(own)))])
-    return without_hem(spread(surface, free, fixed, values, slack=SLACK * es), HEM)
+    pinned = np.zeros(len(surface), dtype=bool)
+    pinned[fixed] = True
+    return without_hem(spread(surface, free, fixed, values, slack=SLACK * es), HEM), pinned
 
 
-def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64) -> Motion:
+def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:
     fap = faps()[handle.fap - 1]
-    low, high = limits(handle.fap)
     vertices = np.flatnonzero(field)
     weight = field[vertices][:, None]
     direction = np.array(DIRECTIONS[fap.positive])
     swell = handle.bulge * np.clip(weight * (1 - weight), 0, None) * marks.surface.normals[vertices]
-    return linear(limiter, vertices, (weight * direction + swell) * marks.fapu[fap.unit], low, high)
+    field = (weight * direction + swell) * marks.fapu[fap.unit]
+    return linear(marks.surface, limiter, vertices, field, handle.fap, pinned)
 
 
 def _rows(name: str) -> list[dict[str, str]]:

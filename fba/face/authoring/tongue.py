@@ -8,7 +8,7 @@ import numpy.typing as npt
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion, limits
-from fba.face.authoring.saturation import guarded, linear
+from fba.face.authoring.saturation import guarded, straight
 from fba.face.authoring.weights import smooth_step
 from fba.face.model import Part
 from fba.face.points import DIRECTIONS, TONGUE_ROLL
@@ -51,7 +51,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
     entry = faps()[fap - 1]
     direction = np.array(DIRECTIONS[entry.positive]) * marks.fapu[entry.unit]
     low, high = limits(fap)
-    return linear(limiter, np.arange(len(points)), share[:, None] * direction, low, high)
+    return straight(limiter, np.arange(len(points)), share[:, None] * direction, low, high)
 
 
 def _roll(marks: Landmarks, points: Float64) -> Motion:
