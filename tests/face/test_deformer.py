@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from fba.face import FeaturePointFace, feature_point_names, neutral_points
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel, Part
+from fba.face.normals import vertex_normals
 from fba.face.points import shift_table
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
@@ -131,7 +134,7 @@ def models(draw: st.DrawFn) -> FaceModel:
     return face(*parts, tables=tuple(tables))
 
 
-def pose(model: FaceModel, name: str, vector: np.ndarray) -> np.ndarray:
+def pose(model: FaceModel, name: str, vector: np.ndarray, size: Callable[[int], float] = unit) -> np.ndarray:
     """(4, 4): translations . rotations . scales, a lower FAP further out, but 48 within 49 and 50."""
     whole = np.eye(4)
     for kind in ("translation", "rotation", "scale"):
@@ -139,7 +142,7 @@ def pose(model: FaceModel, name: str, vector: np.ndarray) -> np.ndarray:
             for transform in model.table_of[fap].transforms if fap in model.table_of else ():
                 if (transform.part, transform.kind) != (name, kind):
                     continue
-                amount = np.array(transform.amount) * vector[fap - 1] * unit(fap)
+                amount = np.array(transform.amount) * vector[fap - 1] * size(fap)
                 one, away = np.eye(4), np.eye(4)
                 if kind == "translation":
                     one[:3, 3] = amount
@@ -152,15 +155,15 @@ def pose(model: FaceModel, name: str, vector: np.ndarray) -> np.ndarray:
     return whole
 
 
-def plainly(model: FaceModel, vector: np.ndarray) -> np.ndarray:
+def plainly(model: FaceModel, vector: np.ndarray, size: Callable[[int], float] = unit) -> np.ndarray:
     parts = []
     for part in model.parts:
         moved = part.vertices.astype(np.float64)
         for table in model.tables:
             for mesh in table.meshes:
                 if mesh.part == part.name:
-                    moved[mesh.vertices] += mesh.shift(float(vector[table.fap - 1])) * unit(table.fap)
-        whole = pose(model, HEAD, vector) @ pose(model, part.name, vector)
+                    moved[mesh.vertices] += mesh.shift(float(vector[table.fap - 1])) * size(table.fap)
+        whole = pose(model, HEAD, vector, size) @ pose(model, part.name, vector, size)
         parts.append(moved @ whole[:3, :3].T + whole[:3, 3])
     return np.concatenate(parts)
 
@@ -184,6 +187,39 @@ def test_equals_a_plain_evaluation(model: FaceModel, seed: int, flat: bool) -> N
             np.testing.assert_allclose(ours, pose(model, part.name, vector), atol=1e-9)
     for vector, ours in zip(frames, matrices, strict=True):
         np.testing.assert_allclose(ours, pose(model, HEAD, vector), atol=1e-9)
+
+
+def test_the_built_in_head_equals_a_plain_evaluation() -> None:
+    model = FaceModel.default()
+    deformer = Deformer(model)
+    limits = np.array([np.array(fap.i_limits) * (fap.step if fap.unit == "AU" else 1) for fap in faps()[2:]])
+    frames = np.zeros((3, 68))
+    frames[:, 2:] = np.random.default_rng(8).uniform(*limits.T, (3, 66)) * ((1,), (0.3,), (0.02,))
+    moved, normals = deformer(frames), np.empty((3, len(model.vertices), 3), np.float32)
+    np.testing.assert_array_equal(deformer(frames, normals=normals), moved)
+    for vector, vertices, upright in zip(frames, moved, normals, strict=True):
+        expected = plainly(model, vector, lambda fap: model.fapu[faps()[fap - 1].unit])
+        np.testing.assert_allclose(vertices, expected, atol=1e-6)
+        _, place, times = np.unique(model.vertices, axis=0, return_inverse=True, return_counts=True)
+        alone = (times[place.ravel()] == 1) & (sizes(model, expected) > 1e-8)
+        assert np.mean(alone) > 0.7
+        np.testing.assert_allclose(
+            upright[alone], vertex_normals(expected, model.triangles)[alone], atol=2e-3
+        )
+    bound = model.bound >= 0
+    np.testing.assert_allclose(
+        deformer.feature_points(frames)[:, bound], moved[:, model.bound[bound]], atol=2e-6
+    )
+
+
+def sizes(model: FaceModel, vertices: np.ndarray) -> np.ndarray:
+    """(V,) length of the sum of the triangles at each vertex, as vectors of twice their area."""
+    corners = vertices[model.triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    summed = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(summed, model.triangles[:, corner], across)
+    return np.linalg.norm(summed, axis=1)
 
 
 # Turns, as the feature points do them
