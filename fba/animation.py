@@ -279,4 +279,6 @@ def _resampled_face(
         held[:, amounts] = blended[:, amounts]
         held[:, flags] = np.where(fresh[:, None], held[:, flags], 0)
         fields.append(held)
-    return FaceTrack(_between(face.values, before, after, weight, both), mask, *fields)
+    interpolated = face.interpolated[before] if face.interpolated is not None else None
+    values = _between(face.values, before, after, weight, both)
+    return FaceTrack(values, mask, fields[0], fields[1], interpolated)

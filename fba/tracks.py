@@ -32,15 +32,20 @@ class FaceTrack:
     viseme: int16 (T, 4): viseme_select1, viseme_select2, viseme_blend, viseme_def.
     expression: int16 (T, 6): expression_select1, expression_intensity1, expression_select2,
         expression_intensity2, init_face, expression_def.
+    interpolated: bool (T, 68), True where the parameter is not sent and the sender asks to have it
+        estimated instead of kept (mask type 2), or None where that is asked for nowhere. A frame that
+        sends nothing and asks for nothing leaves this as it was.
 
     Arrays are copied if they must be changed, and read-only afterwards. Raises ValueError on a wrong
-    shape, a non-integer dtype, or a select or flag outside its range.
+    shape, a non-integer dtype, or a select or flag outside its range. Tracks are equal where they send
+    the same, whatever they ask to have interpolated: a text file of FAPs does not tell that.
     """
 
     values: Int32
     mask: Bool
     viseme: Int16 = None  # type: ignore[assignment]
     expression: Int16 = None  # type: ignore[assignment]
+    interpolated: Bool | None = None
 
     def __post_init__(self) -> None:
         values, mask = _checked_values(self.values, self.mask, FAP_COUNT, "FaceTrack")
@@ -65,7 +70,10 @@ class FaceTrack:
                     raise ValueError(
                         f"FaceTrack: {name} must lie in 0..{limit}, found {low if low < 0 else high}"
                     )
-        freeze(self, values=values, mask=mask, viseme=viseme, expression=expression)
+        interpolated = _checked_interpolated(self.interpolated, mask)
+        freeze(
+            self, values=values, mask=mask, viseme=viseme, expression=expression, interpolated=interpolated
+        )
 
     @classmethod
     def empty(cls, count: int) -> FaceTrack:
@@ -84,6 +92,11 @@ class FaceTrack:
             _stacked([t.mask for t in tracks]),
             _stacked([t.viseme for t in tracks]),
             _stacked([t.expression for t in tracks]),
+            _stacked(
+                [t.interpolated if t.interpolated is not None else np.zeros_like(t.mask) for t in tracks]
+            )
+            if any(t.interpolated is not None for t in tracks)
+            else None,
         )
 
     def __len__(self) -> int:
@@ -91,7 +104,12 @@ class FaceTrack:
 
     def __getitem__(self, frames: slice) -> FaceTrack:
         names = ("values", "mask", "viseme", "expression")
-        return trusted(FaceTrack, **{name: getattr(self, name)[frames] for name in names})
+        taken = {name: getattr(self, name)[frames] for name in names}
+        return trusted(
+            FaceTrack,
+            **taken,
+            interpolated=self.interpolated[frames] if self.interpolated is not None else None,
+        )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FaceTrack):
@@ -154,7 +172,7 @@ class BodyTrack:
 Track = TypeVar("Track", FaceTrack, BodyTrack)
 
 
-def trusted(kind: type[Track], **arrays: npt.NDArray[Any]) -> Track:
+def trusted(kind: type[Track], **arrays: npt.NDArray[Any] | None) -> Track:
     """A track of arrays that are known to be right, such as parts of another's, without any check."""
     track: Track = object.__new__(kind)
     freeze(track, **arrays)
@@ -175,6 +193,21 @@ def _checked_values(values: object, mask: object, columns: int, what: str) -> tu
     if array.any(where=~sent):
         array = np.where(sent, array, np.int32(0))
     return array, sent
+
+
+def _checked_interpolated(interpolated: object, mask: Bool) -> Bool | None:
+    if interpolated is None:
+        return None
+    asked = np.asarray(interpolated)
+    if asked.dtype != np.bool_:
+        raise ValueError(f"FaceTrack: interpolated must be bool, not {asked.dtype}")
+    if asked.shape != mask.shape:
+        raise ValueError(f"FaceTrack: interpolated has shape {asked.shape}, mask {mask.shape}")
+    if (asked & mask).any():
+        asked = asked & ~mask
+    elif asked.flags.writeable:
+        asked = asked.copy()
+    return asked if asked.any() else None
 
 
 def _checked_fields(fields: object, count: int, names: tuple[str, ...], what: str, sent: Bool) -> Int16:

@@ -44,11 +44,12 @@ class _Masks:
     """Masks of frames, as runs of the same: most streams have one."""
 
     def __init__(self, columns: int, count: int) -> None:
+        self._columns = columns
         self._rows = [np.zeros(columns, dtype=bool)] if count else []
         self._counts = [count] if count else []
 
     def append(self, mask: npt.NDArray[np.bool_] | None, count: int) -> None:
-        row = mask if mask is not None else np.zeros_like(self._rows[-1])
+        row = mask if mask is not None else np.zeros(self._columns, dtype=bool)
         if self._rows and np.array_equal(row, self._rows[-1]):
             self._counts[-1] += count
         else:
@@ -81,6 +82,7 @@ class Assembly:
                 "mask": _Masks(FAP_COUNT, self.frames),
                 "viseme": _Rows(len(VISEME_FIELDS), np.int16, self.frames),
                 "expression": _Rows(len(EXPRESSION_FIELDS), np.int16, self.frames),
+                "interpolated": _Masks(FAP_COUNT, self.frames),
             }
         if block.body is not None and not self._body:
             self._body = {
@@ -90,7 +92,9 @@ class Assembly:
         for fields, track in ((self._face, block.face), (self._body, block.body)):
             for name, field in fields.items():
                 rows = getattr(track, name) if track is not None else None
-                field.append(rows[0] if rows is not None and name == "mask" else rows, count)
+                if rows is not None and name in ("mask", "interpolated"):
+                    rows = rows[0]  # a block has one for all of its frames
+                field.append(rows, count)
         self.frames += count
 
     def animation(self) -> Animation:
@@ -99,6 +103,8 @@ class Assembly:
             raise ValueError("there is no plane to make an animation of")
         rate, index = _joined_times(self._times)
         face = {name: field.finished() for name, field in self._face.items()}
+        if face and not face["interpolated"].any():
+            face["interpolated"] = None
         body = {name: field.finished() for name, field in self._body.items()}
         return Animation(
             rate,

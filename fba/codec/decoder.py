@@ -277,7 +277,9 @@ class Decoder:
             index=clock.advance(planes.skips),
             start=start,
             rate=clock.rate,
-            face=slots.face_track(planes.rows, face.mask) if face is not None else None,
+            face=slots.face_track(planes.rows, face.mask, syntax.interpolated(face))
+            if face is not None
+            else None,
             body=slots.body_track(planes.rows, body.mask) if body is not None else None,
             number=self.planes,
             borders=borders,

@@ -148,18 +148,26 @@ class Encoder:
     ) -> None:
         """Encode frames start..stop, which all send the same."""
         masks = _masks(frames, start)
-        present = [part for part, mask in masks.items() if mask.any()] or [min(masks)]
+        interpolated = _interpolated(frames, start)
+        types = {
+            part: planner.mask_types(
+                part, mask, interpolated if part == slots.FACE_BIT else None, self.options.unsent
+            )
+            for part, mask in masks.items()
+        }
+        present = [part for part in masks if any(types[part])] or [min(masks)]
         same = all(
             part in self._joined
             and (force := self._writer.mask_in_force(part)) is not None
             and np.array_equal(force, masks[part])
+            and self._writer.types_in_force(part) == types[part]
             for part in present
         )
         position = start
         if not same:
             # The first plane carries every track there is, even where it sends nothing yet.
             carried = present if self.statistics.planes else list(masks)
-            self._intra(frames, position, carried, masks, rows, int(skips[position]))
+            self._intra(frames, position, carried, masks, types, rows, int(skips[position]))
             position += 1
         while position < stop:
             due = self._intra_due(frames, position, stop)
@@ -186,7 +194,7 @@ class Encoder:
                 wanted = np.array([[0], [0], [error.level], [-error.level]])
                 if ranges.widen(np.array([error.slot]), wanted):
                     self._stale[part] = True
-            self._intra(frames, position, present, masks, rows, int(skips[position]))
+            self._intra(frames, position, present, masks, types, rows, int(skips[position]))
             position += 1
 
     def _intra_due(self, frames: Animation, start: int, stop: int) -> int:
@@ -202,6 +210,7 @@ class Encoder:
         position: int,
         present: list[int],
         masks: dict[int, slots.Bool],
+        types: dict[int, tuple[int, ...]],
         rows: slots.Int32,
         skip: int,
     ) -> None:
@@ -210,7 +219,9 @@ class Encoder:
             self._writer.begin_object()
         index = int(frames.index[position])
         row = rows[position]
-        settings = {part: self._part_settings(part, masks[part], row, position) for part in present}
+        settings = {
+            part: self._part_settings(part, masks[part], types[part], row, position) for part in present
+        }
         plane = PlaneSettings(
             intra=True,
             face=settings.get(slots.FACE_BIT),
@@ -239,7 +250,9 @@ class Encoder:
             bool(self._ranges[part].fits(self._levels(part, masks[part], row)[1]).all()) for part in present
         )
 
-    def _part_settings(self, part: int, mask: slots.Bool, row: slots.Int32, position: int) -> PartSettings:
+    def _part_settings(
+        self, part: int, mask: slots.Bool, types: tuple[int, ...], row: slots.Int32, position: int
+    ) -> PartSettings:
         """Settings for an I plane, with ranges that hold its values. Raises RangeError where none do."""
         options = self.options
         if part not in self._ranges:
@@ -262,7 +275,7 @@ class Encoder:
         send = self._stale[part] or new_mask or options.start_codes
         self._stale[part] = False
         return PartSettings(
-            planner.mask_types(part, mask, options.unsent),
+            types,
             mask,
             options.quant(part),
             options.gender,
@@ -297,12 +310,20 @@ def _masks(frames: Animation, position: int) -> dict[int, slots.Bool]:
     return {part: track.mask[position] for part, track in tracks if track is not None}
 
 
+def _interpolated(frames: Animation, position: int) -> slots.Bool | None:
+    """What a frame asks to have interpolated: bool (68,), or None."""
+    asked = frames.face.interpolated if frames.face is not None else None
+    return asked[position] if asked is not None else None
+
+
 def _runs(frames: Animation, count: int) -> list[tuple[int, int]]:
-    """Stretches of the first `count` frames that send the same."""
+    """Stretches of the first `count` frames that send the same, and ask for the same."""
     changes = np.zeros(count, dtype=bool)
-    for track in (frames.face, frames.body):
-        if track is not None:
-            changes[1:] |= (track.mask[1:count] != track.mask[: count - 1]).any(axis=1)
+    masks = [track.mask for track in (frames.face, frames.body) if track is not None]
+    if frames.face is not None and frames.face.interpolated is not None:
+        masks.append(frames.face.interpolated)
+    for mask in masks:
+        changes[1:] |= (mask[1:count] != mask[: count - 1]).any(axis=1)
     borders = [0, *np.flatnonzero(changes).tolist(), count]
     return list(pairwise(borders))
 

@@ -62,6 +62,11 @@ class PlaneWriter:
         settings = self._settings.get(part)
         return settings.mask if settings is not None else None
 
+    def types_in_force(self, part: int) -> tuple[int, ...] | None:
+        """The mask types of the last I plane with this part."""
+        settings = self._settings.get(part)
+        return settings.mask_types if settings is not None else None
+
     def nearest(self, slot: int, level: int) -> int:
         """The value that a P plane can come to which wants a difference of this level in a slot."""
         models = self.models

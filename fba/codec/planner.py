@@ -6,6 +6,7 @@ import math
 import warnings
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -43,8 +44,9 @@ class EncoderOptions:
         that a reader can join there or go on after damage.
     bap_steps: "iso" or "visage", the table of BAP steps; the reader must be told the same.
     preset: "reference", ranges that fit the data.
-    unsent: what a FAP that is not sent means to the reader: "keep" its last value (mask type 1) or
-        "interpolate" it from others (mask type 2).
+    unsent: what a FAP that is not sent means to the reader where the animation does not say so
+        (`FaceTrack.interpolated`): "keep" its last value (mask type 1) or "interpolate" it from others
+        (mask type 2).
     gender: suggested_gender, 1 male.
     clamp: bring values that no range can carry as near as it can, instead of a RangeError: I planes
         stop at the end of the widest range, and P planes after them catch up.
@@ -142,13 +144,31 @@ class Ranges:
         return codes
 
 
-def mask_types(part: int, mask: slots.Bool, unsent: str) -> tuple[int, ...]:
-    """Mask type of every group: none, all, or masked as `unsent` says (BAPs are always kept)."""
+def mask_types(part: int, mask: slots.Bool, interpolated: slots.Bool | None, unsent: str) -> tuple[int, ...]:
+    """Mask type of every group: none, all, or masked (BAPs are always kept).
+
+    interpolated: bool (68,), what the animation asks to have interpolated, or None. A group of which
+    all that is unsent shall be interpolated says so; one type holds for the whole group. Where the
+    animation asks for none of a group, `unsent` decides.
+    """
+    return _mask_types(
+        part, mask.tobytes(), interpolated.tobytes() if interpolated is not None else b"", unsent
+    )
+
+
+@lru_cache(maxsize=64)
+def _mask_types(part: int, mask: bytes, interpolated: bytes, unsent: str) -> tuple[int, ...]:
+    """Of bytes, to be kept: asked for with every frame that an encoder takes."""
     some = syntax.MASK_INTERPOLATE if unsent == "interpolate" and part == slots.FACE_BIT else syntax.MASK_KEEP
     types = []
     for group in syntax.groups(part):
-        sent = mask[np.array(group) - 1]
-        types.append(syntax.MASK_ALL if sent.all() else some if sent.any() else syntax.MASK_NONE)
+        sent = [mask[number - 1] for number in group]
+        if all(sent):
+            types.append(syntax.MASK_ALL)
+        elif interpolated and all(mask[number - 1] or interpolated[number - 1] for number in group):
+            types.append(syntax.MASK_INTERPOLATE)
+        else:
+            types.append(some if any(sent) else syntax.MASK_NONE)
     return tuple(types)
 
 

@@ -104,8 +104,9 @@ def body_rows(track: BodyTrack, rows: Int32) -> None:
     rows[:, BAPS] = track.values
 
 
-def face_track(rows: Int32, mask: Bool) -> FaceTrack:
-    """The face track that rows (T, columns) and one mask (68,) for all of them hold."""
+def face_track(rows: Int32, mask: Bool, interpolated: Bool | None) -> FaceTrack:
+    """The face track that rows (T, columns) and one mask (68,) for all of them hold; the same for what
+    is to be interpolated."""
     count = len(rows)
     values = np.zeros((count, FAP_COUNT), dtype=np.int32)
     values[:, 2:] = rows[:, FAPS]
@@ -117,7 +118,9 @@ def face_track(rows: Int32, mask: Bool) -> FaceTrack:
     expression[:, 4:] = rows[:, INIT_FACE : FLAGS.stop]
     for array in (values, viseme, expression):
         array.flags.writeable = False
-    return FaceTrack(values, np.broadcast_to(mask, (count, FAP_COUNT)), viseme, expression)
+    shape = (count, FAP_COUNT)
+    asked = np.broadcast_to(interpolated, shape) if interpolated is not None else None
+    return FaceTrack(values, np.broadcast_to(mask, shape), viseme, expression, asked)
 
 
 def body_track(rows: Int32, mask: Bool) -> BodyTrack:

@@ -42,6 +42,18 @@ RANGE_BITS = 5
 _MARKER_EVERY = 4
 
 
+def interpolated(settings: PartSettings) -> slots.Bool | None:
+    """bool (68,): the FAPs that are not sent and that mask type 2 asks to interpolate; None where none."""
+    if MASK_INTERPOLATE not in settings.mask_types:
+        return None
+    asked = np.zeros_like(settings.mask)
+    for kind, group in zip(settings.mask_types, groups(slots.FACE_BIT), strict=True):
+        if kind == MASK_INTERPOLATE:
+            columns = np.array(group) - 1
+            asked[columns] = ~settings.mask[columns]
+    return asked
+
+
 def groups(part: int) -> tuple[tuple[int, ...], ...]:
     """Parameter numbers by group, in coding order, of the FAPs or the BAPs."""
     return fap_groups() if part == slots.FACE_BIT else bap_groups()

@@ -7,7 +7,7 @@ and expression in force.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -40,11 +40,14 @@ class Resolver:
         self._held = _Held()
         self._visemes = definitions.visemes.copy()
         self._expressions = definitions.expressions.copy()
+        # Which FAPs visemes, and which expressions, have a say in once any was sent.
+        self._moved = definitions.visemes.any(axis=0), definitions.expressions.any(axis=0)
 
     def copy(self) -> Resolver:
         """An independent resolver in the same state."""
         other = Resolver.__new__(Resolver)
         other._fit = self._fit
+        other._moved = self._moved
         other._held = self._held.copy()
         other._visemes = self._visemes.copy()
         other._expressions = self._expressions.copy()
@@ -58,17 +61,27 @@ class Resolver:
         return result
 
     def _push_block(self, track: FaceTrack) -> Float32:
-        low, sent = self._held.low_level(track)
+        low, ever, asked = self._held.low_level(track)
+        sent = ever
+        filled: npt.NDArray[Any] = low
+        if asked is not None:
+            sent = ever & ~asked
+            filled = np.where(sent, low, np.int32(0))
         viseme, expression = self._held.high_level(track)
         alone = expression[:, 4:5] == 0  # else init_face: the expression is the new neutral face
-        filled: npt.NDArray[Any] = low
         if self._fit is not None:
-            filled, sent, from_high_level = evaluate(self._fit, low, sent, viseme, expression)
+            filled, sent, from_high_level = evaluate(self._fit, filled, sent, viseme, expression)
             # What the table makes of the expression is not put on top of the expression again.
             alone = alone | fill(from_high_level, sent)[0].astype(bool)
         filled, known = fill(filled, sent)
         shown: Float32 = filled.astype(np.float32)
         base = self._visemes_shown(track, viseme) + self._expressions_shown(track, expression)
+        if asked is not None:
+            # What nothing else tells anything about stays as it was sent.
+            moved = (base != 0) | (ever[:, :1] & self._moved[0]) | (ever[:, 1:2] & self._moved[1])
+            last = ever & ~known & ~moved
+            np.copyto(shown, low, where=last, casting="same_kind")
+            known |= last
         shown += np.where(known & alone, np.float32(0), base)
         shown[:, :2] = 0
         return shown
@@ -98,13 +111,15 @@ class Resolver:
 def resolve(track: FaceTrack, model: Any = None) -> Float32:
     """What the face shows at every frame: float32 (T, 68) in FAPU, columns 0 and 1 zero.
 
-    - A FAP keeps its last value after it was sent. One never sent follows from others by the model's
-      interpolation table (`FaceModel.fit`), where a link leads to it whose sources are there; else it
-      copies its left/right mate, an outer lip FAP its inner one and the other way round.
+    - A FAP keeps its last value after it was sent. One never sent, or that the sender asks to have
+      interpolated (`FaceTrack.interpolated`), follows from others by the model's interpolation table
+      (`FaceModel.fit`), where a link leads to it whose sources are there; else it copies its left/right
+      mate, an outer lip FAP its inner one and the other way round.
     - viseme = definition(select1) x blend/63 + definition(select2) x (1 - blend/63);
       expression = definition(select1) x intensity1/63 + definition(select2) x intensity2/63, one
       expression in both places never above its full intensity. Their sum shows where nothing was sent;
-      with init_face it becomes the neutral face, to which the sent FAPs are added.
+      with init_face it becomes the neutral face, to which the sent FAPs are added. A FAP that is asked
+      to be interpolated though none of all this moves it keeps its last value.
     - viseme_def and expression_def make the low-level FAPs sent in the same frame (of a viseme: the
       mouth's) the definition of select1 from that frame on; without such FAPs nothing changes.
 
@@ -122,16 +137,33 @@ class _Held:
     sent: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
     viseme: npt.NDArray[np.int16] = field(default_factory=lambda: np.zeros(4, dtype=np.int16))
     expression: npt.NDArray[np.int16] = field(default_factory=lambda: np.zeros(6, dtype=np.int16))
+    asked: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
 
     def copy(self) -> _Held:
-        return _Held(self.values.copy(), self.sent.copy(), self.viseme.copy(), self.expression.copy())
+        return _Held(*(getattr(self, one.name).copy() for one in fields(self)))
 
-    def low_level(self, track: FaceTrack) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]:
-        """Values in force, (T, 68), and which of all 68 FAPs were ever sent."""
-        values = track.values if track.mask[:, 2:].all() else hold(track.values, track.mask, self.values)
-        sent = np.asarray(np.logical_or.accumulate(track.mask, axis=0)) | self.sent
+    def low_level(
+        self, track: FaceTrack
+    ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_], npt.NDArray[np.bool_] | None]:
+        """Each (T, 68): values last sent, which of all FAPs were ever sent, and which low-level ones
+        are to be interpolated, None where none are."""
+        if track.mask[:, 2:].all():
+            values, sent = track.values, np.ones_like(track.mask)
+            sent[:, :2] = np.logical_or.accumulate(track.mask[:, :2], axis=0) | self.sent[:2]
+        else:
+            values = hold(track.values, track.mask, self.values)
+            sent = np.asarray(np.logical_or.accumulate(track.mask, axis=0)) | self.sent
         self.values, self.sent = values[-1].copy(), sent[-1].copy()
-        return values, sent
+        return values, sent, self._asked(track)
+
+    def _asked(self, track: FaceTrack) -> npt.NDArray[np.bool_] | None:
+        if track.interpolated is None and not self.asked.any():
+            return None
+        own = track.interpolated if track.interpolated is not None else np.zeros_like(track.mask)
+        says = np.asarray((track.mask | own).any(axis=1))
+        asked = own if says.all() else hold(own, says[:, None], self.asked)
+        self.asked = asked[-1].copy()
+        return asked
 
     def high_level(self, track: FaceTrack) -> tuple[npt.NDArray[np.int16], npt.NDArray[np.int16]]:
         viseme = hold(track.viseme, track.mask[:, :1], self.viseme)

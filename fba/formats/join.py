@@ -37,6 +37,7 @@ def merge(face_animation: Animation, body_animation: Animation) -> Animation:
         _spread(face.mask, at, len(index)),
         _spread(face.viseme, at, len(index)),
         _spread(face.expression, at, len(index)),
+        _spread(face.interpolated, at, len(index)) if face.interpolated is not None else None,
     )
     at = np.searchsorted(index, body_animation.index)
     joined_body = BodyTrack(_spread(body.values, at, len(index)), _spread(body.mask, at, len(index)))

@@ -169,7 +169,8 @@ def tracks(draw: st.DrawFn) -> FaceTrack:
     values[:, :2] = 0
     viseme = np.stack([rng.integers(0, high, count) for high in (4, 4, 64, 2)], axis=1)
     expression = np.stack([rng.integers(0, high, count) for high in (3, 64, 3, 64, 2, 2)], axis=1)
-    return FaceTrack(values, mask, viseme, expression)
+    interpolated = rng.random((count, 68)) < draw(st.sampled_from([0.0, 0.0, 0.05, 0.5]))
+    return FaceTrack(values, mask, viseme, expression, interpolated)
 
 
 @given(tracks(), st.data())
