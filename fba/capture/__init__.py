@@ -7,11 +7,26 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fba.capture.motion import SkeletonMotion
+    from fba.capture.report import BoneError, FeetError, RetargetReport, retarget_report
     from fba.capture.skeleton import from_skeleton
 
-_PLACES = {"SkeletonMotion": "fba.capture.motion", "from_skeleton": "fba.capture.skeleton"}
+_PLACES = {
+    "BoneError": "fba.capture.report",
+    "FeetError": "fba.capture.report",
+    "RetargetReport": "fba.capture.report",
+    "SkeletonMotion": "fba.capture.motion",
+    "from_skeleton": "fba.capture.skeleton",
+    "retarget_report": "fba.capture.report",
+}
 
-__all__ = ["SkeletonMotion", "from_skeleton"]
+__all__ = [
+    "BoneError",
+    "FeetError",
+    "RetargetReport",
+    "SkeletonMotion",
+    "from_skeleton",
+    "retarget_report",
+]
 
 
 def __getattr__(name: str) -> Any:

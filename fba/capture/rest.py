@@ -20,6 +20,7 @@ import numpy.typing as npt
 from fba.body.skeleton import Skeleton
 from fba.capture import rotations
 from fba.capture.motion import SkeletonMotion
+from fba.capture.spine import joints as spine_joints
 from fba.errors import ModelError
 
 Float = npt.NDArray[np.float64]
@@ -121,14 +122,22 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     return Alignment(upright, corrections, aims)
 
 
-def spine_joints(skeleton: Skeleton) -> list[str]:
-    """From the root up to the skull base."""
-    joint = skeleton.number("skullbase")
-    chain = [joint]
-    while skeleton.parents[joint] >= 0:
-        joint = int(skeleton.parents[joint])
-        chain.append(joint)
-    return [skeleton.names[joint] for joint in reversed(chain)]
+def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> float | None:
+    """Length of the body's legs over that of the source's, else of the arms; None where it has neither."""
+    places = motion.rest()
+    for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
+        ours = theirs = 0.0
+        for side in "lr":
+            names = [f"{side}_{part}" for part in chain]
+            if not all(name in mapped and name in skeleton for name in names):
+                continue
+            for a, b in pairwise(names):
+                ends = skeleton.centres[[skeleton.number(a), skeleton.number(b)]]
+                ours += float(np.linalg.norm(ends[1] - ends[0]))
+                theirs += float(np.linalg.norm(places[mapped[b]] - places[mapped[a]]))
+        if theirs > 0:
+            return ours / theirs
+    return None
 
 
 def _facing(rest: Float, mapped: Mapping[str, int]) -> tuple[Float, Float]:

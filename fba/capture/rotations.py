@@ -89,3 +89,35 @@ def interpolate(
     mixed = np.where(sine < 1e-6, near, mixed)
     result: Float = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
     return result
+
+
+def part(start: Float, end: Float, weight: Float | float) -> Float:
+    """Matrices (..., 3, 3) a share of the smallest turn from start to end (..., 3, 3): spherical
+    interpolation."""
+    step = np.swapaxes(start, -1, -2) @ end
+    vector = np.stack(
+        [
+            step[..., 2, 1] - step[..., 1, 2],
+            step[..., 0, 2] - step[..., 2, 0],
+            step[..., 1, 0] - step[..., 0, 1],
+        ],
+        axis=-1,
+    )
+    sine = np.linalg.norm(vector, axis=-1)
+    angle = np.arctan2(sine, np.trace(step, axis1=-2, axis2=-1) - 1.0)
+    axis = vector / np.maximum(sine, 1e-300)[..., None]
+    axis = np.where(sine[..., None] > 1e-12, axis, [1.0, 0.0, 0.0])
+    result: Float = start @ turn(axis, angle * weight)
+    return result
+
+
+def between_all(start: Float, end: Float) -> Float:
+    """The smallest rotations (T, 3, 3) that take directions (T, 3) to others (T, 3), for less than half
+    turns."""
+    a = start / np.linalg.norm(start, axis=-1, keepdims=True)
+    b = end / np.linalg.norm(end, axis=-1, keepdims=True)
+    axis = np.cross(a, b)
+    sine = np.linalg.norm(axis, axis=-1)
+    angle = np.arctan2(sine, np.sum(a * b, axis=-1))
+    axis = np.where(sine[..., None] > 1e-12, axis / np.maximum(sine, 1e-300)[..., None], [1.0, 0.0, 0.0])
+    return turn(axis, angle)

@@ -1,0 +1,100 @@
+"""The source's few spine joints spread over the vertebrae of the body.
+
+A source has two to six joints between hips and head, the body twenty-four. Along the spine, the source's
+rotations hold in the middle of its bones; between these middles the vertebrae turn by spherical
+interpolation, from the pelvis up to the skull base. Then all vertebrae of a source bone are turned together
+by the little that their line still lacks, so that it points exactly where the source's bone points.
+
+With fewer groups of the standard (Spine1, the simple spine of four joints, to Spine5, all of them), the
+vertebrae that may turn take over the bones: each carries the line to the next one, along the source's.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.skeleton import Skeleton
+from fba.capture import rotations
+from fba.parameters import baps
+
+Float = npt.NDArray[np.float64]
+
+GROUPS = 5
+"""Groups Spine1 to Spine5."""
+
+
+def joints(skeleton: Skeleton) -> list[str]:
+    """From the root up to the skull base."""
+    if "skullbase" not in skeleton:
+        return [skeleton.names[0]]
+    joint = skeleton.number("skullbase")
+    chain = [joint]
+    while skeleton.parents[joint] >= 0:
+        joint = int(skeleton.parents[joint])
+        chain.append(joint)
+    return [skeleton.names[joint] for joint in reversed(chain)]
+
+
+def turning(skeleton: Skeleton, groups: int) -> list[str]:
+    """The vertebrae of the standard's groups Spine1 up to a number, root upwards."""
+    allowed = {b.joint for b in baps() if b.group_name in {f"Spine{n}" for n in range(1, groups + 1)}}
+    return [joint for joint in joints(skeleton) if joint in allowed]
+
+
+def spread(
+    skeleton: Skeleton, wanted: dict[str, Float], places: dict[str, Float], anchors: list[str], groups: int
+) -> None:
+    """Replaces the rotations of anchors in wanted by those of all vertebrae that turn.
+
+    anchors: joints of the spine that the source has, root first and upwards, two at least. wanted: joint
+    -> (T, 3, 3), rotations of the bones above them; the last one's is its own. places: anchor -> (T, 3), the
+    source's places of the anchors.
+    """
+    chain = joints(skeleton)
+    first, last = chain.index(anchors[0]), chain.index(anchors[-1])
+    centres = np.array([skeleton.centres[skeleton.number(joint)] for joint in chain])
+    height = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
+    at = [height[chain.index(joint)] for joint in anchors]
+    keys = [at[0], *((a + b) / 2 for a, b in pairwise(at)), at[-1]]
+    turned = [wanted[anchors[0]], *(wanted[joint] for joint in anchors)]
+
+    def rotation(where: float) -> Float:
+        upper = int(np.clip(np.searchsorted(keys, where), 1, len(keys) - 1))
+        low, high = keys[upper - 1], keys[upper]
+        share = float(np.clip((where - low) / max(high - low, 1e-12), 0.0, 1.0))
+        return rotations.part(turned[upper - 1], turned[upper], share)
+
+    def place(where: float) -> Float:
+        upper = int(np.clip(np.searchsorted(at, where), 1, len(at) - 1))
+        low, high = at[upper - 1], at[upper]
+        share = float(np.clip((where - low) / max(high - low, 1e-12), 0.0, 1.0))
+        result: Float = places[anchors[upper - 1]] * (1 - share) + places[anchors[upper]] * share
+        return result
+
+    free = [joint for joint in turning(skeleton, groups) if first < chain.index(joint) <= last]
+    if not free:
+        return
+    pinned = anchors if groups >= GROUPS else [anchors[0], *free]
+    if pinned[-1] != anchors[-1]:
+        pinned = [*pinned, anchors[-1]]
+    head = wanted[anchors[-1]]
+    for joint in anchors[1:]:
+        wanted.pop(joint, None)
+    for low_joint, high_joint in pairwise(pinned):
+        low, high = chain.index(low_joint), chain.index(high_joint)
+        inside = [n for n in range(low, high) if n == low or chain[n] in free]
+        ends = [*inside[1:], high]
+        part = {n: rotation((height[n] + height[end]) / 2) for n, end in zip(inside, ends, strict=True)}
+        line = sum(
+            (part[n] @ (centres[end] - centres[n]) for n, end in zip(inside, ends, strict=True)),
+            np.zeros(3),
+        )
+        course = place(height[high]) - place(height[low])
+        length = np.linalg.norm(course, axis=1).min()
+        turn = rotations.between_all(line, course) if length > 1e-9 else np.eye(3)
+        for n in inside:
+            wanted[chain[n]] = turn @ part[n]
+    wanted[anchors[-1]] = head
