@@ -54,7 +54,9 @@ class Accessors:
         """The same for unsigned integers, unscaled, in their own dtype."""
         index, entry = self._entry(reference)
         if entry.member("componentType").data not in UNSIGNED or _flag(entry, "normalized"):
-            raise entry.error("must hold unsigned integers (component type 5121, 5123 or 5125), unscaled")
+            raise reference.error(
+                f"{entry.path} must hold unsigned integers (component type 5121, 5123, 5125)"
+            )
         if index not in self._integers:
             raw = self._read(entry)
             raw = raw.astype(raw.dtype.newbyteorder("="), copy=False)

@@ -96,7 +96,7 @@ CASES: list[tuple[str, Any, str]] = [
     ("accessors/0/type", "VEC2", r"attributes\.POSITION: accessors\[0\] holds VEC2 elements, but VEC3"),
     ("accessors/0/type", "MAT3", r"accessors\[0\]: type 'MAT3' is none of"),
     ("accessors/0/bufferView", 99, r"accessors\[0\]\.bufferView: 99 is not within"),
-    ("accessors/1/componentType", 5126, r"accessors\[1\]: must hold unsigned integers"),
+    ("accessors/1/componentType", 5126, r"indices: accessors\[1\] must hold unsigned integers"),
     ("accessors/2/count", 2, r"targets\[0\]\.POSITION: accessors\[2\] has 2 elements, but 3 are needed"),
     ("accessors/3/count", 2, r"NORMAL: accessors\[3\] has 2 elements, but 3 are needed"),
     ("accessors/0/sparse", {"count": 9}, r"accessors\[0\]\.sparse\.count: 9 is not within 1\.\.3"),

@@ -47,6 +47,9 @@ def read_model(document: Document) -> FaceModel:
     gltf = read_document(document, accessors)
     parts = _parts(content.member("parts"), gltf, document.budget)
     points, bound = _points(content.member("featurePoints"), parts)
+    for name, value in _members(content, "morphValues", FAP_COUNT):  # for viewers' users, not for us
+        _fap(name, value)
+        value.number()
     fit = content.get("fit")
     with located(content), np.errstate(all="ignore"):  # absurd sizes overflow; no harm comes of it
         return FaceModel(
@@ -75,6 +78,8 @@ def located(value: Value) -> Iterator[None]:
 
 def _parts(listed: Value, gltf: Gltf, budget: Budget) -> tuple[Part, ...]:
     entries = listed.elements(MAX_PARTS)
+    if not entries:
+        raise listed.error("a face needs at least one part")
     parts = []
     taken: set[int] = set()
     for entry in entries:
