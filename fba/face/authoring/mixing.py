@@ -21,15 +21,22 @@ Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
 OWN, ELSEWHERE, ACROSS = 3.0, 1.0, 0.5
-"""Weights of the FAP's own point, of the other points, and of the own point's other directions."""
+"""Weights of the points that are to move, of the other points, and of directions across the way."""
 RIDGE = 0.05
-"""Holds weights small: a metre of error at a point counts as much as this weight at the own point's way."""
+"""Holds weights small: a shape at weight 1 costs as much as a twentieth of the way at another point."""
 MOST_WEIGHT = 1.25
 """A shape is used up to this weight for a typical value of the FAP."""
-LEAST_SHARE = 0.4
-"""Shapes that bring a point less than this share of the way do not serve its FAP."""
+LEAST_SHARE, LEAST_OF_ONE = 0.5, 0.25
+"""Shapes that bring the points of a group less than this share of the way, or one of them less than the
+second, do not serve it."""
 FULL_WEIGHT = 0.15
 """From this weight of the mesh's own tables on, shapes show in full; they fade out below."""
+GROUPS = (
+    (31, 33, 35), (32, 34, 36), (37,), (38,), (39,), (40,), (41,), (42,),
+    (51, 55, 56), (52, 57, 58), (53,), (54,), (59,), (60,), (61,), (62,), (63,), (64,),
+)  # fmt: skip
+"""FAPs that sculptors move together: a shape raises a whole brow, a whole lip. Inner lips follow from
+the mesh, as shapes always move both contours."""
 REGIONS = (
     (*range(31, 39),),
     (*range(39, 43),),
@@ -50,7 +57,8 @@ class Mixer:
         vertices = np.array([base.bound[row_of()[name]] for name in self.points], dtype=np.intp)
         self.vertices = vertices
         self.at = shapes.at(vertices)
-        self.weights = np.stack([self._weight(fap) for fap in self.points.values()], axis=1)
+        columns = [self.weight(fap) for fap in self.points.values()]
+        self.weights = np.stack(columns, axis=1) if columns else np.zeros((len(base.vertices), 0))
         # how far each point follows when another one is moved by its own table
         self.coupling = self.weights[vertices]
 
@@ -64,83 +72,99 @@ class Mixer:
                     found.setdefault(names[0], fap)
         return found
 
-    def _weight(self, fap: int) -> Float64:
+    def weight(self, fap: int) -> Float64:
         """(V,): how much of the way of its point each vertex goes when a FAP is small."""
-        field = first_steps(self.base, fap)
-        way = np.array(DIRECTIONS[faps()[fap - 1].positive])
-        return np.asarray(field @ way / self.unit[fap])
+        field = first_steps(self.base, fap, 1.0)
+        return np.asarray(field @ np.array(DIRECTIONS[faps()[fap - 1].positive]) / self.unit[fap])
 
-    def table(self, fap: int) -> tuple[FaceDefTables, set[str]] | None:
-        """Tables of a FAP from shapes, and the shapes; None where they do not reach."""
-        name = faps()[fap - 1].feature_points[0]
-        if name not in self.points:
-            return None
-        steps: list[Float64 | None] = []
+    def tables(self, group: tuple[int, ...]) -> tuple[dict[int, FaceDefTables], set[str]]:
+        """Tables of a group of FAPs from shapes, and the shapes; none where these do not reach."""
+        group = tuple(fap for fap in group if fap in self.base.table_of)
+        group = tuple(fap for fap in group if faps()[fap - 1].feature_points[0] in self.points)
+        details: dict[float, Float64] = {}
         used: set[str] = set()
-        for sign in (-1.0, 1.0):
-            solved = self._solved(fap, sign)
-            if solved is None:
-                steps.append(None)
-                continue
-            weights, value = solved
-            steps.append(self._put_right(fap, self.shapes.mixed(weights) / value))
-            used |= {h.shape for h, w in zip(self.shapes.halves, weights, strict=True) if w > 0.02}
-        if all(step is None for step in steps):
-            return None
-        own = first_steps(self.base, fap)
-        down, up = (own if step is None else step for step in steps)
-        made = guarded_tables(self.base, fap, down, up)
-        return None if made is None else (made, used)
+        for sign in (-1.0, 1.0) if group else ():
+            solved = self._solved(group, sign)
+            if solved is not None:
+                step = self._put_right(group, self.shapes.mixed(solved))
+                plain = sum(first_steps(self.base, fap, sign) for fap in self._together(group).values())
+                details[sign] = step - plain
+                halves = zip(self.shapes.halves, solved, strict=True)
+                used |= {half.shape for half, weight in halves if weight * self._value(group[0]) > 0.02}
+        made: dict[int, FaceDefTables] = {}
+        if not details:
+            return made, used
+        # what the sculptor adds is shared out, so that it shows once when all of the group move
+        holds = {fap: np.abs(self.weight(fap)) for fap in group}
+        total = np.sum(list(holds.values()), axis=0)
+        for fap in group:
+            share = (holds[fap] / np.where(total > 1e-6, total, 1.0))[:, None]
+            down, up = (
+                first_steps(self.base, fap, sign) + (share * details[sign] if sign in details else 0.0)
+                for sign in (-1.0, 1.0)
+            )
+            table = guarded_tables(self.base, fap, down, up)
+            if table is not None:
+                made[fap] = table
+        return made, used
 
-    def _solved(self, fap: int, sign: float) -> tuple[Float64, float] | None:
-        """Weights of the halves that bring the point of a FAP furthest, and for which value."""
-        from scipy.optimize import lsq_linear
+    def _together(self, group: tuple[int, ...]) -> dict[str, int]:
+        """Points that shapes move at once, and their FAPs: those of a group and of the inner lip's."""
+        found = {faps()[fap - 1].feature_points[0]: fap for fap in group}
+        for fap in group:
+            mate = faps()[fap - 1].lip_mate
+            if mate is not None and mate in self.base.table_of:
+                name = faps()[mate - 1].feature_points[0]
+                if name in self.points:
+                    found[name] = mate
+        return found
 
+    def _value(self, fap: int) -> float:
         from fba.face.gltf.morphs import morph_values
 
-        entry = faps()[fap - 1]
-        value = sign * morph_values()[fap]
-        way = np.array(DIRECTIONS[entry.positive]) * value * self.unit[fap]
-        length = float(np.linalg.norm(way))
-        own = [list(self.points).index(name) for name in self._together(fap)]
-        target = np.zeros((len(self.points), 3))
-        target[own] = way
-        weight = np.full((len(self.points), 3), ELSEWHERE)
-        weight[own] = np.where(np.abs(way) > 0, OWN, ACROSS)
-        system = (self.at * weight).reshape(len(self.shapes.halves), -1).T / length
-        ridge = RIDGE * np.eye(len(self.shapes.halves))
+        return float(morph_values()[fap])
+
+    def _steps(self, group: tuple[int, ...]) -> Float64:
+        """(P, 3): where one step of all FAPs of a group, and of their inner mates, brings each point."""
+        wanted = np.zeros((len(self.points), 3))
+        names = list(self.points)
+        for name, fap in self._together(group).items():
+            wanted[names.index(name)] = np.array(DIRECTIONS[faps()[fap - 1].positive]) * self.unit[fap]
+        return wanted
+
+    def _solved(self, group: tuple[int, ...], sign: float) -> Float64 | None:
+        """(H,) weights of the halves that bring the points of a group one step in its direction."""
+        from scipy.optimize import lsq_linear
+
+        value = self._value(group[0])
+        target = self._steps(group) * sign * value
+        length = np.linalg.norm(target, axis=1)
+        own = length > 0
+        weight = np.full(target.shape, ELSEWHERE)
+        weight[own] = np.where(np.abs(target[own]) > 0, OWN, ACROSS)
+        weight /= length.max()
+        halves = len(self.shapes.halves)
+        system = (self.at * weight).reshape(halves, -1).T
         solution = lsq_linear(
-            np.concatenate([system, ridge]),
-            np.concatenate([(target * weight).reshape(-1) / length, np.zeros(len(ridge))]),
+            np.concatenate([system, RIDGE * np.eye(halves)]),
+            np.concatenate([(target * weight).reshape(-1), np.zeros(halves)]),
             bounds=(0.0, MOST_WEIGHT),
         ).x
         solution[solution < 1e-3] = 0.0
         moved = np.einsum("h,hpk->pk", solution, self.at)
-        share = float(moved[own[0]] @ way) / length**2
-        if share < LEAST_SHARE:
+        outer = [list(self.points).index(faps()[fap - 1].feature_points[0]) for fap in group]
+        shares = (moved[outer] * target[outer]).sum(axis=1) / length[outer] ** 2
+        if shares.mean() < LEAST_SHARE or shares.min() < LEAST_OF_ONE:
             return None
-        return solution / share, value
+        return np.asarray(solution / (shares.mean() * value) * sign)
 
-    def _together(self, fap: int) -> list[str]:
-        """The point of a FAP, and that of the inner lip which shapes move along with the outer one."""
-        entry = faps()[fap - 1]
-        names = [entry.feature_points[0]]
-        if entry.lip_mate:
-            mate = faps()[entry.lip_mate - 1].feature_points[0]
-            names += [mate] if mate in self.points else []
-        return names
-
-    def _put_right(self, fap: int, step: Float64) -> Float64:
-        """(V, 3) for one step of a FAP: faded out of its region, and exact at all feature points."""
-        region = next(region for region in REGIONS if fap in region)
+    def _put_right(self, group: tuple[int, ...], step: Float64) -> Float64:
+        """(V, 3) for one step of a group: faded out of its region, and exact at all feature points."""
+        region = next(region for region in REGIONS if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
         hold = np.clip(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT, 0.0, 1.0)
         step = step * (hold * hold * (3 - 2 * hold))[:, None]
-        wanted = np.zeros((len(self.points), 3))
-        entry = faps()[fap - 1]
-        own = list(self.points).index(entry.feature_points[0])
-        wanted[own] = np.array(DIRECTIONS[entry.positive]) * self.unit[fap]
-        rest, *_ = np.linalg.lstsq(self.coupling, wanted - step[self.vertices], rcond=1e-6)
+        rest, *_ = np.linalg.lstsq(self.coupling, self._steps(group) - step[self.vertices], rcond=1e-6)
         return np.asarray(step + self.weights @ rest)
 
     def standing_in(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
@@ -159,14 +183,13 @@ class Mixer:
         return guarded_tables(self.base, fap, step, step)
 
 
-def first_steps(model: FaceModel, fap: int) -> Float64:
-    """(V, 3) metres: what the first step of a FAP above 0 does to all vertices of a model."""
-    entry = faps()[fap - 1]
-    unit = model.fapu[entry.unit]
+def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
+    """(V, 3) metres a step: what a FAP does to all vertices of a model next to 0, above or below it."""
+    unit = model.fapu[faps()[fap - 1].unit]
     field = np.zeros((len(model.vertices), 3))
     for mesh in model.table_of[fap].meshes:
-        above = int(np.flatnonzero(mesh.borders == 0)[0])
-        column = min(above, len(mesh.borders) - 2)
+        zero = int(np.flatnonzero(mesh.borders == 0)[0])
+        column = min(max(zero - (sign < 0), 0), len(mesh.borders) - 2)
         field[model.starts[mesh.part] + mesh.vertices] = mesh.displacements[:, column] * unit
     return field
 

@@ -1,9 +1,10 @@
 """From a mesh with shapes (the 52 of ARKit, or one a FAP) to a face model whose FAPs use them.
 
-How far each shape moves each feature point is measured; for each FAP and each of its two directions the
-shapes are mixed so that its own point moves as the standard wants and the others least. What is left
-over at the points is taken away with the tables that `author` makes of the mesh alone, so every
-point moves exactly as far as its FAP says, and between the points the sculptor's shapes show.
+How far each shape moves each feature point is measured; for each group of FAPs that shapes move together
+(a brow, a lip) and each direction the shapes are mixed so that its points move as the standard wants and
+the others least. What is left over at the points is taken away with the tables that `author` makes of the
+mesh alone, so every point moves exactly as far as its FAP says, and between the points the sculptor's
+shapes show.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from fba.errors import FbaWarning
 from fba.face.authoring.author import author
-from fba.face.authoring.mixing import Mixer, guarded_tables
+from fba.face.authoring.mixing import GROUPS, Mixer, guarded_tables
 from fba.face.authoring.shape_names import canonical, fap_of
 from fba.face.authoring.shapes import Morphs, Shapes
 from fba.face.expressions import Definitions
@@ -33,9 +34,6 @@ FEWEST_FAPS = 5
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
 """FAPs whose points move on arcs, or as bodies: jaw, lids, eyeballs, tongue, head. A shape is straight;
 it serves them only where the mesh alone cannot."""
-SHAPED = (*range(31, 43), *range(51, 65))
-"""FAPs for which shapes are mixed: brows, cheeks, outer lips with all around them, nose. Inner lips
-follow from the mesh, as ARKit's shapes always move both contours."""
 STANDING_IN = {
     3: ("jawOpen", "mouthClose"),
     19: ("eyeBlinkLeft",),
@@ -87,11 +85,10 @@ def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
     mixer = Mixer(base, shapes)
     tables: dict[int, FaceDefTables] = dict(base.table_of)
     used: set[str] = set()
-    for fap in SHAPED:
-        mixed = mixer.table(fap) if fap in tables else None
-        if mixed is not None:
-            tables[fap], names = mixed
-            used |= names
+    for group in GROUPS:
+        made, names = mixer.tables(group)
+        tables |= made
+        used |= names
     lost = dict(base.lost)
     for fap, wanted in STANDING_IN.items():
         if fap in lost and wanted[0] in shapes.morphs:

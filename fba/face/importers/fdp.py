@@ -139,25 +139,9 @@ def _load_text(path: str) -> Fdp:
 
 def on_their_sides(points: Float64, path: str, *, stacklevel: int = 2) -> Float64:
     """Points on the wrong side mirrored, changed places changed back; an FbaWarning names them."""
-    points = points.copy()
-    row = row_of()
-    midline = points[[row[name] for name in ("2.1", "2.2", "2.3", "2.10", "8.1", "8.2", "9.3", "9.15")], 0]
-    middle = float(np.nanmedian(midline)) if np.isfinite(midline).any() else 0.0
-    changed: list[str] = []
-    for left, right in MIRRORED.items():
-        a, b = points[row[left], 0] - middle, points[row[right], 0] - middle
-        if a < 0 < b:
-            points[[row[left], row[right]]] = points[[row[right], row[left]]]
-            changed.append(f"{left} and {right} have changed places")
-            continue
-        for name, wrong in ((left, a < 0), (right, b > 0)):
-            if wrong:
-                points[row[name], 0] = 2 * middle - points[row[name], 0]
-                changed.append(f"{name} is on the other side")
-    for outer, inner in (("3.12", "3.8"), ("3.11", "3.7")):
-        if points[row[outer], 0] > points[row[inner], 0]:
-            points[[row[outer], row[inner]]] = points[[row[inner], row[outer]]]
-            changed.append(f"{inner} and {outer} have changed places")
+    right, swaps, mirrored = sides(points)
+    changed = [f"{a} and {b} have changed places" for a, b in swaps]
+    changed += [f"{name} is on the other side" for name in mirrored]
     if changed:
         warnings.warn(
             f"{path}: put right (+x is the subject's left): {'; '.join(changed[:6])}"
@@ -165,4 +149,33 @@ def on_their_sides(points: Float64, path: str, *, stacklevel: int = 2) -> Float6
             FbaWarning,
             stacklevel=stacklevel + 1,
         )
-    return points
+    return right
+
+
+def sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[str]]:
+    """Points (84, 3) on their sides of the face; the pairs that had changed places, and those mirrored."""
+    points = points.copy()
+    row = row_of()
+    midline = points[[row[name] for name in ("2.1", "2.2", "2.3", "2.10", "8.1", "8.2", "9.3", "9.15")], 0]
+    middle = float(np.nanmedian(midline)) if np.isfinite(midline).any() else 0.0
+    swaps: list[tuple[str, str]] = []
+    mirrored: list[str] = []
+
+    def swap(a: str, b: str) -> None:
+        points[[row[a], row[b]]] = points[[row[b], row[a]]]
+        swaps.append((a, b))
+
+    for left, right in MIRRORED.items():
+        x, y = points[row[left], 0] - middle, points[row[right], 0] - middle
+        if x < 0 < y:
+            swap(left, right)
+            continue
+        for name, wrong in ((left, x < 0), (right, y > 0)):
+            if wrong:
+                points[row[name], 0] = 2 * middle - points[row[name], 0]
+                mirrored.append(name)
+    for inner, outer in (("3.8", "3.12"), ("3.7", "3.11")):
+        # of two corners of an eye the first named is the one more to the left
+        if points[row[inner], 0] < points[row[outer], 0]:
+            swap(inner, outer)
+    return points, swaps, mirrored

@@ -14,6 +14,7 @@ from fba.face.importers.fdp import Fdp, load_fdp
 from fba.face.importers.fitting import finished
 from fba.face.importers.mesh import READERS, import_mesh
 from fba.face.importers.pieces import Piece
+from fba.face.importers.points_file import GivenPoints
 from fba.face.importers.polygons import make_part
 from fba.face.importers.vrml import read_vrml
 from fba.face.importers.xface import NEUTRAL, xface_points
@@ -49,7 +50,8 @@ def import_fdp(
     for form in ("wfm", "obj", "ply"):
         mesh = place.with_suffix(f".{form}")
         if form in READERS and mesh.is_file():
-            return import_mesh(mesh, form, points=path, unit=unit, up=up, kinds=kinds, name=name)
+            given = GivenPoints(fdp.points, {point: vertex for point, (_, vertex) in fdp.vertices.items()})
+            return import_mesh(mesh, form, points=given, unit=unit, up=up, kinds=kinds, name=name)
     raise ModelError(
         f"{place}: an FDP file says where feature points are, but brings no mesh; put {place.stem}.wfm, .obj "
         "or .ply beside it, or fit a head that is there to its points: fba model fit"

@@ -161,16 +161,10 @@ def _mouth(
     middle = (left + right) / 2
     drop = -shapes["jawOpen"][:, 1]
     ahead = vertices[:, 2] > middle[2]
-    centre = (np.abs(vertices[:, 0] - middle[0]) < 0.04 * apart) & ahead
-    moved = centre & (drop > 0.5 * drop[centre].max())
-    if not moved.any():
-        raise ModelError(f"{path}: the shape jawOpen moves nothing at the midline of the mouth")
-    lower = int(np.where(moved, vertices[:, 1], -np.inf).argmax())
-    still = centre & (drop < 0.3 * drop[centre].max())
-    gap = np.where(still, np.linalg.norm(vertices - vertices[lower], axis=1), np.inf)
-    # the edge of the upper lip is the lowest of what stays near the lower lip
-    close = gap < gap.min() + 0.03 * apart
-    upper = int(np.where(close, vertices[:, 1], np.inf).argmin())
+    pair = _lip_pair(vertices, drop, ahead, float(middle[0]), apart)
+    if pair is None:
+        raise ModelError(f"{path}: the shape jawOpen does not part any lips at the midline of the face")
+    upper, lower = pair
     found = {"2.2": vertices[upper], "2.3": vertices[lower]}
     for side, sign, inner, outer in (("Left", 1, "2.4", "8.3"), ("Right", -1, "2.5", "8.4")):
         shape = next((s for s in (f"mouthSmile{side}", f"mouthStretch{side}") if s in shapes.arkit), None)
@@ -185,8 +179,33 @@ def _mouth(
         far = place > 0.9 * place.max()
         across = np.abs(vertices[:, 1] - vertices[upper, 1]) + 0.2 * np.abs(vertices[:, 0] - middle[0])
         corner = vertices[int(np.where(far, across, np.inf).argmin())]
-        found[inner], found[outer] = corner, corner
+        beyond = (vertices[:, 0] - corner[0]) * sign > 0.015 * apart
+        away = np.linalg.norm(vertices - corner - (0.035 * apart * sign, 0, 0), axis=1)
+        found[inner] = corner
+        found[outer] = vertices[int(np.where(beyond & front, away, np.inf).argmin())]
+        half = _lip_pair(vertices, drop, ahead, float(middle[0] + corner[0]) / 2, apart)
+        if half is not None and np.abs(vertices[list(half), 1] - vertices[upper, 1]).max() < 0.1 * apart:
+            found[{"2.4": "2.6", "2.5": "2.7"}[inner]] = vertices[half[0]]
+            found[{"2.4": "2.8", "2.5": "2.9"}[inner]] = vertices[half[1]]
     return found
+
+
+def _lip_pair(
+    vertices: Float64, drop: Float64, ahead: Bool, x: float, apart: float
+) -> tuple[int, int] | None:
+    """Upper and lower lip where they touch at some x: what an opening jaw takes along, and what stays."""
+    column = (np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead
+    if not column.any() or not drop[column].max() > 0:
+        return None
+    moved = column & (drop > 0.5 * drop[column].max())
+    still = column & (drop < 0.3 * drop[column].max())
+    if not still.any():
+        return None
+    lower = int(np.where(moved, vertices[:, 1], -np.inf).argmax())
+    gap = np.where(still, np.linalg.norm(vertices - vertices[lower], axis=1), np.inf)
+    # the edge of the upper lip is the lowest of what stays near the lower lip
+    close = gap < gap.min() + 0.03 * apart
+    return int(np.where(close, vertices[:, 1], np.inf).argmin()), lower
 
 
 def _warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:

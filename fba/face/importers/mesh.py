@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fba.errors import FbaWarning, ModelError
 from fba.face.feature_points import names, row_of
+from fba.face.importers.fdp import sides
 from fba.face.importers.files import lines
 from fba.face.importers.fitting import finished
 from fba.face.importers.materials import read_mtl
@@ -30,6 +31,8 @@ READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
     "ply": read_ply,
     "wfm": read_wfm,
 }
+FEWEST_PAIRS = 8
+"""So many positions with vertices show the unit of a file of points."""
 POINT_FILES = (".points.csv", ".points.json", ".fdp", ".csv", ".json")
 """Ends of the names of files beside a mesh in which its feature points are looked for."""
 
@@ -48,8 +51,8 @@ def import_mesh(
     polygons = READERS[form](path)
     given = given_points(points) if points is not None else _beside(path)
     pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {})
-    places = _places(polygons, given, os.fspath(path))
-    return finished(pieces, places, given.vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
+    places, vertices = _places(polygons, given, os.fspath(path))
+    return finished(pieces, places, vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
 
 
 def polygon_pieces(polygons: Polygons, materials: Mapping[str, Material]) -> list[Piece]:
@@ -86,30 +89,68 @@ def _beside(path: str | os.PathLike[str]) -> GivenPoints:
     )
 
 
-def _places(polygons: Polygons, given: GivenPoints, path: str) -> Float64:
-    """Positions (84, 3) of the points in the mesh's unit; a vertex says more than a position."""
+def _places(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64, dict[str, int]]:
+    """Positions (84, 3) of the points in the mesh's unit, and their vertices.
+
+    A vertex says more than a position, which may be of another unit; an FbaWarning names those that
+    disagree. Points of the wrong side are put right.
+    """
     places = given.points.copy()
-    scale = float(np.ptp(polygons.vertices, axis=0).max()) or 1.0
-    away: list[str] = []
+    vertices = dict(given.vertices)
     for name, vertex in given.vertices.items():
-        if vertex >= len(polygons.vertices):
-            if np.isfinite(places[row_of()[name]]).all():
-                continue
+        if vertex < len(polygons.vertices):
+            places[row_of()[name]] = polygons.vertices[vertex]
+        elif np.isfinite(places[row_of()[name]]).all():
+            del vertices[name]
+        else:
             raise ModelError(
                 f"{path}: feature point {name} is vertex {vertex}, but the mesh has {len(polygons.vertices)}"
             )
-        position = polygons.vertices[vertex]
-        if np.linalg.norm(places[row_of()[name]] - position) > 1e-3 * scale:
-            away.append(name)
-        places[row_of()[name]] = position
-    if away:
+    places, swaps, mirrored = sides(_brought(given.points, places, list(vertices), path))
+    for a, b in swaps:
+        found = {b: vertices.pop(a, None), a: vertices.pop(b, None)}
+        vertices |= {name: vertex for name, vertex in found.items() if vertex is not None}
+    for name in mirrored:
+        vertices.pop(name, None)
+    if swaps or mirrored:
         warnings.warn(
-            f"{path}: {len(away)} feature points do not lie where their vertices are "
-            f"({', '.join(away[:6])}{', ...' if len(away) > 6 else ''}); the vertices are taken",
+            f"{path}: feature points of the wrong side of the face put right: "
+            f"{', '.join([*mirrored, *(f'{a} with {b}' for a, b in swaps)][:8])}",
             FbaWarning,
             stacklevel=4,
         )
-    return places
+    return places, vertices
+
+
+def _brought(said: Float64, placed: Float64, chosen: list[str], path: str) -> Float64:
+    """Positions without a vertex, brought to the unit and origin that the others show.
+
+    Warns of positions that do not agree with their vertices.
+    """
+    rows = [row_of()[name] for name in chosen if np.isfinite(said[row_of()[name]]).all()]
+    if len(rows) < FEWEST_PAIRS:
+        return placed
+    a, b = said[rows], placed[rows]
+    # medians: a few that disagree do not pull at the unit
+    centres = np.median(a, axis=0), np.median(b, axis=0)
+    a, b = a - centres[0], b - centres[1]
+    far = np.linalg.norm(a, axis=1)
+    spread = far > 0.3 * far.max()
+    if not spread.any() or not far.max() > 0:
+        return placed
+    ratio = float(np.median(np.linalg.norm(b[spread], axis=1) / far[spread]))
+    away = np.linalg.norm(a * ratio - b, axis=1) > 0.05 * np.ptp(b, axis=0).max()
+    names_ = [names()[row] for row, bad in zip(rows, away, strict=True) if bad]
+    if names_:
+        warnings.warn(
+            f"{path}: {len(names_)} of {len(rows)} feature points do not lie where their vertices are "
+            f"({', '.join(names_[:8])}{', ...' if len(names_) > 8 else ''}); the vertices are taken",
+            FbaWarning,
+            stacklevel=5,
+        )
+    rest = [row for row in range(len(placed)) if names()[row] not in chosen]
+    placed[rest] = (placed[rest] - centres[0]) * ratio + centres[1]
+    return placed
 
 
 def _materials(path: str | os.PathLike[str]) -> dict[str, Material]:
@@ -118,8 +159,3 @@ def _materials(path: str | os.PathLike[str]) -> dict[str, Material]:
         if text.startswith("mtllib") and line < 10000:
             found |= read_mtl(path, text[6:].strip())
     return found
-
-
-def unknown_points(points: Float64) -> tuple[str, ...]:
-    """Names of the points without a position."""
-    return tuple(n for n, p in zip(names(), points, strict=True) if np.isnan(p).any())

@@ -8,16 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import FbaWarning, ModelError
+from fba.errors import ModelError
 from fba.face.importers.kinds import DROPPED, checked_kinds, kind_of
 from fba.face.importers.shells import shell_labels
-from fba.face.model import Material, Part
+from fba.face.model import Part
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
 Bool = npt.NDArray[np.bool_]
-
-__all__ = ["FbaWarning", "Piece", "assembled", "moved"]
 
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
@@ -61,8 +59,9 @@ def assembled(
         raise ModelError("no part of the mesh is left: all are named as transparent shells of the eye")
     unknown = [piece for piece, kind in guessed if kind is None or kind == "skin"]
     if not any(kind == "eye" for _, kind in guessed):
-        guessed = [pair for pair in guessed if pair[0] not in unknown]
-        guessed += _with_eyes(unknown, {id(p): k for p, k in guessed}, middle)
+        known = {id(piece): kind for piece, kind in guessed}
+        guessed = [pair for pair in guessed if pair[1] is not None and pair[1] != "skin"]
+        guessed += _with_eyes(unknown, known, middle)
     if not any(kind == "skin" for _, kind in guessed):
         largest = max((len(p.part.vertices) for p, kind in guessed if kind is None), default=0)
         guessed = [
@@ -256,8 +255,3 @@ def _colours(part: Part) -> Float32:
     if part.colours is None:
         own[:, 3] = 1.0 - part.material.roughness
     return own
-
-
-def plain_material(name: str) -> Material:
-    """A material of that name and no colour of its own."""
-    return Material(name or "plain")

@@ -134,11 +134,12 @@ def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
 
 
 def _from_fdp(path: str) -> GivenPoints:
-    from fba.face.importers.fdp import load_fdp, read_fdp
+    from fba.face.importers.fdp import load_fdp
+    from fba.face.importers.xface import xface_points
 
     fdp = load_fdp(path)
     if fdp.format == "xface":
-        return GivenPoints(read_fdp(path))
+        return GivenPoints(xface_points(fdp))
     return GivenPoints(fdp.points, {name: vertex for name, (_, vertex) in fdp.vertices.items()})
 
 
