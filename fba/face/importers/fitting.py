@@ -13,7 +13,8 @@ import numpy.typing as npt
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.pieces import Piece, assembled, moved
-from fba.face.importers.units import metres_per_unit
+from fba.face.importers.units import metres_per_unit, pupil_distance
+from fba.face.importers.winding import outward
 from fba.face.model import FaceModel
 
 Float64 = npt.NDArray[np.float64]
@@ -22,6 +23,7 @@ Int32 = npt.NDArray[np.int32]
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 """Which way is up in a file -> rows that bring it to +x left, +y up, +z forward. z-up faces look to -y."""
 FREE = ("7.1", "11.5")
+EYES = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
 
 
 def turned(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
@@ -66,11 +68,16 @@ def finished(
     middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else 0.0
     origin = pupils.mean(axis=0) if np.isfinite(pupils).all() else np.zeros(3)
     parts = [moved(piece, size, -origin * size) for piece in assembled(pieces, kinds, middle=middle)]
+    # a point in the middle of the head, behind the pupils or the lids
+    eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
+    parts, over = outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
     placed = (points - origin) * size
     bound = bound_by_number(parts, vertices)
     everything = np.concatenate([piece.part.vertices for piece in parts]).astype(np.float64)
     placed[bound >= 0] = everything[bound[bound >= 0]]
     said = {"source": Path(path).name, "unit": how, **(notes or {})}
+    if over:
+        said["triangles"] = f"{over} turned to face outwards"
     return authored(parts, placed, bound, name=name or Path(path).stem, notes=said)
 
 
