@@ -10,6 +10,7 @@ from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names as feature_point_names
 from fba.face.feature_points import neutral_points
+from fba.face.interpolation_table import Function, InterpolationTable, Link, Term
 from fba.face.model import FaceModel, Material, Part
 from fba.face.points import Eyeballs, FeaturePointFace
 from fba.face.resolve import Resolver, resolve
@@ -28,9 +29,13 @@ __all__ = [
     "FaceModel",
     "Fapu",
     "FeaturePointFace",
+    "Function",
+    "InterpolationTable",
+    "Link",
     "Material",
     "Part",
     "Resolver",
+    "Term",
     "feature_point_names",
     "neutral_points",
     "resolve",
