@@ -29,6 +29,8 @@ LIPS = (("2.2", "2.3", "8.2"), ("2.6", "2.8", "8.7"), ("2.7", "2.9", "8.8"))
 """Upper and lower inner lip, and the outer lip below."""
 OPEN = 0.01
 """Share of the mouth's width by which lips may be apart before it is worth a word."""
+KEPT = 0.25
+"""Share of the distance between two such points by which the person's may differ and stay as given."""
 TEETH = ("9.10", "9.11")
 FREE = ("7.1", "11.5")
 """Points that stand on no surface: they say nothing about its shape, and vary from author to author."""
@@ -169,6 +171,8 @@ def shut(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64
         if np.isnan(full[a]).any():
             full[a] = full[b] - apart  # NaN where neither is known
         rise = full[a] + apart - full[b]
+        if np.linalg.norm(rise) < KEPT * np.linalg.norm(apart):
+            continue
         if np.isfinite(rise).all():
             full[b] += rise
             if abs(rise[1]) > OPEN * width:

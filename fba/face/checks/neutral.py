@@ -31,7 +31,7 @@ Float64 = npt.NDArray[np.float64]
 Limits = tuple[float, float]
 """Above the first a deviation is a warning, above the second an error."""
 
-GAZE: Limits = (2.0, 8.0)
+GAZE: Limits = (3.0, 8.0)
 """Degrees between gaze and +z."""
 TANGENT: Limits = (0.08, 0.25)
 """Of the iris's diameter: how far the edge of the iris may be from a lid margin."""

@@ -1,0 +1,166 @@
+"""Face models and what checks found, as text and as JSON."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from fba.face.checks import Finding
+    from fba.face.model import FaceModel
+
+UNITS = {
+    "IRISD": "height of the lid opening",
+    "ES": "between the pupils",
+    "ENS": "pupils to nose",
+    "MNS": "nose to mouth",
+    "MW": "width of the mouth",
+}
+
+
+def summary(model: FaceModel) -> str:
+    """One line: vertices, feature points, FAPs."""
+    from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
+
+    every = FAP_COUNT - FIRST_LOW_LEVEL_FAP + 1
+    points = len(model.points) - len(model.missing)
+    return (
+        f"{len(model.parts)} parts, {len(model.vertices)} vertices, {len(model.triangles)} triangles, "
+        f"{points} feature points, {len(model.tables)} of {every} FAPs"
+    )
+
+
+def lost(model: FaceModel) -> list[str]:
+    """FAPs that do nothing, and why, those with the same reason on one line."""
+    from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
+
+    reasons = defaultdict(list)
+    for number in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1):
+        if number not in model.table_of:
+            reasons[model.lost.get(number, "no tables")].append(f"{number} {faps()[number - 1].name}")
+    return [f"lost     FAP {', '.join(numbers)}: {reason}" for reason, numbers in reasons.items()]
+
+
+def described(model: FaceModel) -> dict[str, Any]:
+    """Everything of interest, for programs; lengths in metres."""
+    from fba.face.feature_points import names
+
+    low, high = model.vertices.min(axis=0), model.vertices.max(axis=0)
+    return {
+        "name": model.name,
+        "notes": dict(model.notes),
+        "vertices": len(model.vertices),
+        "triangles": len(model.triangles),
+        "size": [round(float(extent), 6) for extent in high - low],
+        "parts": [
+            {
+                "name": part.name,
+                "kind": part.kind,
+                "vertices": len(part.vertices),
+                "triangles": len(part.triangles),
+                "texture": part.material.texture is not None,
+            }
+            for part in model.parts
+        ],
+        "fapu": {unit: model.fapu[unit] for unit in (*UNITS, "AU")},
+        "feature_points": {
+            name: [round(float(number), 7) for number in place]
+            for name, place in zip(names(), model.points, strict=True)
+            if name not in model.missing
+        },
+        "bound": [name for name, vertex in zip(names(), model.bound, strict=True) if vertex >= 0],
+        "missing": list(model.missing),
+        "faps": sorted(model.table_of),
+        "lost": {str(number): reason for number, reason in sorted(model.lost.items())},
+        "fit": model.fit is not None,
+    }
+
+
+def print_model(model: FaceModel) -> None:
+    """The same, for people; lengths in millimetres."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from fba.face.fapu import PER_DISTANCE
+
+    console = Console(width=None if Console().is_terminal else 160, highlight=False)
+    click.echo(f"{model.name or 'face'}: {summary(model)}")
+    low, high = model.vertices.min(axis=0), model.vertices.max(axis=0)
+    click.echo(f"  size     {' x '.join(f'{extent * 1000:.0f}' for extent in high - low)} mm")
+    for key, text in model.notes.items():
+        click.echo(f"  {key:<8} {text}")
+    if model.fit is not None:
+        click.echo("  FIT      its own; unsent FAPs follow from sent ones by it")
+    bound = int((model.bound >= 0).sum())
+    click.echo(
+        f"  points   {len(model.points) - len(model.missing)} of {len(model.points)}, {bound} on a vertex"
+    )
+    if model.missing:
+        click.echo(f"  missing  {', '.join(model.missing)}")
+    for line in lost(model):
+        click.echo(f"  {line}")
+    parts = Table("part", "kind", box=None, pad_edge=False, padding=(0, 3, 0, 0))
+    for heading in ("vertices", "triangles"):
+        parts.add_column(heading, justify="right")
+    parts.add_column("surface")
+    for part in model.parts:
+        surface = "texture" if part.material.texture is not None else ""
+        surface = surface or ("colours" if part.colours is not None else "plain")
+        parts.add_row(part.name, part.kind, str(len(part.vertices)), str(len(part.triangles)), surface)
+    units = Table("FAPU", box=None, pad_edge=False, padding=(0, 3, 0, 0))
+    units.add_column("distance", justify="right")
+    units.add_column("one step", justify="right")
+    units.add_column("what it is")
+    for unit, what in UNITS.items():
+        step = model.fapu[unit]
+        units.add_row(unit, f"{step * PER_DISTANCE * 1000:.1f} mm", f"{step * 1e6:.1f} um", what)
+    for table in (parts, units):
+        console.print()
+        console.print(table)
+
+
+def findings_as_json(findings: Sequence[Finding]) -> dict[str, Any]:
+    """Counts, and every finding."""
+    errors = sum(finding.severity == "error" for finding in findings)
+    return {
+        "errors": errors,
+        "warnings": len(findings) - errors,
+        "findings": [
+            {
+                "severity": finding.severity,
+                "subject": finding.subject,
+                "rule": finding.rule,
+                "found": finding.found,
+                "expected": finding.expected,
+            }
+            for finding in findings
+        ],
+    }
+
+
+def print_findings(name: str, findings: Sequence[Finding]) -> None:
+    """A table, errors first, and a line that counts them."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    errors = [finding for finding in findings if finding.severity == "error"]
+    warnings = [finding for finding in findings if finding.severity != "error"]
+    if findings:
+        table = Table(
+            "", "about", "rule", "found", "expected", box=None, pad_edge=False, padding=(0, 2, 0, 0)
+        )
+        for finding in (*errors, *warnings):
+            style = "bold red" if finding.severity == "error" else "yellow"
+            cells = (finding.subject, finding.rule, finding.found, finding.expected)
+            table.add_row(Text(finding.severity, style=style), *map(Text, cells))
+        Console(width=None if Console().is_terminal else 160, highlight=False).print(table)
+    counts = f"{_count(len(errors), 'error')}, {_count(len(warnings), 'warning')}"
+    click.echo(f"{name}: {counts if findings else 'as the standard wants it'}")
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"

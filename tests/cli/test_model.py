@@ -1,0 +1,201 @@
+"""`fba model`: what it prints and writes, and how it fails."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fba.face import FaceModel, feature_point_names
+
+TEETH = ("9.8", "9.9", "9.10", "9.11")
+"""Teeth stay rigid: a head of another width does not stretch them."""
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def person(tmp_path: Path) -> Path:
+    """The built-in head's own points, a tenth wider, in centimetres, as an FDP file."""
+    points = FaceModel.default().points * (110.0, 100.0, 100.0)
+    lines = ["1.0 person.fdp 0 0 0 0 0 0"]
+    lines += [
+        f"  {name} {x:.7f} {y:.7f} {z:.7f}"
+        for name, (x, y, z) in zip(feature_point_names(), points, strict=True)
+    ]
+    path = tmp_path / "person.fdp"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_info_tells_parts_units_and_points(run: Run) -> None:
+    code, out, err = run("model", "info", "--default")
+    assert (code, err) == (0, "")
+    head = FaceModel.default()
+    assert f"{len(head.vertices)} vertices" in out
+    for part in head.parts:
+        assert part.name in out
+    pupils = head.points[feature_point_names().index("3.5")] - head.points[feature_point_names().index("3.6")]
+    assert f"{pupils[0] * 1000:.1f} mm" in out
+    assert "84 of 84" in out
+
+
+def test_info_as_json(run: Run) -> None:
+    code, out, _ = run("model", "info", "--default", "--json")
+    assert code == 0
+    told = json.loads(out)
+    head = FaceModel.default()
+    assert told["vertices"] == len(head.vertices)
+    assert [part["name"] for part in told["parts"]] == [part.name for part in head.parts]
+    assert told["feature_points"]["9.3"] == pytest.approx(
+        head.points[feature_point_names().index("9.3")], abs=1e-6
+    )
+    assert told["fapu"]["AU"] == 1e-5
+    assert told["faps"] == list(range(3, 69))
+
+
+def test_info_needs_one_model(run: Run, tmp_path: Path) -> None:
+    for arguments in ([], ["--default", str(tmp_path)]):
+        code, out, err = run("model", "info", *arguments)
+        assert (code, out) == (2, "")
+        assert "--default" in err
+
+
+def test_no_subcommand_shows_all(run: Run) -> None:
+    code, out, err = run("model")
+    for name in ("info", "validate", "import", "fit"):
+        assert name in out + err
+    assert code in (0, 2)
+
+
+@pytest.mark.parametrize("name", ["info", "validate", "import", "fit"])
+def test_help_shows_examples_and_debug(run: Run, name: str) -> None:
+    code, out, _ = run("model", name, "--help")
+    assert code == 0
+    assert f"fba model {name}" in out.split("Examples:")[1]
+    assert "--debug" in out
+
+
+def test_fit_writes_a_model_of_the_person(run: Run, person: Path, tmp_path: Path) -> None:
+    target = tmp_path / "person.glb"
+    code, out, err = run("model", "fit", person, "-o", target, "--tables", "carry")
+    assert (code, err) == (0, "")
+    assert out.startswith(f"{target}: ")
+    fitted, head = FaceModel.load(target), FaceModel.default()
+    soft = [row for row, name in enumerate(feature_point_names()) if name not in TEETH]
+    np.testing.assert_allclose(fitted.points[soft], head.points[soft] * (1.1, 1, 1), atol=2e-6)
+    assert fitted.name == "person"
+    assert "in cm" in fitted.notes["fitted"]
+
+
+def test_fit_takes_csv_and_a_unit(run: Run, tmp_path: Path) -> None:
+    points = FaceModel.default().points
+    rows = [
+        f"{name},{x},{y},{z}" for name, (x, y, z) in zip(feature_point_names(), points / 0.0254, strict=True)
+    ]
+    path = tmp_path / "person.csv"
+    path.write_text("point,x,y,z\n" + "\n".join(rows) + "\n")
+    target = tmp_path / "head.glb"
+    assert (
+        run("model", "fit", path, "-o", target, "--unit", "in", "--tables", "carry", "--name", "Ada")[0] == 0
+    )
+    fitted = FaceModel.load(target)
+    assert fitted.name == "Ada"
+    np.testing.assert_allclose(fitted.points, points, atol=2e-6)
+
+
+def test_fit_fails_in_one_line_and_writes_nothing(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "spot.fdp"
+    path.write_text("1.0 spot\n" + "".join(f"{name} 1 2 3\n" for name in feature_point_names()))
+    target = tmp_path / "head.glb"
+    code, out, err = run("model", "fit", path, "-o", target)
+    assert (code, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "one spot" in err
+    assert not target.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--unit", "parsec"], "parsec"),
+        (["--tables", "guess"], "guess"),
+        (["--model", "/no/such/head.glb"], "/no/such/head.glb"),
+    ],
+)
+def test_fit_bad_usage(run: Run, person: Path, tmp_path: Path, arguments: list[str], text: str) -> None:
+    code, out, err = run("model", "fit", person, "-o", tmp_path / "head.glb", *arguments)
+    assert (code, out) == (2, "")
+    assert text in err
+
+
+def test_fit_of_distances_alone(run: Run, shared: Path, tmp_path: Path) -> None:
+    """alice.fdp names vertices of a mesh that is not there, but gives distances in mm."""
+    target = tmp_path / "alice.glb"
+    code, _, err = run("model", "fit", shared / "data/xface/alice.fdp", "-o", target, "--tables", "carry")
+    assert code == 0
+    assert "only the distances" in err
+    fapu = FaceModel.load(target).fapu
+    mm = {"ES": 69, "ENS": 51, "MNS": 30, "MW": 50, "IRISD": 16}
+    assert {unit: fapu[unit] * 1024 * 1000 for unit in mm} == pytest.approx(mm, abs=0.002)
+
+
+def test_import_of_a_mesh(run: Run, shared: Path, tmp_path: Path) -> None:
+    target = tmp_path / "head.glb"
+    code, out, _ = run("model", "import", shared / "models/makehuman", "-o", target)
+    assert code == 0
+    assert out.startswith(f"{target}: ")
+    assert {part.kind for part in FaceModel.load(target).parts} >= {"skin", "eye", "teeth", "tongue"}
+
+
+def test_import_of_something_else(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "note.txt"
+    path.write_text("hello\n")
+    code, out, err = run("model", "import", path, "-o", tmp_path / "head.glb")
+    assert (code, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "note.txt" in err
+
+
+@pytest.mark.parametrize("kind", ["eyes", "eye", "=eye", "left=ear"])
+def test_import_part_needs_a_name_and_a_kind(run: Run, person: Path, tmp_path: Path, kind: str) -> None:
+    code, out, err = run("model", "import", person, "-o", tmp_path / "head.glb", "--part", kind)
+    assert (code, out) == (2, "")
+    assert "NAME=KIND" in err
+
+
+def test_validate_passes_and_fails(run: Run, tmp_path: Path) -> None:
+    """A head whose lower lip hangs 8 mm open is no neutral face."""
+    from dataclasses import replace
+
+    code, out, _ = run("model", "validate", "--default", "--only", "neutral")
+    assert code == 0, out
+    head = FaceModel.default()
+    skin = head.part("skin")
+    lower = [feature_point_names().index(name) for name in ("2.3", "2.8", "2.9")]
+    vertices, points = np.array(skin.vertices), np.array(head.points)
+    vertices[head.bound[lower] - head.starts["skin"]] -= (0, 0.008, 0)
+    points[lower] -= (0, 0.008, 0)
+    parts = tuple(replace(skin, vertices=vertices) if part is skin else part for part in head.parts)
+    path = tmp_path / "open.glb"
+    replace(head, parts=parts, points=points).save(path)
+    code, out, _ = run("model", "validate", path, "--only", "neutral")
+    assert code == 1
+    assert "8.0 mm apart" in out
+    assert f"{path}: 3 errors" in out
+    code, out, _ = run("model", "validate", path, "--only", "neutral", "--json")
+    assert code == 1
+    told = json.loads(out)
+    assert told["errors"] == 3
+    assert sum(finding["rule"] == "lips touch" for finding in told["findings"]) == 3
+
+
+def test_validate_checks_every_fap(run: Run) -> None:
+    code, out, err = run("model", "validate", "--default", "--json")
+    assert err == ""
+    told = json.loads(out)
+    assert told["errors"] == 0, told["findings"]
+    assert code == 0
