@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
+from fba.face.importers.looks import with_looks
 from fba.face.importers.pieces import Piece, assembled, moved
 from fba.face.importers.units import metres_per_unit, pupil_distance
 from fba.face.importers.winding import outward
@@ -72,6 +73,7 @@ def finished(
     eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
     parts, over = outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
     placed = (points - origin) * size
+    parts = with_looks(parts, placed)
     bound = bound_by_number(parts, vertices)
     everything = np.concatenate([piece.part.vertices for piece in parts]).astype(np.float64)
     placed[bound >= 0] = everything[bound[bound >= 0]]

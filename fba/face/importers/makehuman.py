@@ -1,15 +1,15 @@
 """MakeHuman's base mesh: the head and neck of it, with eyes, teeth, tongue, lashes and feature points.
 
 Users point it at a copy of their own (the files are CC0). `makehuman.csv` says which vertices of the base
-mesh "hm08" are the feature points, `makehuman_cuts.csv` where head and neck end and where the sockets
-behind the eyeballs are cut off. The base mesh is in decimetres, +x the subject's left, +y up, +z forward.
+mesh "hm08" are the feature points, `makehuman_cuts.csv` where head and neck end, where the sockets
+behind the eyeballs are cut off and where the inside of the mouth begins. The base mesh is in decimetres, +x the subject's left, +y up, +z forward.
 """
 
 from __future__ import annotations
 
 import csv
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -20,6 +20,7 @@ import numpy.typing as npt
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
 from fba.face.importers.files import beside, whole
+from fba.face.importers.looks import LOOKS
 from fba.face.importers.mhclo import fitted
 from fba.face.importers.obj import read_obj
 from fba.face.importers.polygons import Polygons, Source, make_part
@@ -34,25 +35,19 @@ METRES = 0.1
 """Metres per unit of the base mesh."""
 VERTICES = 19158
 """How many vertices the base mesh hm08 has."""
-CROWN = 881
-"""A vertex of the head, from which the head is what is reached without crossing a cut."""
+CROWN, PALATE = 881, 656
+"""Vertices of the head and of the inside of the mouth."""
 EYES = "high-poly.mhclo"
 """The eyes that are fitted where they lie beside the base mesh; else its helper eyes are taken."""
 
-SKIN = Material("skin", (0.71, 0.47, 0.36), 0.55)
-TEETH = Material("teeth", (0.83, 0.80, 0.72), 0.25)
-TONGUE = Material("tongue", (0.55, 0.16, 0.15), 0.4)
-LASHES = Material("lashes", (0.02, 0.015, 0.01), 0.8)
-WHITE = Material("eye", (0.80, 0.78, 0.75), 0.1)
-
 HELPERS = (
-    ("upper teeth", "teeth", ("helper-upper-teeth",), TEETH),
-    ("lower teeth", "teeth", ("helper-lower-teeth",), TEETH),
-    ("tongue", "tongue", ("helper-tongue",), TONGUE),
-    ("left lashes", "lash", ("helper-l-eyelashes-1", "helper-l-eyelashes-2"), LASHES),
-    ("right lashes", "lash", ("helper-r-eyelashes-1", "helper-r-eyelashes-2"), LASHES),
+    ("upper teeth", "teeth", ("helper-upper-teeth",)),
+    ("lower teeth", "teeth", ("helper-lower-teeth",)),
+    ("tongue", "tongue", ("helper-tongue",)),
+    ("left lashes", "lash", ("helper-l-eyelashes-1", "helper-l-eyelashes-2")),
+    ("right lashes", "lash", ("helper-r-eyelashes-1", "helper-r-eyelashes-2")),
 )
-"""Name, kind, groups of the base mesh, material."""
+"""Name, kind, groups of the base mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,11 +94,11 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
             f"{VERTICES}" + (f", no group {missing[0]!r}" if missing else "") + "; import another OBJ file "
             "with kind='obj' and its feature points"
         )
-    sources = [make_part(base, _head(base), "skin", "skin", scale=METRES, material=SKIN)]
+    sources = [_skin(base)]
     sources += _eyes(file, base)
-    for name, kind, groups, material in HELPERS:
+    for name, kind, groups in HELPERS:
         faces = np.any([_group(base, group) for group in groups], axis=0)
-        sources.append(make_part(base, faces, name, kind, scale=METRES, material=material))
+        sources.append(make_part(base, faces, name, kind, scale=METRES, material=LOOKS[kind]))
     points, bound = _feature_points(base, sources)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
     shift = -pupils.mean(axis=0)
@@ -137,8 +132,12 @@ def _group(base: Polygons, name: str) -> Bool:
     return np.isin(base.group, wanted)
 
 
-def _head(base: Polygons) -> Bool:
-    """Faces of the body reached from the crown without crossing a loop of `makehuman_cuts.csv`."""
+def _head(base: Polygons) -> tuple[Bool, Bool]:
+    """Faces of the body that are the head, and among them those of the inside of the mouth.
+
+    Head is what is reached from the crown, mouth what is reached from the palate, without crossing a
+    loop of `makehuman_cuts.csv`.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -155,18 +154,30 @@ def _head(base: Polygons) -> Bool:
         b = np.roll(a, -1)
         walls.append(np.minimum(a, b) << 32 | np.maximum(a, b))
     open_edges = ~np.isin(edge, np.concatenate(walls))
-    edge, face = edge[open_edges], face[open_edges]
+    edge, of_edge = edge[open_edges], face[open_edges]
     order = np.argsort(edge, kind="stable")
-    edge, face = edge[order], face[order]
+    edge, of_edge = edge[order], of_edge[order]
     shared = np.flatnonzero(edge[1:] == edge[:-1])
-    links = (np.ones(len(shared)), (face[shared], face[shared + 1]))
+    links = (np.ones(len(shared)), (of_edge[shared], of_edge[shared + 1]))
     _, label = connected_components(coo_array(links, shape=(len(body), len(body))), directed=False)
-    crown = np.flatnonzero((base.corners[starts[:, None] + np.arange(3)] == CROWN).any(axis=1))
-    if not len(crown):
-        raise ModelError("the base mesh has no crown of the head; is it damaged?")
-    chosen = np.zeros(len(base), dtype=np.bool_)
-    chosen[body[label == label[crown[0]]]] = True
-    return chosen
+    found = []
+    for start in (CROWN, PALATE):
+        around = face[first == start]
+        if not len(around):
+            raise ModelError(f"the base mesh has no faces around vertex {start} of its head; is it damaged?")
+        chosen = np.zeros(len(base), dtype=np.bool_)
+        chosen[body[label == label[around[0]]]] = True
+        found.append(chosen)
+    return found[0] | found[1], found[1]
+
+
+def _skin(base: Polygons) -> Source:
+    """The skin, darker and redder inside the mouth."""
+    head, mouth = _head(base)
+    colours = np.tile(np.array([*LOOKS["skin"].colour, 0.4], dtype=np.float32), (len(base.vertices), 1))
+    colours[base.used(mouth)] = (*LOOKS["mouth"].colour, 0.6)
+    painted = replace(base, colours=colours)
+    return make_part(painted, head, "skin", "skin", scale=METRES, material=LOOKS["skin"])
 
 
 def _eyes(file: Path, base: Polygons) -> list[Source]:
@@ -174,7 +185,9 @@ def _eyes(file: Path, base: Polygons) -> list[Source]:
     clothes = beside(file, EYES)
     if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
-        return [make_part(base, _group(base, g), n, "eye", scale=METRES, material=WHITE) for n, g in sides]
+        return [
+            make_part(base, _group(base, g), n, "eye", scale=METRES, material=LOOKS["eye"]) for n, g in sides
+        ]
     return eye_pieces(clothes, base.vertices)
 
 
@@ -182,7 +195,7 @@ def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
     """Left and right eyeball of the eyes in an .mhclo file, fitted to a base mesh (V, 3)."""
     eyes = fitted(clothes, base)
     picture = beside(clothes, "brown_eye.png")
-    material = Material("eye", (1.0, 1.0, 1.0), 0.1, whole(picture)) if picture is not None else WHITE
+    material = Material("eye", (1.0, 1.0, 1.0), 0.1, whole(picture)) if picture is not None else LOOKS["eye"]
     sources = []
     for name, side in (("left eye", 1.0), ("right eye", -1.0)):
         source = make_part(eyes, _eyeball(eyes, side), name, "eye", scale=METRES, material=material)
