@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from player.camera import Camera, Subject
+    from player.contact_sheet import contact_sheet
     from player.offscreen import Offscreen
     from player.recording import record, render
     from player.renderer import Renderer
@@ -31,6 +32,7 @@ _PLACES = {
     "Subject": "player.camera",
     "Timeline": "player.timeline",
     "Transport": "player.transport",
+    "contact_sheet": "player.contact_sheet",
     "default_camera": "player.scene",
     "play": "player.window",
     "record": "player.recording",
@@ -45,6 +47,7 @@ __all__ = [
     "Subject",
     "Timeline",
     "Transport",
+    "contact_sheet",
     "default_camera",
     "play",
     "record",

@@ -91,9 +91,7 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED).astype(int))]
     unit = model.fapu.IRISD
     lids = tuple(int(model.bound[point_row(name)]) for name in LIDS[side])
-    return Eyeball(
-        side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit
-    )
+    return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)
 
 
 def _sphere(points: Float64) -> tuple[Float64, float]:

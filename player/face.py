@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,7 +63,7 @@ class FaceFigure:
         }
         self._eyeballs: list[tuple[Part, Eyeball]] = []
         self._shapes: dict[str, FaceShape] = {}
-        sways = sway(model)
+        self._sway = sways = sway(model)
         for part in model.parts:
             ball = find_eyeball(part, model) if part.kind == "eye" else None
             if ball is None:
@@ -81,7 +81,8 @@ class FaceFigure:
     def between_eyes(self) -> Float64:
         """(3,) the point between the pupils, metres, in the frame of the model."""
         eyes = [self.model.points[point_row(name)] for name in ("3.5", "3.6")]
-        return np.mean(eyes, axis=0)
+        middle: Float64 = np.mean(eyes, axis=0)
+        return middle
 
     @cached_property
     def subject(self) -> Subject:
@@ -107,16 +108,20 @@ class FaceFigure:
             self._pose = Pose(faps.copy(), positions, normals, self.deformer.head_matrices(faps))
         return self._pose
 
-    def meshes(self, faps: Float32, matrix: Float64, *, on_body: bool = False) -> list[FaceMesh]:
+    def meshes(
+        self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()
+    ) -> list[FaceMesh]:
         """The parts for FAPs (68,), put into the world by matrix (4, 4).
 
-        on_body: without the lower neck and shoulders.
+        on_body: without the lower neck and shoulders. without: kinds of parts that are left out.
         """
         pose = self.pose(faps)
         light = self._light(pose, matrix)
         axis = rotation_vector(pose.turn[:3, :3])
         found = []
         for name, shape in (self._on_body() if on_body else self._shapes).items():
+            if self.model.part(name).kind in without:
+                continue
             rows = self._ranges[name]
             arrays = pose.positions[rows], pose.normals[rows], light[rows]
             found.append(FaceMesh(shape, *arrays, matrix, axis, self._centre))
@@ -141,10 +146,8 @@ class FaceFigure:
         if not self._cut:
             for name, shape in self._shapes.items():
                 kept = (shape.sway[shape.triangles] > CUT).all(axis=1)
-                self._cut[name] = FaceShape(
-                    np.ascontiguousarray(shape.triangles[kept]), shape.colours, np.ones_like(shape.sway),
-                    shape.texcoords, shape.picture, shape.scatter, shape.fine, shape.two_sided,
-                )  # fmt: skip
+                if kept.any():
+                    self._cut[name] = replace(shape, triangles=np.ascontiguousarray(shape.triangles[kept]))
         return self._cut
 
     def _light(self, pose: Pose, matrix: Float64) -> Float32:
@@ -167,21 +170,34 @@ class FaceFigure:
         return float(np.clip((gap - self._gaps[0]) / max(self._gaps[1] - self._gaps[0], 1e-6), 0.0, 1.0))
 
     def _baked(self) -> tuple[Visibility, Visibility]:
+        """What reaches the vertices with the mouth shut, and open."""
         solid = [part for part in self.model.parts if part.kind not in ("brow", "lash")]
-        triangles = np.concatenate([part.triangles + self.model.starts[part.name] for part in solid])
-        found, self._gaps = [], [0.0, 0.0]
-        for number, sent in enumerate(({}, MOUTH_OPEN)):
-            faps = np.zeros(68, dtype=np.float32)
-            for fap, value in sent.items():
-                faps[fap - 1] = value
-            pose = self.pose(faps)
-            found.append(
-                bake(pose.positions, pose.normals, np.ascontiguousarray(triangles, dtype=np.int32))
-            )
-            if self._lips is not None:
-                upper, lower = pose.positions[self._lips]
-                self._gaps[number] = float(np.linalg.norm(upper - lower))
-        return found[0], found[1]
+        joined = [part.triangles + self.model.starts[part.name] for part in solid]
+        triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
+        pose = self.pose(np.zeros(68, dtype=np.float32))
+        shut = bake(pose.positions, pose.normals, triangles, self._sway > 0.05)
+        self._gaps = [0.0, 0.0]
+        if self._lips is None:
+            return shut, shut
+        faps = np.zeros(68, dtype=np.float32)
+        for fap, value in MOUTH_OPEN.items():
+            faps[fap - 1] = value
+        moved = self.pose(faps)
+        for number, positions in enumerate((pose.positions, moved.positions)):
+            upper, lower = positions[self._lips]
+            self._gaps[number] = float(np.linalg.norm(upper - lower))
+        near = self._near_mouth(pose.positions)
+        wide = bake(moved.positions, moved.normals, triangles, near)
+        arrays = []
+        for before, after in zip(shut.arrays, wide.arrays, strict=True):
+            arrays.append(np.where(near[:, None] if before.ndim == 2 else near, after, before))
+        return shut, Visibility(*arrays)
+
+    def _near_mouth(self, positions: Float32) -> npt.NDArray[np.bool_]:
+        """(V,) vertices within half the height of the lower face of the mouth."""
+        assert self._lips is not None
+        away = np.linalg.norm(positions - positions[self._lips].mean(axis=0), axis=1)
+        return np.asarray(away < 1.1 * self.model.fapu.ENS * 1024)
 
 
 def sway(model: FaceModel) -> Float32:
@@ -196,15 +212,15 @@ def sway(model: FaceModel) -> Float32:
     along = np.clip((z - lobe[2]) / max(chin[2] - lobe[2], 1e-6), 0.0, 1.0)
     border = lobe[1] + (chin[1] - 0.12 * reach - lobe[1]) * along
     share = np.clip(1 - (border - y) / reach, 0.0, 1.0)
-    return (share * share * (3 - 2 * share)).astype(np.float32)
+    smooth: Float32 = (share * share * (3 - 2 * share)).astype(np.float32)
+    return smooth
 
 
 def _known(model: FaceModel, names: Sequence[str]) -> Float64 | None:
-    """Middle of those feature points that the face has, or None."""
+    """Middle of the first two of those feature points that the face has, or None."""
     places = np.array([model.points[point_row(name)] for name in names])
-    known = places[np.isfinite(places).all(axis=1)]
-    middle: Float64 = known[:2].mean(axis=0)
-    return middle if len(known) else None
+    known = places[np.isfinite(places).all(axis=1)][:2]
+    return np.asarray(known.mean(axis=0)) if len(known) else None
 
 
 def _head_centre(model: FaceModel) -> Float64:

@@ -13,7 +13,6 @@ MOST_SHAPES = 64
 """Parts remembered on the graphics card; the longest unused goes first."""
 
 
-
 class FaceRenderer:
     """Draws face meshes with the program "face", whose uniforms of camera and eye are already set.
 

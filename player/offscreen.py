@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.parameters import FAP_COUNT
 from player.camera import Camera
 from player.context import offscreen_context
 from player.renderer import Renderer
 from player.scene import Scene
+from player.shapes import View
 from player.target import Target
 
 UInt8 = npt.NDArray[np.uint8]
@@ -70,14 +72,27 @@ class Offscreen:
 
     def draw(self, time: float) -> UInt8:
         """Like `frame`, into memory that the next call overwrites."""
+        if self._target is None:
+            raise ValueError("this Offscreen is closed")
+        return self._drawn(self.scene.at(time), following(self.camera, self.scene, time))
+
+    def still(self, faps: npt.ArrayLike) -> UInt8:
+        """A picture of the face for FAPs (68,) as `fba.face.resolve` gives them: uint8 (H, W, 4).
+
+        `camera` may be set in between. Raises ValueError for another shape, or after `close`.
+        """
+        values = np.asarray(faps, dtype=np.float32)
+        if values.shape != (FAP_COUNT,):
+            raise ValueError(f"FAPs must have shape ({FAP_COUNT},), not {values.shape}")
+        return self._drawn(self.scene.still(values), self.camera).copy()
+
+    def _drawn(self, view: View, camera: Camera) -> UInt8:
         if self._target is None or self._renderer is None:
             raise ValueError("this Offscreen is closed")
-        view = self.scene.at(time)
-        camera = following(self.camera, self.scene, time)
         with self._gl:
             self._target.begin()
-            self._renderer.draw(view, camera, self.size)
-            self._target.finish().read_into(self._buffer, components=4)
+            within = self._renderer.draw(view, camera, self.size)
+            self._target.finish(within=within).read_into(self._buffer, components=4)
         width, height = self.size
         return np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)[::-1]
 

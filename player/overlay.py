@@ -96,7 +96,7 @@ def bar_picture(controls: Controls) -> Image:
         draw.rounded_rectangle((low, middle - half, at, middle + half), radius=half, fill=ACCENT)
     knob = 6.5 * scale
     draw.ellipse((at - knob, middle - knob, at + knob, middle + knob), fill=TEXT)
-    font = _font(13 * scale)
+    font = label_font(13 * scale)
     line = 28 * scale
     state = "playing" if transport.playing else "paused"
     draw.text((low, line), f"{state}   {transport.text()}", font=font, fill=TEXT)
@@ -112,7 +112,7 @@ def help_picture(scale: float) -> Image:
     """The help panel."""
     from PIL import Image, ImageDraw
 
-    font, row = _font(15 * scale), 25 * scale
+    font, row = label_font(15 * scale), 25 * scale
     width, height = round(470 * scale), round((len(HELP) + 1) * row + 26 * scale)
     picture = Image.new("RGBA", (width, height), (0, 0, 0, 0))
     draw = ImageDraw.Draw(picture)
@@ -129,7 +129,7 @@ def help_picture(scale: float) -> Image:
 _FONTS: dict[int, FreeTypeFont | ImageFont] = {}
 
 
-def _font(size: float) -> FreeTypeFont | ImageFont:
+def label_font(size: float) -> FreeTypeFont | ImageFont:
     """Pillow's own font: the same on every machine."""
     from PIL import ImageFont
 

@@ -11,6 +11,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaError, RangeError, UnsupportedError
 from player.camera import Camera
@@ -20,11 +23,13 @@ from player.scene import Scene
 Progress = Callable[[int, int], None]
 PathLike = str | os.PathLike[str]
 
-SUFFIXES = (".mp4", ".png")
+PICTURES = (".png", ".jpg", ".jpeg")
+SUFFIXES = (".mp4", *PICTURES)
 SMOOTH_RATES = (Fraction(10), Fraction(120))
 """A film's own rate lies between these where none is asked for."""
 MOST_FRAMES = 1_000_000
 """A longer film is refused: its times are damaged, or a part of it was meant."""
+JPEG_QUALITY = 90
 QUALITY = "18"
 """H.264 constant rate factor."""
 
@@ -42,7 +47,8 @@ def render(
     end: float | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Draw an animation into a file without a window; the suffix decides: .png one picture, .mp4 a film.
+    """Draw an animation into a file without a window; the suffix decides: .png or .jpg one picture, .mp4 a
+    film.
 
     size: width and height in pixels. camera: a `Camera`, "front", "three-quarter", "profile", "body", or
     None for the one that suits the content. For a picture: frame, its position in the animation
@@ -55,11 +61,7 @@ def render(
     """
     target = Path(path)
     suffix = target.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise UnsupportedError(
-            f"{target}: pictures are written as .png and films as .mp4, not as {suffix or 'a bare name'}",
-            what=f"rendering to {suffix or 'no suffix'}",
-        )
+    _check_suffix(target, SUFFIXES)
     scene = animation if isinstance(animation, Scene) else Scene(animation)
     if suffix == ".mp4":
         if frame is not None or time is not None:
@@ -72,13 +74,39 @@ def render(
     if fps is not None or end is not None or (start is not None and time is not None):
         raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
     at = _moment(scene, frame, time if time is not None else start)
-    with Offscreen(scene, size, camera) as offscreen, written(target) as temporary:
-        from PIL import Image
-
-        Image.fromarray(offscreen.frame(at)).convert("RGB").save(temporary, format="PNG")
+    with Offscreen(scene, size, camera) as offscreen:
+        write_picture(target, offscreen.frame(at))
     if progress is not None:
         progress(1, 1)
     return target
+
+
+def write_picture(path: PathLike, pixels: npt.NDArray[np.uint8]) -> Path:
+    """Write pixels, uint8 (H, W, 3 or 4), as .png or .jpg, whole or not at all; returns the path.
+
+    Raises UnsupportedError for another suffix, OSError where it cannot be written.
+    """
+    from PIL import Image
+
+    target = Path(path)
+    _check_suffix(target, PICTURES)
+    with written(target) as temporary:
+        picture = Image.fromarray(pixels).convert("RGB")
+        if target.suffix.lower() == ".png":
+            picture.save(temporary, format="PNG")
+        else:
+            picture.save(temporary, format="JPEG", quality=JPEG_QUALITY)
+    return target
+
+
+def _check_suffix(target: Path, suffixes: tuple[str, ...]) -> None:
+    suffix = target.suffix.lower()
+    if suffix not in suffixes:
+        films = " and films as .mp4" if ".mp4" in suffixes else ""
+        raise UnsupportedError(
+            f"{target}: pictures are written as .png or .jpg{films}, not as {suffix or 'a bare name'}",
+            what=f"rendering to {suffix or 'no suffix'}",
+        )
 
 
 def record(

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from player.camera import Camera
+from player.extent import Rectangle, filled
 from player.face_renderer import FaceRenderer
 from player.primitives import capsule_mesh, sphere_mesh
 from player.programs import load_program, matrix_bytes, set_uniform
@@ -35,7 +36,8 @@ class Renderer:
     def __init__(self, context: Any) -> None:
         self._gl = context
         self._programs = {
-            name: load_program(context, name) for name in ("mesh", "capsule", "eye", "studio", "shadow", "face")
+            name: load_program(context, name)
+            for name in ("mesh", "capsule", "eye", "studio", "shadow", "face")
         }
         self._faces = FaceRenderer(context, self._programs["face"])
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
@@ -62,8 +64,11 @@ class Renderer:
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
-    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> None:
-        """Clear the bound framebuffer and draw the view; size: its width and height in pixels."""
+    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> list[Rectangle]:
+        """Clear the bound framebuffer and draw the view; size: its width and height in pixels.
+
+        Returns where the picture is not backdrop: rectangles of left, bottom, width, height.
+        """
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
         matrix = camera.projection_matrix(aspect) @ camera.view_matrix()
@@ -84,6 +89,7 @@ class Renderer:
         for ball in view.eyes:
             self._draw_eye(ball)
         self._faces.draw(view.faces)
+        return filled(view, matrix, size)
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""

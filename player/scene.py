@@ -16,15 +16,13 @@ from player.timeline import Timeline
 if TYPE_CHECKING:
     from fba.face.model import FaceModel
     from player.face import FaceFigure
-    from player.head import Head
-    from player.head.drawing import Drawing
     from player.mannequin import Mannequin
+    from player.point_view import PointView
 
 Float64 = npt.NDArray[np.float64]
 
 HEAD_ON_BODY = np.array([0.0, 1.628, 0.077])
 """Where the point between the pupils lies in the default posture of the default skeleton."""
-FACE_SUBJECT = Subject((0.0, -0.012, -0.070), 0.165, 0.14)
 BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
 SAMPLES = 48
 """Moments at which the extent of a moving body is looked up to fit the camera."""
@@ -40,10 +38,10 @@ LOOKS = ("figure", "points")
 class Scene:
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
-    animation: at least one frame, else ValueError. model: the face, by default the built-in head. axes: name of the body's axis convention
-    (`fba.body.convention_names()`). view: "figure", a person, or "points", the face as its 84 feature
-    points with lines through them and the body as its bones; it may be set at any time, ValueError where
-    it is something else. Nothing is worked out before it is asked for.
+    animation: at least one frame, else ValueError. model: the face, by default the built-in head. axes:
+    name of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or
+    "points", the face as its feature points with lines through them and the body as its bones; it may be
+    set at any time, ValueError where it is something else. What is drawn is worked out on first use.
     """
 
     def __init__(
@@ -57,12 +55,11 @@ class Scene:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
         self.animation = animation
-        self.timeline = Timeline(animation, model)
-        self.model = model
+        self.model = model or _default_model()
+        self.timeline = Timeline(animation, self.model)
         self.view = view
         self._figure: FaceFigure | None = None
-        self._head: Head | None = None
-        self._drawing: Drawing | None = None
+        self._point_view: PointView | None = None
         self._mannequin: Mannequin | None = None
         self._subject: Subject | None = None
         self._follow = False
@@ -93,22 +90,13 @@ class Scene:
         self._view = name
 
     @property
-    def figure(self) -> FaceFigure | None:
+    def figure(self) -> FaceFigure:
         """The face that is shown; built on first use."""
-        if self._figure is None and self.model is not None:
+        if self._figure is None:
             from player.face import FaceFigure
 
             self._figure = FaceFigure(self.model)
         return self._figure
-
-    @property
-    def head(self) -> Head:
-        """The head that is shown; built on first use."""
-        if self._head is None:
-            from player.head import Head
-
-            self._head = Head.default()
-        return self._head
 
     @property
     def has_body(self) -> bool:
@@ -134,7 +122,7 @@ class Scene:
     def subject(self) -> Subject:
         """What a camera is to have in view over the whole performance."""
         if self._subject is None:
-            self._subject = self._extent() if self.has_body else self._face_subject
+            self._subject = self._extent() if self.has_body else self.figure.subject
         return self._subject
 
     @property
@@ -151,16 +139,13 @@ class Scene:
     @property
     def face_subject(self) -> Subject:
         """The head alone, where the performance begins."""
-        face = self._face_subject
+        face = self.figure.subject
         if not self.has_body:
             return face
-        matrix = self._head_matrix(*self._posed(float(self.start)))
+        faps, joints = self._posed(float(self.start))
+        matrix = self._face_matrix(joints) @ self.figure.pose(faps).turn
         x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3]
         return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
-
-    @property
-    def _face_subject(self) -> Subject:
-        return FACE_SUBJECT if self.figure is None else self.figure.subject
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """A camera that has everything in view: the named preset, or the one that suits the content.
@@ -173,39 +158,23 @@ class Scene:
         whole = self.has_body and preset == "body"
         return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
 
+    def still(self, faps: npt.NDArray[np.float32]) -> View:
+        """The face for FAPs (68,) as they are shown, in the body's posture at the start."""
+        return self._shown(faps, self._posed(float(self.start))[1])
+
     def at(self, time: float) -> View:
         """Everything to be drawn at a time in seconds; before the start or after the end, its frames.
 
         Raises ValueError for a time that is not finite.
         """
-        faps, joints = self._posed(time)
+        return self._shown(*self._posed(time))
+
+    def _shown(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
         if self._view == "points":
             return self._points(faps, joints)
-        if self.figure is not None:
-            return self._figured(self.figure, faps, joints)
-        if joints is None:
-            matrix = self._head_matrix(faps, None)
-            return View(
-                meshes=self.head.meshes(faps, matrix, bust=np.eye(4)), eyes=self.head.eyes(faps, matrix)
-            )
-        assert self._mannequin is not None
-        matrix = self._head_matrix(faps, joints)
-        capsules = self._mannequin.capsules(joints)
-        return View(
-            meshes=[*self.head.meshes(faps, matrix), self._torso.mesh(joints)],
-            capsules=capsules,
-            eyes=self.head.eyes(faps, matrix),
-            blobs=_shadows(joints, self._skeleton.names),
-            ground=True,
-        )
-
-    def _figured(self, figure: FaceFigure, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
-        """The face, on a body where there is one."""
+        figure, matrix = self.figure, self._face_matrix(joints)
         if joints is None or self._mannequin is None:
-            matrix = np.eye(4)
             return View(eyes=figure.eyes(faps, matrix), faces=figure.meshes(faps, matrix))
-        placed = HEAD_ON_BODY - self._skull_centre
-        matrix = joints[self._skull] @ translation(placed) @ translation(-figure.between_eyes)
         return View(
             meshes=[self._torso.mesh(joints)],
             capsules=self._mannequin.capsules(joints),
@@ -217,20 +186,21 @@ class Scene:
 
     def _points(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
         """The view as feature points and bones."""
-        if self._drawing is None:
-            from player.head.drawing import Drawing
+        if self._point_view is None:
+            from player.point_view import PointView
 
-            self._drawing = Drawing(self.head)
-        drawing, matrix = self._drawing, self._head_matrix(faps, joints)
-        marks, eyeballs = drawing.marks(faps, matrix), drawing.eyeballs(faps, matrix)
-        if joints is None:
-            return View(drawing.meshes(faps, matrix, bust=np.eye(4)), eyeballs, marks)
+            self._point_view = PointView(self.figure)
+        shown, matrix = self._point_view, self._face_matrix(joints)
+        capsules = shown.eyeballs(faps, matrix)
+        if joints is not None:
+            capsules = np.concatenate([capsules, self._bones.capsules(joints)])
         return View(
-            drawing.meshes(faps, matrix),
-            np.concatenate([eyeballs, self._bones.capsules(joints)]),
-            marks,
-            blobs=_shadows(joints, self._skeleton.names),
-            ground=True,
+            meshes=shown.meshes(faps, matrix),
+            capsules=capsules,
+            marks=shown.marks(faps, matrix),
+            faces=shown.ghost(faps, matrix, on_body=joints is not None),
+            blobs=np.zeros((0, 4), np.float32) if joints is None else _shadows(joints, self._skeleton.names),
+            ground=joints is not None,
         )
 
     def travel(self, time: float) -> tuple[float, float, float]:
@@ -249,23 +219,13 @@ class Scene:
             return faps, None
         return faps, self._solver.pose(self.timeline.baps(time))
 
-    def _head_matrix(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> Float64:
-        """Frame of the head (origin between the pupils) into the world."""
-        if self.figure is not None:
-            turned = self.figure.pose(faps).turn
-            if joints is None:
-                return turned
-            moved = translation(HEAD_ON_BODY - self._skull_centre) @ translation(-self.figure.between_eyes)
-            on_skull: Float64 = joints[self._skull] @ moved @ turned
-            return on_skull
-        face = self.head.face
-        turn = np.eye(4)
-        turn[:3, :3] = face.head_rotation(faps)
-        own: Float64 = translation(face.head_centre) @ turn @ translation(-face.head_centre)
+    def _face_matrix(self, joints: Float64 | None) -> Float64:
+        """Frame of the face model, without the head's own turn, into the world."""
         if joints is None:
-            return own
-        on_body: Float64 = joints[self._skull] @ translation(HEAD_ON_BODY - self._skull_centre) @ own
-        return on_body
+            return np.eye(4)
+        offset = HEAD_ON_BODY - self._skull_centre - self.figure.between_eyes
+        placed: Float64 = joints[self._skull] @ translation(offset)
+        return placed
 
     def _extent(self) -> Subject:
         frames = self.timeline.frames
@@ -289,6 +249,12 @@ class Scene:
         return Subject(
             (x, y, z), max(float(high[1] - low[1]) / 2 * 1.06, 0.9), max(wide, BODY_SUBJECT.half_width)
         )
+
+
+def _default_model() -> FaceModel:
+    from fba.face.model import FaceModel
+
+    return FaceModel.default()
 
 
 def _aside(low: Float64, high: Float64) -> Float64:

@@ -6,6 +6,7 @@ and a pass that smooths the finished picture's edges.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -72,8 +73,10 @@ class Target:
         """Bind it for drawing."""
         self._drawn.use()
 
-    def finish(self, into: Any = None) -> Any:
+    def finish(self, into: Any = None, within: Sequence[tuple[int, int, int, int]] | None = None) -> Any:
         """The framebuffer that now holds the picture: one of its own, or, with samples = 0, `into`.
+
+        within: left, bottom, width and height of the parts whose edges are to be smoothed; all by default.
 
         `into` may be a window's framebuffer: its size is taken to be that of this target, as moderngl does
         not notice that a window was resized.
@@ -82,11 +85,18 @@ class Target:
             self._gl.copy_framebuffer(self._result, self._drawn)
             return self._result
         result = self._result if into is None else into
+        whole = (0, 0, *self.size)
+        parts = [whole] if within is None else within
+        if whole not in parts:
+            self._gl.copy_framebuffer(result, self._drawn)
         result.use()
-        self._gl.viewport = (0, 0, *self.size)
+        self._gl.viewport = whole
         self._gl.enable_only(self._gl.NOTHING)
         self._colour.use(0)
-        self._pass.render()
+        for part in parts:
+            self._gl.scissor = part
+            self._pass.render()
+        self._gl.scissor = None
         return result
 
     def close(self) -> None:

@@ -211,8 +211,8 @@ class Window:
         time = self.transport.time
         camera = following(controls.camera, self.scene, time)
         self._target.begin()
-        self._renderer.draw(self.scene.at(time), camera, size)
-        self._target.finish(self._gl.screen)
+        within = self._renderer.draw(self.scene.at(time), camera, size)
+        self._target.finish(self._gl.screen, within)
         self._gl.screen.use()
         self._gl.viewport = (0, 0, *size)
         self._overlay.draw(controls)

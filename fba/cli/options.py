@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from fba.animation import Animation
+
+if TYPE_CHECKING:
+    from fba.face.model import FaceModel
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -76,6 +79,24 @@ def bap_steps_option(command: Command) -> Command:
         show_default=True,
         help="Table of BAP quantiser steps: the standard's, or one vendor's. Streams do not say which.",
     )(command)
+
+
+def model_option(command: Command) -> Command:
+    return click.option(
+        "--model",
+        type=click.Path(exists=True, path_type=Path),
+        metavar="FILE",
+        help="The face: a .glb of this project, or another that can be imported. Default: the built-in head.",
+    )(command)
+
+
+def read_model(path: Path | None) -> FaceModel | None:
+    """The face of `--model`, or None for the built-in one."""
+    if path is None:
+        return None
+    from fba.face.model import FaceModel
+
+    return FaceModel.load(path)
 
 
 def camera_option(command: Command) -> Command:

@@ -24,6 +24,7 @@ from fba.cli import options
 )
 @click.option("--loop", is_flag=True, help="Start again at the end.")
 @click.option("--size", type=options.SizeType(), default="1280x720", show_default=True, metavar="WxH")
+@options.model_option
 @options.camera_option
 @options.view_option
 @options.axes_option
@@ -35,6 +36,7 @@ def command(
     speed: float,
     loop: bool,
     size: tuple[int, int],
+    model: Path | None,
     camera: str | None,
     view: str,
     axes: str,
@@ -48,5 +50,5 @@ def command(
     import player
 
     animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage)
-    scene = player.Scene(animation, axes=axes, view=view)
+    scene = player.Scene(animation, options.read_model(model), axes=axes, view=view)
     player.play(scene, size=size, speed=speed, loop=loop, camera=camera, title=file.name)

@@ -25,6 +25,6 @@ void main() {
         opaque = texel.a;
     }
     vec3 n = normalize(gl_FrontFacing ? normal : -normal);
-    vec3 shown = surface(place, n, n, albedo, colour.a, light, scatter);
+    vec3 shown = surface(normalize(eye - place), n, n, albedo, colour.a, light, scatter);
     pixel = vec4(encode(shown), opaque);
 }

@@ -11,14 +11,11 @@ const vec3 RIM = vec3(0.80, 0.86, 0.95);
 const vec3 SKY = vec3(0.44, 0.46, 0.50);
 const vec3 FLOOR = vec3(0.17, 0.15, 0.14);
 
-// Linear light to sRGB, by roots: within 1/500 of the curve, at a fraction of the cost of pow.
+// Linear light to sRGB: highlights roll off, then a curve within 1/170 of the standard's, by one root.
 vec3 encode(vec3 linear) {
     vec3 light = max(linear, 0.0);
-    vec3 toned = light * (1.0 + light * 0.06) / (1.0 + light * 0.5);   // highlights roll off
-    vec3 root = sqrt(toned);
-    vec3 fourth = sqrt(root);
-    vec3 curve = 0.662002687 * root + 0.684122060 * fourth - 0.323583601 * sqrt(fourth) - 0.0225411470 * toned;
-    return max(curve, 0.0);
+    vec3 toned = light * (1.0 + light * 0.06) / (1.0 + light * 0.5);
+    return max(1.23460 * sqrt(toned) - 0.21734 * toned - 0.02316, 0.0);
 }
 
 float power(float x, int doublings) {
@@ -49,50 +46,48 @@ vec3 decode(vec3 code) {
     return code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
 }
 
-// A lobe of light mirrored by a rough surface (GGX), without the Fresnel term. Large lights widen it.
-float lobe(float rough, float nh, float nl, float nv) {
-    float a = rough * rough;
-    float a2 = a * a;
-    float d = nh * nh * (a2 - 1.0) + 1.0;
-    float k = 0.5 * a;
-    float visible = (nl * (1.0 - k) + k) * (nv * (1.0 - k) + k);
-    return a2 / (12.566 * d * d * visible);
+// What a surface that mirrors (GGX, Kelemen's visibility) sends of a light. nv, nl, vl: cosines between
+// normal, view and light; sharp, soft: squares of the two lobes' widths.
+float mirrored(float nv, float nl, float vl, float sharp, float soft) {
+    float hh = 2.0 + 2.0 * vl;                      // square of view + light
+    float nh2 = min((nv + nl) * (nv + nl) / max(hh, 0.1), 1.0);
+    float a = nh2 * (sharp - 1.0) + 1.0;
+    float b = nh2 * (soft - 1.0) + 1.0;
+    a *= a;
+    b *= b;
+    float off = 1.0 - hh * 0.25;                    // Schlick's Fresnel term, by the square of its cosine
+    off *= off;
+    off *= off;
+    float fresnel = 0.028 + 0.95 * off * off;
+    return fresnel * nl * (0.75 * soft * a + 0.25 * sharp * b) / (a * b * max(hh, 0.9));
 }
 
 // What a surface shows of the studio. n: normal; fine: with the relief of pores, for what is mirrored;
 // reach: what reaches it of the key light, the open sky, through it from behind, of the rim light.
-vec3 surface(vec3 place, vec3 n, vec3 fine, vec3 albedo, float gloss, vec4 reach, float scatter) {
-    vec3 view = normalize(eye - place);
-    float nv = max(dot(fine, view), 0.02);
+vec3 surface(vec3 view, vec3 n, vec3 fine, vec3 albedo, float gloss, vec4 reach, float scatter) {
     // Light that wanders below the surface softens the edge of the shade, the red most.
     vec3 wander = vec3(0.36, 0.15, 0.09) * scatter;
-    vec3 key = clamp((vec3(dot(n, KEY_DIRECTION)) + wander) / (1.0 + wander), 0.0, 1.0);
-    key = mix(key, key * key, wander);
-    vec3 shade = mix(vec3(reach.x), vec3(reach.x * (2.0 - reach.x)), vec3(0.55, 0.12, 0.0) * scatter);
-    vec3 open = reach.y / (reach.y + (1.0 - reach.y) * (1.0 - albedo * 0.75));  // light bounced in folds
-    vec3 diffuse = KEY * key * shade;
-    diffuse += FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) * open;
-    diffuse += mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62 * open;
-    diffuse += RIM * max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
-    diffuse += RIM * vec3(1.5, 0.32, 0.16) * reach.z * scatter;
-    // Mirrored: the oily film and the skin beneath it.
+    vec3 key = clamp((dot(n, KEY_DIRECTION) + wander) / (1.0 + wander), 0.0, 1.0);
+    key *= 1.0 - wander + wander * key;
+    key *= reach.x * (1.0 + (1.0 - reach.x) * vec3(0.55, 0.12, 0.0) * scatter);
+    // Light bounces on in folds, and through flesh, which leaves the red of it.
+    vec3 open = reach.y * (1.0 + (1.0 - reach.y) * 0.85 * albedo);
+    open += (1.0 - reach.y) * vec3(0.16, 0.07, 0.06) * scatter;
+    vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) + mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;
+    float rim = max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
+    vec3 diffuse = KEY * key + dome * open + RIM * (rim + vec3(1.5, 0.32, 0.16) * (reach.z * scatter));
+    // Mirrored: the skin, and an oily film on it.
+    float nv = max(dot(fine, view), 0.02);
     float rough = clamp(1.0 - gloss, 0.12, 1.0);
-    float graze = 1.0 - nv;
-    float graze2 = graze * graze;
-    float fresnel = 0.028 + 0.972 * graze2 * graze2 * graze * (1.0 - 0.6 * rough);
-    vec3 half_ = normalize(KEY_DIRECTION + view);
+    float soft = rough * rough * rough * rough;
+    float sharp = soft * 0.16 + 0.0004;
     float nl = max(dot(fine, KEY_DIRECTION), 0.0);
-    float nh = max(dot(fine, half_), 0.0);
-    float mirror = mix(lobe(rough, nh, nl, nv), lobe(rough * 0.6 + 0.05, nh, nl, nv), 0.25);
-    float away = 1.0 - max(dot(view, half_), 0.0);
-    float facing = 0.028 + 0.972 * away * away * away * away * away;
-    vec3 spark = KEY * 3.14159 * facing * mirror * nl * reach.x;
-    vec3 behind = normalize(RIM_DIRECTION + view);
     float bl = max(dot(fine, RIM_DIRECTION), 0.0);
-    away = 1.0 - max(dot(view, behind), 0.0);
-    facing = 0.028 + 0.972 * away * away * away * away * away;
-    spark += RIM * 3.14159 * facing * lobe(rough, max(dot(fine, behind), 0.0), bl, nv) * bl * reach.w;
+    vec3 shine = KEY * (mirrored(nv, nl, dot(view, KEY_DIRECTION), sharp, soft) * reach.x);
+    shine += RIM * (mirrored(nv, bl, dot(view, RIM_DIRECTION), soft, soft) * reach.w);
+    float graze = 1.0 - nv;
+    graze *= graze;
+    float around = (0.028 + 0.8 * graze * graze) * (1.0 - 0.6 * rough) * reach.y * reach.y;
     float up = 2.0 * dot(fine, view) * fine.y - view.y;
-    vec3 around = mix(FLOOR, SKY, clamp(up * 0.5 + 0.5, 0.0, 1.0));
-    return albedo * diffuse + spark + around * fresnel * reach.y * reach.y * (1.0 - 0.5 * rough);
+    return albedo * diffuse + shine + mix(FLOOR, SKY, clamp(up * 0.5 + 0.5, 0.0, 1.0)) * around;
 }

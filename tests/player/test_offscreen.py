@@ -13,6 +13,7 @@ from player_tracks import body_track, face_track
 
 from fba.animation import Animation
 from fba.errors import DisplayError
+from fba.face.model import point_row
 from player import Camera, Offscreen, Scene
 
 UInt8 = npt.NDArray[np.uint8]
@@ -44,8 +45,9 @@ class TestPictures:
         shown = picture(still(), camera="front").astype(int)
         red_over_blue = shown[..., 0] - shown[..., 2]
         assert red_over_blue[120:160, 140:180].mean() > 30  # skin
-        assert abs(red_over_blue[:, :20].mean()) < 25  # neutral studio
-        assert shown[18:30, 150:170, :3].mean() < 110  # hair above
+        assert abs(red_over_blue[:150, :20].mean()) < 25  # neutral studio
+        assert shown[38:48, 150:170, :3].mean() < 150  # hair above
+        assert shown[70:80, 150:170, :3].mean() > 150  # the forehead below it
         assert shown[-12:, 60:90, 2].mean() > shown[-12:, 60:90, 0].mean()  # a blue shirt below
 
     def test_the_same_time_gives_the_same_bytes(self, walking: Animation) -> None:
@@ -57,18 +59,27 @@ class TestPictures:
         np.testing.assert_array_equal(runs[0], runs[1])
 
     @pytest.mark.parametrize(
-        ("faps", "rows"),
+        ("faps", "between"),
         [
-            ({3: 800, 5: -700, 10: -600, 11: -600}, slice(120, 230)),
-            ({19: 1024, 20: 1024}, slice(90, 130)),
-            ({31: 500, 32: 500, 33: 500}, slice(40, 125)),
+            ({3: 800, 5: -700, 10: -600, 11: -600}, ("9.3", 0.0, "2.10", -0.06)),
+            ({19: 1024, 20: 1024}, ("4.1", 0.004, "5.3", 0.0)),
+            ({31: 500, 32: 500, 33: 500}, ("11.1", 0.01, "3.3", 0.0)),
         ],
         ids=["jaw", "lids", "brows"],
     )
-    def test_faps_change_the_part_they_move(self, faps: dict[int, int], rows: slice) -> None:
-        where = changed(picture(still(), camera="front"), picture(still(faps), camera="front"))
+    def test_faps_change_the_part_they_move(
+        self, faps: dict[int, int], between: tuple[str, float, str, float]
+    ) -> None:
+        scene = Scene(still())
+        camera = scene.camera("front", 4 / 3)
+        where = changed(picture(still(), camera=camera), picture(still(faps), camera=camera))
+        rows = []
+        for name, above in (between[:2], between[2:]):
+            place = scene.model.points[point_row(name)] + (0, above, 0)
+            clip = camera.projection_matrix(4 / 3) @ camera.view_matrix() @ [*place, 1.0]
+            rows.append(round(120 * (1 - clip[1] / clip[3])))
         assert where.sum() > 30
-        assert where[rows].sum() > 0.95 * where.sum()
+        assert where[rows[0] : rows[1]].sum() > 0.95 * where.sum()
 
     def test_a_turned_head_looks_to_its_left(self) -> None:
         front, turned = (picture(still(faps), camera="front").astype(int) for faps in ({}, {49: 60000}))

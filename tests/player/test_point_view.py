@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,15 @@ from player_tracks import body_track, face_track
 
 from fba.animation import Animation
 from fba.body import BapSolver, Skeleton
-from fba.face import FeaturePointFace, feature_point_names, resolve
+from fba.face import feature_point_names, resolve
+from fba.face.deformer import Deformer
+from fba.face.model import FaceModel
 from player import Offscreen, Scene
 from player.controls import Controls
-from player.head import Head
-from player.head.drawing import Drawing
+from player.face import FaceFigure
+from player.point_view import PointView
 from player.scene import HEAD_ON_BODY
+from player.skin_lines import skin_lines
 from player.transport import Transport
 
 ROW = {name: row for row, name in enumerate(feature_point_names())}
@@ -30,16 +34,30 @@ def face(faps: dict[int, int]) -> Animation:
     return Animation(25, np.arange(1), face_track([faps]))  # type: ignore[arg-type]
 
 
+@pytest.fixture(scope="module")
+def view() -> PointView:
+    return PointView(FaceFigure(FaceModel.default()))
+
+
 @pytest.mark.parametrize("faps", FACES, ids=["neutral", "face", "head"])
 def test_a_sphere_stands_at_every_feature_point(faps: dict[int, int]) -> None:
     animation = face(faps)
     marks = Scene(animation, view="points").at(0.0).marks
     assert animation.face is not None
-    expected = FeaturePointFace()(resolve(animation.face)[0])
+    model = FaceModel.default()
+    expected = Deformer(model).feature_points(resolve(animation.face, model)[0])
     assert marks.shape == (84, 16)
     np.testing.assert_allclose(marks[:, :3], expected, atol=1e-6)
     np.testing.assert_allclose(marks[:, 4:7], expected, atol=1e-4)
     assert ((marks[:, 3] > 0.0005) & (marks[:, 3] < 0.002)).all()
+
+
+def test_points_that_a_face_lacks_are_left_out() -> None:
+    model = FaceModel.default()
+    points, bound = model.points.copy(), model.bound.copy()
+    points[ROW["10.1"]], bound[ROW["10.1"]] = np.nan, -1
+    scene = Scene(face({}), replace(model, points=points, bound=bound), view="points")
+    assert scene.at(0.0).marks.shape == (83, 16)
 
 
 def test_on_a_body_the_points_go_with_the_head() -> None:
@@ -50,8 +68,10 @@ def test_on_a_body_the_points_go_with_the_head() -> None:
     skeleton = Skeleton.default()
     joints = BapSolver(skeleton).pose(animation.body.values[0])
     shift = joints[0, :3, 3] - skeleton.centres[0]  # the root alone moves
-    expected = FeaturePointFace()(resolve(animation.face)[0]) + HEAD_ON_BODY + shift
-    np.testing.assert_allclose(Scene(animation, view="points").at(0.0).marks[:, :3], expected, atol=1e-5)
+    scene = Scene(animation, view="points")
+    alone = Deformer(scene.model).feature_points(resolve(animation.face, scene.model)[0])
+    expected = alone - scene.figure.between_eyes + HEAD_ON_BODY + shift
+    np.testing.assert_allclose(scene.at(0.0).marks[:, :3], expected, atol=1e-5)
 
 
 def test_every_bone_and_joint_has_its_capsule(walking: Animation) -> None:
@@ -67,32 +87,44 @@ def test_every_bone_and_joint_has_its_capsule(walking: Animation) -> None:
 
 
 @pytest.mark.parametrize("faps", FACES[:2], ids=["neutral", "face"])
-def test_lines_pass_through_their_points(faps: dict[int, int]) -> None:
+def test_lines_pass_through_their_points(view: PointView, faps: dict[int, int]) -> None:
     vector = np.zeros(68, dtype=np.float32)
     for number, value in faps.items():
         vector[number - 1] = value
-    drawing = Drawing(Head.default())
-    points = FeaturePointFace().local(vector)
-    vertices = drawing.meshes(vector, np.eye(4))[2].positions
-    # Upper lids slide over the eyeball, so their points stay behind where they close.
+    points = Deformer(FaceModel.default()).feature_points(vector, local=True)
+    vertices = view.meshes(vector, np.eye(4))[0].positions
     chains = {
         2: (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14),
-        3: (9, 13),
+        3: (1, 2, 3, 4, 7, 8, 9, 10, 11, 12, 13, 14),
         4: range(1, 7),
-        8: range(1, 9),
+        8: range(1, 11),
         9: (1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15),
-        10: (1, 3, 7),
+        10: range(1, 11),
     }
-    through = [f"{group}.{index}" for group, indices in chains.items() for index in indices]
-    for name in through:
+    for name in [f"{group}.{index}" for group, indices in chains.items() for index in indices]:
         nearest = np.linalg.norm(vertices - points[ROW[name]], axis=1).min()
-        assert nearest < 0.0013, name  # a tube's radius, or half the way to its next ring
+        assert nearest < 0.0013, name  # a tube's radius
 
 
-def test_extreme_faps_give_finite_lines() -> None:
+def test_lines_lie_on_the_skin_and_on_their_own_lip() -> None:
+    model = FaceModel.default()
+    lines = skin_lines(model)
+    assert len(lines) == 19
+    still = model.vertices.copy()
+    for line in lines:
+        assert (line.shares >= -1e-9).all()
+        np.testing.assert_allclose(line.shares.sum(axis=1), 1)
+    # Where only the lower lip moves, a line along the upper one stays.
+    lowered = Deformer(model).local(np.bincount([4, 51], [-300, -300], 68).astype(np.float32))
+    upper, lower = lines[0], lines[1]
+    assert np.abs(upper.places(lowered) - upper.places(still))[2:-2].max() < 0.0008
+    assert np.abs(lower.places(lowered) - lower.places(still)).max() > 0.004
+
+
+def test_extreme_faps_give_finite_lines(view: PointView) -> None:
     for value in (10**5, -(10**5)):
         vector = np.full(68, value, dtype=np.float32)
-        for mesh in Drawing(Head.default()).meshes(vector, np.eye(4), bust=np.eye(4)):
+        for mesh in view.meshes(vector, np.eye(4)):
             assert np.isfinite(mesh.positions).all()
             assert np.isfinite(mesh.normals).all()
 
@@ -133,8 +165,8 @@ class TestPictures:
             shown = offscreen.frame(0.0).astype(int)
         orange = (shown[..., 0] - shown[..., 2] > 70) & (shown[..., 1] - shown[..., 2] > 20)
         matrix = camera.projection_matrix(4 / 3) @ camera.view_matrix()
-        for name in ("5.1", "5.2", "2.10", "11.1", "9.3", "4.3", "8.1", "2.1", "10.1"):
-            clip = matrix @ [*FeaturePointFace().points[ROW[name]], 1.0]
+        for name in ("5.1", "5.2", "2.10", "11.1", "9.3", "4.3", "8.1", "2.1", "3.7"):
+            clip = matrix @ [*FaceModel.default().points[ROW[name]], 1.0]
             x, y = 400 * (1 + clip[0] / clip[3]), 300 * (1 - clip[1] / clip[3])
             assert orange[round(y) - 3 : round(y) + 4, round(x) - 3 : round(x) + 4].sum() >= 3, name
         assert orange.mean() < 0.02
@@ -146,7 +178,7 @@ class TestPictures:
             whole = offscreen.frame(0.0).astype(int)
             behind = view.marks[:, 0] < -0.005  # the other side of the face
             assert behind.sum() > 25
-            hidden = type(view)(view.meshes, view.capsules, view.marks[~behind], view.eyes)
+            hidden = replace(view, marks=view.marks[~behind])
             scene.at = lambda time: hidden  # type: ignore[method-assign]
             without = offscreen.frame(0.0).astype(int)
         faint = np.abs(whole - without)[100:220, 100:260].max(axis=2)
@@ -166,12 +198,3 @@ class TestPictures:
         with Offscreen(Scene(animation, view="points"), (160, 120)) as offscreen:
             pictures = [offscreen.frame(time) for time in (0.0, 2.0)]
         assert (np.abs(pictures[0].astype(int) - pictures[1].astype(int)) > 8).sum() > 50
-
-
-def test_the_hairline_is_part_of_the_mesh() -> None:
-    surface = Head.default()._surface
-    lines = [rows for name, rows in surface.parts.items() if name.startswith("hairline")]
-    assert len(lines) == 3
-    dark = Head.default()._skin.colours[:, :3].sum(axis=1)
-    low, _, high = (dark[rows] for rows in lines)
-    assert low.min() > 2.5 * high.max()  # skin just below it, hair just above, all along

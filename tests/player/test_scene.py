@@ -1,7 +1,8 @@
-"""What a scene shows: the head follows its feature points, the body its joints."""
+"""What a scene shows: the face follows its model, the body its joints."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,12 @@ from player_tracks import body_track, face_track
 
 from fba.animation import Animation
 from fba.body import Skeleton
-from fba.face import feature_point_names
+from fba.errors import FbaWarning
+from fba.face.model import FaceModel, point_row
 from player import Scene, default_camera
-from player.head import Head
+from player.face import FaceFigure, sway
 from player.mannequin import Mannequin
 
-ROW = {name: row for row, name in enumerate(feature_point_names())}
 STILL = np.zeros(68, dtype=np.float32)
 
 
@@ -26,86 +27,112 @@ def faps(**values: float) -> np.ndarray:
     return vector
 
 
-def skin(vector: np.ndarray) -> np.ndarray:
-    return Head.default().meshes(vector, np.eye(4))[0].positions.astype(float)
+@pytest.fixture(scope="module")
+def figure() -> FaceFigure:
+    return FaceFigure(FaceModel.default())
 
 
-def nearest(point: str) -> int:
-    """Skin vertex at a feature point of the neutral face."""
-    away = np.linalg.norm(skin(STILL) - Head.default().face.points[ROW[point]], axis=1)
-    assert away.min() < 0.0025, point
-    return int(away.argmin())
+def test_the_skin_follows_the_model(figure: FaceFigure) -> None:
+    chin = figure.model.bound[point_row("2.1")]
+    skin = figure.model.parts[0]
+    assert skin.kind == "skin"
+    assert chin < len(skin.vertices)
+    before, after = (figure.meshes(one, np.eye(4))[0].positions[chin].copy() for one in (STILL, faps(f3=500)))
+    assert after[1] - before[1] == pytest.approx(-500 * figure.model.fapu.MNS, rel=0.02)
+    np.testing.assert_array_equal(before, skin.vertices[chin])
 
 
-@pytest.mark.parametrize(
-    ("fap", "point", "millimetres"),
-    [
-        (3, "2.1", (0, -500 * 21.5 / 1024)),
-        (31, "4.1", (0, 500 * 45 / 1024)),
-        (33, "4.3", (0, 500 * 45 / 1024)),
-        (39, "5.1", (500 * 62 / 1024, 0)),
-        (51, "8.1", (0, -500 * 21.5 / 1024)),
-        (61, "9.1", (500 * 45 / 1024, 0)),
-        (63, "9.3", (0, 500 * 45 / 1024)),
-    ],
-)
-def test_the_skin_follows_feature_points(fap: int, point: str, millimetres: tuple[float, float]) -> None:
-    vertex = nearest(point)
-    shift = (skin(faps(**{f"f{fap}": 500})) - skin(STILL))[vertex, :2] * 1000
-    np.testing.assert_allclose(shift, millimetres, atol=0.12 * max(np.abs(millimetres)))
+@pytest.mark.parametrize(("fap", "side"), [(23, 0), (24, 1)])
+def test_eyes_look_where_faps_say(figure: FaceFigure, fap: int, side: int) -> None:
+    straight, aside = (figure.eyes(one, np.eye(4)) for one in (STILL, faps(**{f"f{fap}": 30000})))
+    expected = [np.sin(0.3), 0, np.cos(0.3)]  # 30,000 steps of 1e-5 rad to the subject's left
+    gaze = [eye.matrix[:3, 2] / np.linalg.norm(eye.matrix[:3, 2]) for eye in aside]
+    np.testing.assert_allclose(gaze[side], expected, atol=1e-3)
+    np.testing.assert_allclose(gaze[1 - side], [0, 0, 1], atol=1e-3)
+    np.testing.assert_allclose(aside[side].matrix[:3, 3], straight[side].matrix[:3, 3], atol=1e-5)
+    down = figure.eyes(faps(f25=20000), np.eye(4))[0].matrix[:3, 2]
+    np.testing.assert_allclose(down / np.linalg.norm(down), [0, -np.sin(0.2), np.cos(0.2)], atol=1e-3)
 
 
-def test_an_upper_lip_never_grips_the_lower_one() -> None:
-    moved = np.abs(skin(faps(f4=-400, f8=-300, f9=-300, f51=-400)) - skin(STILL)).max(axis=1)
-    below = (skin(STILL)[:, 1] < -0.072) & (np.abs(skin(STILL)[:, 0]) < 0.012)
-    assert moved[below].max() < 0.0006
-    assert moved.max() > 0.006
+def test_eyes_have_the_size_of_the_face(figure: FaceFigure) -> None:
+    unit = figure.model.fapu
+    left, right = figure.eyes(STILL, np.eye(4))
+    centre, radius = left.matrix[:3, 3], np.linalg.norm(left.matrix[:3, 0])
+    assert centre[0] == pytest.approx(-right.matrix[0, 3], abs=1e-6)
+    assert centre[0] == pytest.approx(unit.ES * 512, rel=0.02)
+    assert left.iris * radius * 2 == pytest.approx(unit.IRISD * 1024)
+    assert left.pupil * radius * 2 == pytest.approx(unit.IRISD * 1024 / 3)  # a third of the iris at rest
+    wide = figure.eyes(faps(f29=200), np.eye(4))
+    assert (wide[0].pupil - left.pupil) * radius * 2 == pytest.approx(unit.IRISD * 200)
+    assert wide[1].pupil == right.pupil
+    thrust = figure.eyes(faps(f27=100), np.eye(4))[0].matrix[:3, 3] - centre
+    np.testing.assert_allclose(thrust, [0, 0, 100 * unit.ES], atol=1e-5)
+    edge = figure.model.points[point_row("3.5")][2]
+    assert edge == pytest.approx(centre[2] + radius, abs=0.002)
 
 
-def test_the_back_of_the_head_stays() -> None:
-    vector = faps(f3=1000, f6=600, f31=900, f39=900, f19=1080, f63=600)
-    still = skin(STILL)[:, 2] < -0.09
-    assert still.sum() > 200
-    np.testing.assert_array_equal(skin(vector)[still], skin(STILL)[still])
+def test_the_neck_bends_and_the_shoulders_stay(figure: FaceFigure) -> None:
+    skin = figure.model.vertices[: len(figure.model.parts[0].vertices)]
+    share = sway(figure.model)[: len(skin)]
+    chin = figure.model.points[point_row("2.10")]
+    assert (share[(skin[:, 1] > chin[1] + 0.01) & (skin[:, 2] > chin[2] - 0.03)] > 0.8).all()
+    assert (share[skin[:, 1] > figure.between_eyes[1]] == 1).all()
+    assert share[skin[:, 1].argmin()] == 0
+    assert share[skin[:, 1] < skin[:, 1].min() + 0.03].max() < 0.1
 
 
-@pytest.mark.parametrize("lids", [0, 300, 700, 1024, -300])
-def test_lids_stay_off_the_eyeballs(lids: int) -> None:
-    face = Head.default().face
-    positions = skin(faps(f19=lids, f20=lids))
-    for centre in face.eyeball_centres:
-        assert np.linalg.norm(positions - centre, axis=1).min() > face.eyeball_radius
+def test_a_face_without_feature_points_of_the_neck_turns_whole() -> None:
+    model = FaceModel.default()
+    points, bound = model.points.copy(), model.bound.copy()
+    for name in ("2.1", "2.10"):
+        points[point_row(name)], bound[point_row(name)] = np.nan, -1
+    assert (sway(replace(model, points=points, bound=bound)) == 1).all()
 
 
-@pytest.mark.parametrize("viseme", range(15))
-def test_lips_never_pass_through_each_other(viseme: int) -> None:
-    from fba.face import Definitions
-
-    head = Head.default()
-    positions = head.meshes(Definitions.default().visemes[viseme], np.eye(4))[0].positions
-    upper, lower = (head._surface.parts[f"lip inner {which}"] for which in ("upper", "lower"))
-    assert (positions[upper[1:-1], 1] - positions[lower, 1]).min() > -1e-6
+def test_on_a_body_shoulders_are_left_out(figure: FaceFigure) -> None:
+    whole, cut = (figure.meshes(STILL, np.eye(4), on_body=on) for on in (False, True))
+    low = [min(mesh.positions[mesh.shape.triangles.ravel(), 1].min() for mesh in m) for m in (whole, cut)]
+    assert low[0] < -0.2
+    assert low[1] > -0.2
+    assert len(cut) < len(whole)
 
 
-def test_extreme_faps_give_finite_meshes() -> None:
-    head = Head.default()
+def test_extreme_faps_give_finite_meshes(figure: FaceFigure) -> None:
     for value in (10**5, -(10**5)):
-        for mesh in head.meshes(np.full(68, value, dtype=np.float32), np.eye(4)):
+        vector = np.full(68, value, dtype=np.float32)
+        for mesh in figure.meshes(vector, np.eye(4)):
             assert np.isfinite(mesh.positions).all()
             assert np.isfinite(mesh.normals).all()
+            assert ((mesh.light >= 0) & (mesh.light <= 1)).all()
+        for eye in figure.eyes(vector, np.eye(4)):
+            assert np.isfinite(eye.matrix).all()
 
 
-def test_the_skin_is_closed_but_for_eyes_and_mouth() -> None:
-    triangles = Head.default()._surface.triangles
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    found, uses = np.unique(edges, axis=0, return_counts=True)
-    assert uses.max() == 2
-    border = np.unique(found[uses == 1])
-    parts = Head.default()._surface.parts
-    allowed = np.concatenate(
-        [rows for name, rows in parts.items() if "margin" in name or "lip inner" in name]
-    )
-    assert set(border) <= set(allowed)
+def test_light_falls_into_an_open_mouth(figure: FaceFigure) -> None:
+    def seen(vector: np.ndarray) -> np.ndarray:
+        meshes = figure.meshes(vector, np.eye(4))
+        light = {part.name: mesh.light for part, mesh in zip(drawn, meshes, strict=True)}
+        return np.array([light[part.name][row, 1] for part, row in places])
+
+    drawn = [part for part in figure.model.parts if part.kind != "eye"]
+    places = []
+    for name in ("9.10", "9.11", "6.1"):  # edges of the teeth, tip of the tongue
+        vertex = int(figure.model.bound[point_row(name)])
+        starts = figure.model.starts
+        part = max((p for p in drawn if starts[p.name] <= vertex), key=lambda p: starts[p.name])
+        places.append((part, vertex - starts[part.name]))
+    wide = faps(f3=700, f5=-900, f10=-700, f11=-700, f52=-900, f57=-700, f58=-700, f4=-300, f51=-300)
+    assert (seen(STILL) < 0.06).all()
+    assert (seen(wide) > 0.1).all()
+
+
+def test_a_damaged_texture_is_told_and_the_colour_shown() -> None:
+    model = FaceModel.default()
+    skin = model.parts[0]
+    broken = replace(skin, material=replace(skin.material, texture=b"\x89PNG no picture"))
+    with pytest.warns(FbaWarning, match="texture of part 'skin' cannot be read"):
+        figure = FaceFigure(replace(model, parts=(broken, *model.parts[1:])))
+    assert figure.meshes(STILL, np.eye(4))[0].shape.picture is None
 
 
 def test_capsules_stand_where_the_table_puts_them() -> None:

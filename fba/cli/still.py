@@ -1,0 +1,135 @@
+"""What `fba render` takes instead of a file: FAPs, visemes and expressions as words of a command line."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from fba.animation import Animation
+
+MOST = 2
+"""A frame has room for two visemes and two expressions."""
+LARGEST = 2**31 - 1
+
+
+def still(faps: tuple[str, ...], visemes: tuple[str, ...], expressions: tuple[str, ...]) -> Animation:
+    """An animation of one frame that sends these FAPs, visemes and expressions and nothing else.
+
+    faps: NAME=VALUE. visemes: NAME or NAME=BLEND. expressions: NAME or NAME=INTENSITY. A name may be a
+    number. Raises click.UsageError saying what is wrong and which names come near.
+    """
+    import numpy as np
+
+    from fba.animation import Animation
+    from fba.parameters import FAP_COUNT, INTENSITY_MAX
+    from fba.tracks import FaceTrack
+
+    values = np.zeros((1, FAP_COUNT), dtype=np.int32)
+    mask = np.zeros((1, FAP_COUNT), dtype=bool)
+    for text in faps:
+        number, value = _fap(text)
+        if mask[0, number - 1]:
+            raise click.UsageError(f"--fap {text}: FAP {number} is given twice")
+        values[0, number - 1], mask[0, number - 1] = value, True
+    viseme, expression = np.zeros((1, 4), dtype=np.int16), np.zeros((1, 6), dtype=np.int16)
+    if visemes:
+        chosen = _chosen("viseme", visemes)
+        viseme[0, : len(chosen)] = [select for select, _ in chosen]
+        viseme[0, 2] = _blend([share for _, share in chosen])
+        mask[0, 0] = True
+    if expressions:
+        for place, (select, intensity) in enumerate(_chosen("expression", expressions)):
+            expression[0, 2 * place] = select
+            expression[0, 2 * place + 1] = INTENSITY_MAX if intensity is None else intensity
+        mask[0, 1] = True
+    return Animation(25, np.arange(1), FaceTrack(values, mask, viseme, expression), name="still")
+
+
+def _fap(text: str) -> tuple[int, int]:
+    from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
+
+    name, equals, amount = text.partition("=")
+    name = name.strip()
+    numbers = {key: number for key, number in fap_numbers().items() if number >= FIRST_LOW_LEVEL_FAP}
+    if name in ("1", "2", "viseme", "expression"):
+        raise click.UsageError(f"--fap {text}: visemes and expressions have options of their own, --viseme "
+                               "and --expression")  # fmt: skip
+    if name.isdecimal() and FIRST_LOW_LEVEL_FAP <= int(name[:9]) <= FAP_COUNT:
+        number = int(name)
+    elif name in numbers:
+        number = numbers[name]
+    else:
+        raise click.UsageError(
+            f"--fap {text}: there is no FAP {name!r}{_near(name, list(numbers))}; "
+            f"they have names, or numbers {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}"
+        )
+    try:
+        value = int(amount)
+    except ValueError:
+        value = LARGEST + 1
+    if not equals or abs(value) > LARGEST:
+        raise click.UsageError(
+            f"--fap {text}: a value is missing or no whole number; write e.g. --fap {name}=200"
+        )
+    return number, value
+
+
+def _chosen(kind: str, texts: tuple[str, ...]) -> list[tuple[int, int | None]]:
+    """(select, amount or None) of each."""
+    from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
+
+    names = VISEMES if kind == "viseme" else EXPRESSIONS
+    if len(texts) > MOST:
+        raise click.UsageError(f"--{kind}: a frame holds at most {MOST}, not {len(texts)}")
+    found = []
+    for text in texts:
+        name, equals, amount = text.partition("=")
+        select = _select(name.strip(), names)
+        if select is None:
+            words = [*names[1:], *(word for each in names[1:] for word in each.split())]
+            raise click.UsageError(
+                f"--{kind} {text}: there is no {kind} {name!r}{_near(name, words)}; "
+                f"they are {', '.join(f'{n} {each}' for n, each in enumerate(names) if n)}"
+            )
+        if equals and not (amount.strip().isdecimal() and int(amount.strip()[:9]) <= INTENSITY_MAX):
+            raise click.UsageError(
+                f"--{kind} {text}: {amount!r} is no whole number from 0 to {INTENSITY_MAX}"
+            )
+        found.append((select, int(amount) if equals else None))
+    return found
+
+
+def _select(name: str, names: tuple[str, ...]) -> int | None:
+    """A number, a name, or one of the sounds that a viseme stands for."""
+    if name.isdecimal():
+        number = int(name[:9])
+        return number if 0 < number < len(names) else None
+    for select, each in enumerate(names):
+        if select and (name == each or name in each.split()):
+            return select
+    return None
+
+
+def _blend(shares: list[int | None]) -> int:
+    """viseme_blend: the share of the first of one or two visemes, in 63rds."""
+    from fba.parameters import INTENSITY_MAX
+
+    if len(shares) == 1:
+        return INTENSITY_MAX if shares[0] is None else shares[0]
+    first, second = shares
+    if first is not None and second is not None and first + second != INTENSITY_MAX:
+        raise click.UsageError(
+            f"--viseme: the blends of two visemes add up to {INTENSITY_MAX}, not {first} + {second}; "
+            "give one of them"
+        )
+    if first is not None:
+        return first
+    return (INTENSITY_MAX + 1) // 2 if second is None else INTENSITY_MAX - second
+
+
+def _near(name: str, names: list[str]) -> str:
+    near = get_close_matches(name, names, n=3)
+    return f" (near: {', '.join(dict.fromkeys(near))})" if near else ""

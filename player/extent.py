@@ -1,0 +1,87 @@
+"""Which part of a picture a view fills: what lies outside need not be looked at again."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+from player.shapes import View
+
+Float64 = npt.NDArray[np.float64]
+
+MARGIN = 0.03
+"""Added on every side, as a share of what is filled."""
+NEAR = 1e-3
+STILL = 0.3
+"""What goes with the head by less than this is looked at apart: shoulders are wide, and low."""
+
+Rectangle = tuple[int, int, int, int]
+
+
+def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:
+    """Rectangles (left, bottom, width, height), in pixels, that together hold all that is drawn.
+
+    matrix: (4, 4), world to clip space. None of them lies within another.
+    """
+    boxes = [_corners(mesh.positions) @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3] for mesh in view.meshes]
+    for face in view.faces:
+        still = face.shape.sway < STILL
+        for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
+            both = np.concatenate([box, _turned(box, face.turn, face.centre)])  # the neck bends between them
+            boxes.append(both @ face.matrix[:3, :3].T + face.matrix[:3, 3])
+    for round_ in (view.capsules, view.marks):
+        if len(round_):
+            reach = float(round_[:, [3, 7]].max())
+            ends = np.concatenate([round_[:, 0:3], round_[:, 4:7]])
+            boxes.append(_box(ends.min(axis=0) - reach, ends.max(axis=0) + reach))
+    found: list[Rectangle] = []
+    for rectangle in sorted({_rectangle(box, matrix, size) for box in boxes if len(box)}, key=_area):
+        found = [other for other in found if not _within(other, rectangle)]
+        if _area(rectangle):
+            found.append(rectangle)
+    return found
+
+
+def _rectangle(places: Float64, matrix: Float64, size: tuple[int, int]) -> Rectangle:
+    clip = np.column_stack([places, np.ones(len(places))]) @ matrix.T
+    if not np.isfinite(clip).all() or (clip[:, 3] < NEAR).any():
+        return (0, 0, *size)
+    flat = clip[:, :2] / clip[:, 3:]
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    grown = MARGIN * (high - low) + 4 / np.array(size)
+    pixels = (np.stack([low - grown, high + grown]) * 0.5 + 0.5) * size
+    left, bottom = np.clip(np.floor(pixels[0]), 0, size).astype(int)
+    right, top = np.clip(np.ceil(pixels[1]), 0, size).astype(int)
+    return int(left), int(bottom), int(right - left), int(top - bottom)
+
+
+def _area(rectangle: Rectangle) -> int:
+    return rectangle[2] * rectangle[3]
+
+
+def _within(one: Rectangle, other: Rectangle) -> bool:
+    return (
+        one[0] >= other[0]
+        and one[1] >= other[1]
+        and one[0] + one[2] <= other[0] + other[2]
+        and one[1] + one[3] <= other[1] + other[3]
+    )
+
+
+def _corners(positions: npt.NDArray[np.float32]) -> Float64:
+    if not len(positions):
+        return np.zeros((0, 3))
+    return _box(positions.min(axis=0), positions.max(axis=0))
+
+
+def _box(low: npt.NDArray[np.floating], high: npt.NDArray[np.floating]) -> Float64:
+    return np.array(list(itertools.product(*zip(low, high, strict=True))), dtype=np.float64)
+
+
+def _turned(places: Float64, turn: Float64, centre: Float64) -> Float64:
+    from scipy.spatial.transform import Rotation
+
+    turned: Float64 = Rotation.from_rotvec(turn).apply(places - centre) + centre
+    return turned

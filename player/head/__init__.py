@@ -1,5 +1,0 @@
-"""The player's built-in head."""
-
-from player.head.head import Head
-
-__all__ = ["Head"]
