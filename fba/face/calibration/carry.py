@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 Float64 = npt.NDArray[np.float64]
 
-FLATTEST = 0.02
-"""Stretch, of the usual, below which a triangle fan says nothing about a direction."""
+LEAST = 1e-6
+"""How much a direction that no edge has counts as stretched like the others."""
 
 
 def carried_tables(
@@ -156,7 +156,7 @@ def stretches(part: Part, after: npt.NDArray[np.floating]) -> Float64:
     along = [n.astype(np.float64) for n in normals]
     squares += weight[:, None, None] * along[0][:, :, None] * along[0][:, None, :]
     products += (weight * size)[:, None, None] * along[1][:, :, None] * along[0][:, None, :]
-    squares += (FLATTEST * weight)[:, None, None] * np.eye(3)
-    products += (FLATTEST * weight * size)[:, None, None] * np.eye(3)
+    squares += (LEAST * weight)[:, None, None] * np.eye(3)
+    products += (LEAST * weight * size)[:, None, None] * np.eye(3)
     matrices: Float64 = products @ np.linalg.inv(squares)
     return matrices

@@ -177,13 +177,14 @@ def shut(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64
             full[b] += rise
             if abs(rise[1]) > OPEN * width:
                 full[c] += rise
-            widest = max(widest, rise[1], -rise[1], key=abs)
+            widest = max(widest, float(rise[1]), key=abs)
         elif np.isfinite(full[a]).all():
             full[b] = full[a] + apart
-    if widest > OPEN * width:
+    if abs(widest) > OPEN * width:
+        found = "the mouth is open by" if widest > 0 else "the lower lip is in the upper one by"
         _warn(
-            f"the mouth is open by {widest * 1000:.1f} mm, but the lips of a neutral face touch: "
-            "the lower lip was raised",
+            f"{found} {abs(widest) * 1000:.1f} mm, but the lips of a neutral face touch: "
+            "the lower lip was moved",
             stacklevel,
         )
     a, b = (row_of()[name] for name in TEETH)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from fba.errors import FbaWarning
 from fba.face.calibration.field import between
 from fba.face.eyeball import Eyeball
 
@@ -20,6 +22,10 @@ SIZES = (0.75, 1.35)
 """How far an eyeball may grow or shrink against the face around it."""
 WIDEST_IRIS = np.radians(42.0)
 """Half the angle that the widest iris takes of its eyeball."""
+BARELY = 1.003
+"""Radii from the centre at which a lid is just outside the eyeball."""
+DEEP = 0.0005
+"""Metres by which an eyeball may go back without a word."""
 LEAST = 0.02
 """Points that belong to the eyeball by less do not count for it."""
 
@@ -64,12 +70,14 @@ def fit_eye(
     size: float,
     pupil_given: bool,
     iris: tuple[float, float],
+    given: Float64,
 ) -> FittedEye:
     """The sphere that fits under the fitted lids as the old one under the old.
 
     skin, fitted: (V, 3) vertices before and after. pupil: its point before and after. size: of the
     fitted face around the eye by the old one. pupil_given: keep the pupil exactly where it is; the centre
-    lies straight behind it. iris: its diameter before and after, metres.
+    lies straight behind it. iris: its diameter before and after, metres. given: (K, 3) where points of the
+    lids must be; if they are inside the eyeball it goes back, and an FbaWarning tells how far.
     """
     from scipy.optimize import least_squares
 
@@ -106,12 +114,27 @@ def fit_eye(
         float(np.arcsin(min(across / 2 / ball, np.sin(WIDEST_IRIS))))
         for across, ball in ((iris[0], eye.radius), (iris[1], radius))
     ]
+    values[1] -= _sunk(given, centre(values), radius, eye.side)
     fitted_eye = FittedEye(eye, centre(values), radius, angles[1], angles[0])
     # The pupil's own vertex may stand a little off the axis.
-    off = front - fitted_eye(pupil[0][None])[0]
-    if not pupil_given:
-        off[2] = 0.0
+    off = (front - fitted_eye(pupil[0][None])[0]) * (1.0, 1.0, 0.0)
     return replace(fitted_eye, centre=fitted_eye.centre + off)
+
+
+def _sunk(given: Float64, centre: Float64, radius: float, side: str) -> float:
+    """How far an eyeball must go back for the given points of its lids to be outside: metres."""
+    across = np.hypot(*(given - centre)[:, :2].T)
+    before = across < radius
+    room = np.sqrt(np.maximum((BARELY * radius) ** 2 - across[before] ** 2, 0.0))
+    back = max(0.0, float((centre[2] + room - given[before, 2]).max(initial=0.0)))
+    if back > DEEP:
+        warnings.warn(
+            f"the lids of the {side} eye lie {back * 1000:.1f} mm inside its eyeball: "
+            "the eyeball and its pupil were put back",
+            FbaWarning,
+            stacklevel=6,
+        )
+    return back
 
 
 def lids_on(eye: FittedEye, skin: Float64, fitted: Float64, sources: Float64, targets: Float64) -> Float64:

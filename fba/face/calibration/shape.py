@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fba.face.calibration.align import known_rows
 from fba.face.calibration.eyes import REACH, FittedEye, fit_eye, lids_on
 from fba.face.calibration.field import Field, bumps
-from fba.face.eyeball import PUPIL_POINT, eyeballs
+from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
 from fba.face.feature_points import names, row_of
 from fba.face.normals import vertex_normals
 
@@ -30,6 +30,8 @@ INNER = ("3.5", "3.6", *TEETH["upper"], *TEETH["lower"], *TONGUE, "7.1", "11.5")
 ON_LIDS = ("lash", "brow", "hair", "other")
 """Kinds of parts that are carried by the skin under them."""
 LIPS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")
+SNAP = 2e-5
+"""Metres that no eye sees."""
 BESIDE = 0.005
 """Metres sideways within which teeth are behind a point of the lips."""
 TONGUE_WIDTH = 0.012
@@ -68,6 +70,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
     vertices = {part.name: field(part.vertices) for part in model.parts}
     fixed = _fixed(model, targets)
     eyes: dict[str, FittedEye] = {}
+    lids = {side: [row[name] for name in lid] for side, lid in LID_POINTS.items()}
     skin = [part for part in model.parts if part.kind in ("skin", "mouth")]
     joined = np.concatenate([part.vertices for part in skin]).astype(np.float64) if skin else np.zeros((0, 3))
     moved = np.concatenate([vertices[part.name] for part in skin]) if skin else joined
@@ -87,6 +90,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
             size=around,
             pupil_given=bool(given[row[PUPIL_POINT[side]]]),
             iris=iris,
+            given=targets[lids[side]][given[lids[side]]],
         )
         moved = lids_on(eyes[side], joined, moved, *fixed)
     start = 0
@@ -101,12 +105,27 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
     for part in model.parts:
         if part.kind in ON_LIDS and eyes and len(joined):
             vertices[part.name] += _carried(part.vertices, joined, moved - plain, eyes)
+    _snap(model, vertices, targets)
     teeth, tongue = _mouth(model, field, targets, given)
     for part in model.of_kind("teeth"):
         vertices[part.name] = teeth[_jaw(model, part)](part.vertices)
     for part in model.of_kind("tongue"):
         vertices[part.name] = tongue(part.vertices)
     return Shape(vertices, _points(model, vertices, field, targets, teeth, tongue), eyes)
+
+
+def _snap(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> None:
+    """Vertices of feature points put exactly where they are within a hair's breadth already.
+
+    Points that nearly coincide, such as those of two lips, go through one place of the deformation.
+    """
+    for row in np.flatnonzero(known_rows(targets) & (model.bound >= 0)):
+        for part in model.parts:
+            own = int(model.bound[row]) - model.starts[part.name]
+            if part.kind not in ("skin", "mouth") or not 0 <= own < len(part.vertices):
+                continue
+            if np.linalg.norm(vertices[part.name][own] - targets[row]) < SNAP:
+                vertices[part.name][own] = targets[row]
 
 
 def _fixed(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
