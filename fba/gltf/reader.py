@@ -37,13 +37,13 @@ def read_gltf(path: Path) -> Gltf:
     document, where it is damaged, larger than what is read, or needs an extension not known here. Points,
     lines and pictures of other kinds are left out with an FbaWarning.
     """
-    document = open_document(path)
-    return read_document(document, Accessors(document))
+    return read_document(open_document(path))
 
 
-def read_document(document: Document, accessors: Accessors) -> Gltf:
-    """The same from an opened document and its accessors."""
+def read_document(document: Document) -> Gltf:
+    """The same from an opened document."""
     _check_extensions(document)
+    accessors = Accessors(document)
     materials = read_materials(document)
     meshes = read_meshes(document, accessors, len(materials))
     skins = read_skins(document, accessors, len(document.entries("nodes")))

@@ -14,6 +14,7 @@ from fba.gltf.accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
 from fba.gltf.document import MAX_JSON
 from fba.gltf.glb import MAX_BYTES, join
 from fba.gltf.materials import media_type
+from fba.gltf.packed import pack
 from fba.source import Path
 
 ATTRIBUTES, ELEMENTS = 34962, 34963
@@ -67,9 +68,9 @@ class Builder:
         view, offset = self._append(array, (None, None))
         return self._accessor(array, bounds, view, offset)
 
-    def indices(self, indices: npt.ArrayLike) -> int:
-        """Accessor of whole numbers from 0 on, (N,), in the fewest bytes that hold them."""
-        return self.data(_unsigned(np.asarray(indices), 65535))
+    def packed(self, array: npt.NDArray[Any]) -> int:
+        """Buffer view of 32-bit numbers that no plain viewer needs, without loss in few bytes."""
+        return self._blob(pack(array))
 
     def displacements(self, values: npt.NDArray[np.floating[Any]]) -> int:
         """Accessor of a morph target, (V, 3): sparse where most vertices stay."""
@@ -96,9 +97,7 @@ class Builder:
             kind = media_type(data)
             if kind is None:
                 raise ModelError(f"the picture {name!r} is neither PNG nor JPEG")
-            view = self.add("bufferViews", {})
-            self._blobs.append((view, data))
-            entry: dict[str, Any] = {"bufferView": view, "mimeType": kind}
+            entry: dict[str, Any] = {"bufferView": self._blob(data), "mimeType": kind}
             self._pictures[data] = self.add("images", entry | ({"name": name} if name else {}))
         return self._pictures[data]
 
@@ -152,6 +151,11 @@ class Builder:
             raise ModelError(f"the file would be larger than {MAX_BYTES} bytes; simplify the model")
         content += array.astype(array.dtype.newbyteorder("<")).tobytes()
         return view, start
+
+    def _blob(self, data: bytes) -> int:
+        view = self.add("bufferViews", {})
+        self._blobs.append((view, data))
+        return view
 
     def _accessor(self, array: npt.NDArray[Any], bounds: bool, view: int, offset: int) -> int:
         return self.add("accessors", _at(_entry(array, bounds), view, offset))

@@ -180,7 +180,6 @@ def table(draw: st.DrawFn, number: int, meshes: tuple[Part, ...]) -> FaceDefTabl
 def face_def_mesh(draw: st.DrawFn, mesh: Part) -> FaceDefMesh:
     borders = sorted({0, *draw(st.lists(st.integers(-(2**31), 2**31 - 1), min_size=1, max_size=4))} | {7})
     vertices = draw(st.lists(st.integers(0, len(mesh.vertices) - 1), max_size=5, unique=True))
-    # few different numbers: intervals repeat and axes stay empty now and then
     number = draw(
         st.sampled_from(
             [st.just(0.0), st.sampled_from([0.0, 1.0]), st.floats(-(2.0**-10), 2.0**-10, width=32)]

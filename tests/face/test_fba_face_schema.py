@@ -24,7 +24,7 @@ BEYOND = {  # what no schema can say: it depends on other values, or on the docu
     "parts/0/node", "featurePoints", "featurePoints/3.1/vertex", "featurePoints/3.1/part",
     "featurePoints/3.5/position/0", "tables/1/fap", "tables/0/meshes", "tables/2/transforms/0/part",
     "tables/1/meshes/0/part", "tables/1/meshes/0/borders", "tables/1/meshes/0/vertices",
-    "tables/1/meshes/0/displacements", "tables/1/meshes/0/axes", "tables/1/meshes/0/intervals",
+    "tables/1/meshes/0/count",
     "fit/links", "visemes/0/faps",
 }  # fmt: skip
 

@@ -76,13 +76,14 @@ def test_a_viewer_shows_the_neutral_face(tmp_path: Path) -> None:
 
 
 def typical(name: str) -> float:
-    """Metres or radians at weight 1 on the neutral face of `neutral_points`, from its distances."""
-    steps, distance = {
-        "open_jaw": (800, 0.0215),
-        "close_t_l_eyelid": (1024, 0.0117),
-        "dilate_l_pupil": (300, 0.0117),
+    """Metres at weight 1: so many 1024ths of the nose's height over the mouth, or of the eye's opening."""
+    steps, upper, lower = {
+        "open_jaw": (800, "9.15", "2.2"),
+        "close_t_l_eyelid": (1024, "3.1", "3.3"),
+        "dilate_l_pupil": (300, "3.1", "3.3"),
     }[name]
-    return steps * distance / 1024
+    height = neutral_points()[:, 1]
+    return float(height[row_of()[upper]] - height[row_of()[lower]]) * steps / 1024
 
 
 def test_faps_are_morph_targets(tmp_path: Path) -> None:
@@ -112,7 +113,7 @@ def test_turns_are_drawn_as_straight_lines_to_where_they_lead(tmp_path: Path) ->
     assert moved == pytest.approx(eye @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]), abs=1e-7)
     pupil = shown["left eye"].morphs["dilate_l_pupil"] + eye
     grown = eye + np.eye(6)[1][:, None] * [0.5, 0.5, 0] * typical("dilate_l_pupil")  # the mesh moves first
-    factor = 1 + 300 * 0.0117 / 1024
+    factor = 1 + typical("dilate_l_pupil")
     assert pupil == pytest.approx(grown * [factor, factor, 1], abs=1e-7)
 
 

@@ -6,6 +6,7 @@ import copy
 import json
 import random
 import warnings
+import zlib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -92,21 +93,21 @@ CASES: list[tuple[str, Any, str]] = [
     (FACE + "/tables/2/transforms/0/amount", [0, 1], r"transforms\[0\].amount: expected a list of 3"),
     (FACE + "/tables/2/transforms/0/part", 9, r"transforms\[0\].part: 9 is not within"),
     (LID + "/part", 4, r"tables\[1\].meshes\[0\].part: 4 is not within 0\.\.3"),
-    (LID + "/part", 1, r"tables\[1\].meshes\[0\].vertices: element 1 names vertex 51, but .* has 6"),
+    (LID + "/part", 1, r"meshes\[0\].vertices: names vertices 50 to 51, but part 'left eye' has 6"),
+    (LID + "/count", 3, r"meshes\[0\].vertices: bufferViews\[\d+\] does not unpack to the 3 numbers"),
+    (LID + "/count", 1, r"meshes\[0\].vertices: bufferViews\[\d+\] does not unpack to the 1 numbers"),
+    (LID + "/count", 85, r"tables\[1\].meshes\[0\].count: 85 is not within 0\.\.84"),
+    (LID + "/count", REMOVED, r"tables\[1\].meshes\[0\]: 'count' is missing"),
     (LID + "/borders", [0], r"tables\[1\].meshes\[0\].borders: at least two borders"),
     (LID + "/borders", [1, 2, 3, 4], r"tables\[1\].meshes\[0\]: .* exactly one interval border must be 0"),
     (LID + "/borders", [0, 2, 1, 4], r"tables\[1\].meshes\[0\]: .* rising interval borders"),
-    (LID + "/borders", [0, 1], r"meshes\[0\].displacements: accessors\[\d+\] has 6 elements, but 2"),
+    (LID + "/borders", [0, 1], r"displacements: bufferViews\[\d+\] does not unpack to the 6 numbers"),
     (LID + "/borders/0", -(2**31) - 1, r"meshes\[0\].borders\[0\]: -2147483649 is not within"),
     (LID + "/borders", [0] * 5000, r"meshes\[0\].borders: 5000 elements, more than the 4096"),
-    (LID + "/vertices", 0, r"meshes\[0\].vertices: accessors\[0\] must hold unsigned integers"),
+    (LID + "/vertices", 0, r"meshes\[0\].vertices: the packed numbers in bufferViews\[0\] are damaged"),
     (LID + "/vertices", 999, r"meshes\[0\].vertices: 999 is not within"),
-    (LID + "/displacements", 0, r"meshes\[0\].displacements: accessors\[0\] holds VEC3 .*VEC2 are needed"),
+    (LID + "/vertices", REMOVED, r"meshes\[0\]: 'vertices' is missing"),
     (LID + "/displacements", REMOVED, r"meshes\[0\]: 'displacements' is missing"),
-    (LID + "/axes", "zx", r"meshes\[0\].axes: 'zx' is none of x, y, z, xy"),
-    (LID + "/axes", "x", r"displacements: accessors\[\d+\] holds VEC2 elements, but SCALAR are needed"),
-    (LID + "/intervals", [0], r"meshes\[0\].intervals: 1 entries for 3 intervals"),
-    (LID + "/intervals", [0, 1, 4095], r"displacements: accessors\[\d+\] has 6 elements, but 8192"),
     (FACE + "/visemes", [], r"FBA_face.visemes: 0 entries, but 14 are needed"),
     (FACE + "/visemes/0/faps", {"expression": 1}, r"visemes\[0\].faps.expression: .* no low-level FAP"),
     (FACE + "/visemes/0/faps", {"open_jaw": 1e39}, r"visemes\[0\].faps.open_jaw: 1e\+39 is not within"),
@@ -128,34 +129,73 @@ def test_the_good_file_is_good() -> None:
     assert_same(read(file()), face())
 
 
-def test_numbers_of_tables_are_checked() -> None:
+def packed_again(which: str, content: bytes) -> bytes:
+    """The good file with another stream for the numbers of its second table."""
     root, binary = document()
-    accessor = root["accessors"][root["extensions"]["FBA_face"]["tables"][1]["meshes"][0]["vertices"]]
-    at = root["bufferViews"][accessor["bufferView"]]["byteOffset"] + accessor.get("byteOffset", 0)
-    data = bytearray(binary)
-    data[at : at + 4] = np.array([50, 50], "<u2").tobytes()
-    with pytest.raises(ModelError, match=r"tables\[1\]\.meshes\[0\]: .*vertex 50 is listed more than once"):
-        read(join(json.dumps(root).encode(), bytes(data)))
+    view = root["bufferViews"][root["extensions"]["FBA_face"]["tables"][1]["meshes"][0][which]]
+    view |= {"byteOffset": len(binary), "byteLength": len(content)}
+    binary += content
+    root["buffers"][0]["byteLength"] = len(binary)
+    return join(json.dumps(root).encode(), binary)
 
 
-def test_intervals_that_repeat_cannot_fill_the_memory() -> None:
+def planes(values: list[float], kind: str) -> bytes:
+    """Packed as the schema says: lowest bytes of all numbers first."""
+    raw = np.array(values, kind).tobytes()
+    return zlib.compress(b"".join(raw[place::4] for place in range(4)))
+
+
+MOVES = [0.0] * 18
+"""2 vertices, 3 intervals, 3 axes."""
+
+
+@pytest.mark.parametrize(
+    ("which", "content", "message"),
+    [
+        ("vertices", planes([50, 50], "<i4"), "vertex 50 is listed more than once"),
+        ("vertices", planes([50, -1], "<i4"), "names vertices -1 to 50"),
+        ("vertices", planes([50, 84], "<i4"), "names vertices 50 to 84, but part 'skin' has 84"),
+        ("vertices", planes([50], "<i4"), "does not unpack to the 2 numbers"),
+        ("vertices", planes([50, 51, 52], "<i4"), "does not unpack to the 2 numbers"),
+        ("vertices", planes([50, 51], "<i4")[:-1], "does not unpack to the 2 numbers"),
+        ("vertices", b"\x78", "does not unpack to the 2 numbers"),
+        ("vertices", b"no stream", "the packed numbers in .* are damaged"),
+        ("displacements", planes([*MOVES[1:], np.nan], "<f4"), "displacement of vertex 51 is not finite"),
+        ("displacements", planes([*MOVES, 0], "<f4"), "does not unpack to the 18 numbers"),
+        ("displacements", zlib.compress(bytes(100_000_000)), "does not unpack to the 18 numbers"),
+    ],
+)
+def test_packed_numbers_are_checked(which: str, content: bytes, message: str) -> None:
+    with pytest.raises(ModelError, match=rf"tables\[1\]\.meshes\[0\].*: .*{message}"):
+        read(packed_again(which, content))
+
+
+def test_packed_numbers_are_what_the_schema_says() -> None:
+    moves = np.arange(18.0)  # interval by interval, axis by axis, vertex by vertex
+    model = read(packed_again("displacements", planes(moves.tolist(), "<f4")))
+    (mesh,) = model.tables[1].meshes
+    assert mesh.vertices.tolist() == [50, 51]
+    assert mesh.displacements[0].tolist() == [[0, 2, 4], [6, 8, 10], [12, 14, 16]]
+    assert mesh.displacements[1].tolist() == [[1, 3, 5], [7, 9, 11], [13, 15, 17]]
+
+
+def test_packed_zeros_cannot_fill_the_memory() -> None:
     root, binary = document()
-    content = root["extensions"]["FBA_face"]
-    root["accessors"] += [
-        {"componentType": 5125, "count": 100_000, "type": "SCALAR"},
-        {"componentType": 5126, "count": 100_000, "type": "VEC3"},
+    count, bomb = 200_000, zlib.compress(bytes(800_000))
+    root["accessors"].append({"componentType": 5126, "count": count, "type": "VEC3"})
+    root["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(bomb)})
+    binary += bomb
+    root["buffers"][0]["byteLength"] = len(binary)
+    root["meshes"][0]["primitives"][0] = {
+        "attributes": {"POSITION": len(root["accessors"]) - 1},
+        "indices": root["meshes"][0]["primitives"][0]["indices"],
+    }
+    del root["meshes"][0]["extras"]
+    view = len(root["bufferViews"]) - 1
+    root["extensions"]["FBA_face"]["tables"][0]["meshes"] = [
+        {"part": 0, "borders": list(range(4096)), "count": count, "vertices": view, "displacements": view}
     ]
-    vertices, moves = len(root["accessors"]) - 2, len(root["accessors"]) - 1
-    content["tables"][0]["meshes"] = [
-        {
-            "part": 0,
-            "borders": list(range(4096)),
-            "vertices": vertices,
-            "displacements": moves,
-            "intervals": [0] * 4095,
-        }
-    ]
-    with pytest.raises(ModelError, match=r"tables\[0\]\.meshes\[0\]: the file unpacks to more than 1024 MiB"):
+    with pytest.raises(ModelError, match=r"tables\[0\].*: the file unpacks to more than 1024 MiB"):
         read(join(json.dumps(root).encode(), binary))
 
 

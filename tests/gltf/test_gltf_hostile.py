@@ -17,7 +17,7 @@ from gltf_documents import Sheet, container
 from fba.errors import FbaError, FbaWarning, FormatError, ModelError
 from fba.gltf import read_gltf
 from fba.gltf.document import parse_document
-from fba.gltf.reader import Accessors, read_document
+from fba.gltf.reader import read_document
 
 
 def good() -> Sheet:
@@ -58,8 +58,7 @@ def sheet_with(sheet: Sheet, **more: Any) -> Sheet:
 
 
 def read(data: bytes) -> None:
-    document = parse_document(data, "a.glb")
-    read_document(document, Accessors(document))
+    read_document(parse_document(data, "a.glb"))
 
 
 def changed(place: str, value: Any) -> bytes:

@@ -22,11 +22,10 @@ from fba.parameters import faps
 
 NAME = "FBA_face"
 VERSION = 1
-AXES = "xyz"
 
 
 def extension(builder: Builder, model: FaceModel, nodes: list[int]) -> dict[str, Any]:
-    """The extension object; arrays go to accessors of `builder`. nodes: one a part."""
+    """The extension object; arrays go to buffer views of `builder`. nodes: one a part."""
     place = {part.name: number for number, part in enumerate(model.parts)}
     content: dict[str, Any] = {
         "version": VERSION,
@@ -79,33 +78,15 @@ def _table(builder: Builder, table: FaceDefTables, place: dict[str, int]) -> dic
 
 
 def _mesh(builder: Builder, mesh: FaceDefMesh, place: dict[str, int]) -> dict[str, Any]:
-    entry: dict[str, Any] = {"part": place[mesh.part], "borders": mesh.borders.tolist()}
-    if not len(mesh.vertices):
-        return entry  # an accessor cannot be empty
-    entry["vertices"] = builder.indices(mesh.vertices)
-    moves = mesh.displacements
-    stored, intervals = _distinct(moves)
-    if len(stored) < len(intervals):
-        entry["intervals"] = intervals
-    axes = [axis for axis in range(3) if moves[:, :, axis].any()] or [0]
-    if len(axes) < 3:
-        entry["axes"] = "".join(AXES[axis] for axis in axes)
-    kept = moves[:, stored][:, :, axes]
-    entry["displacements"] = builder.data(kept.reshape(-1, len(axes)))
+    entry: dict[str, Any] = {
+        "part": place[mesh.part],
+        "borders": mesh.borders.tolist(),
+        "count": len(mesh.vertices),
+    }
+    if len(mesh.vertices):
+        entry["vertices"] = builder.packed(mesh.vertices)
+        entry["displacements"] = builder.packed(mesh.displacements.transpose(1, 2, 0))
     return entry
-
-
-def _distinct(moves: npt.NDArray[np.float32]) -> tuple[list[int], list[int]]:
-    """Intervals that differ from all before them, and for each interval which of those it equals."""
-    stored: list[int] = []
-    which: list[int] = []
-    for interval in range(moves.shape[1]):
-        same = (n for n, other in enumerate(stored) if np.array_equal(moves[:, interval], moves[:, other]))
-        number = next(same, len(stored))
-        if number == len(stored):
-            stored.append(interval)
-        which.append(number)
-    return stored, which
 
 
 def _transform(transform: FaceDefTransform, place: dict[str, int]) -> dict[str, Any]:

@@ -20,7 +20,6 @@ from fba.face.gltf.extension import NAME, VERSION
 from fba.face.gltf.tables import read_tables
 from fba.face.interpolation_table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Float32, Float64, Int32, Material, Part
-from fba.gltf.accessors import Accessors
 from fba.gltf.document import Document
 from fba.gltf.reader import read_document
 from fba.gltf.scene import Gltf
@@ -43,8 +42,7 @@ def read_model(document: Document) -> FaceModel:
     version = content.member("version").integer(0, 1 << 30)
     if version != VERSION:
         raise content.error(f"is version {version}; version {VERSION} is read here")
-    accessors = Accessors(document)
-    gltf = read_document(document, accessors)
+    gltf = read_document(document)
     parts = _parts(content.member("parts"), gltf, document.budget)
     points, bound = _points(content.member("featurePoints"), parts)
     for name, value in _members(content, "morphValues", FAP_COUNT):  # for viewers' users, not for us
@@ -56,7 +54,7 @@ def read_model(document: Document) -> FaceModel:
             parts=parts,
             points=points,
             bound=bound,
-            tables=read_tables(document, accessors, content, parts),
+            tables=read_tables(document, content, parts),
             fit=None if fit is None else _fit(fit),
             definitions=_definitions(content),
             name=_text(content, "name"),
