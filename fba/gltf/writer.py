@@ -55,6 +55,18 @@ class Builder:
         view, offset = self._append(array, (ATTRIBUTES, stride))
         return self._accessor(array, bounds, view, offset)
 
+    def colours(self, colours: npt.ArrayLike) -> int:
+        """Accessor of COLOR_0, (V, 4): in 8 or 16 bits where these say exactly the same, else in floats."""
+        array = _native(colours)
+        for kind in (np.uint8, np.uint16):
+            top = np.float32(np.iinfo(kind).max)
+            whole = np.rint(np.clip(array, 0, 1) * top)
+            if np.array_equal(whole / top, array):  # as the reader scales them
+                shown = self.attribute(whole.astype(kind))
+                self.root["accessors"][shown]["normalized"] = True
+                return shown
+        return self.attribute(array)
+
     def triangles(self, triangles: npt.ArrayLike) -> int:
         """Accessor of the corners of triangles, (F, 3)."""
         corners = _unsigned(np.asarray(triangles).reshape(-1, 1), RESTART - 1)

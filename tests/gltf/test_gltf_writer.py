@@ -102,6 +102,33 @@ def test_displacements_are_sparse_where_most_vertices_stay(tmp_path: Path) -> No
         assert np.array_equal(morph, expected)
 
 
+@pytest.mark.parametrize(
+    ("colours", "component", "size"),
+    [
+        ([[0, 0.2, 1, 1], [1, 1, 1, 1]], 5121, 8),  # 51 / 255
+        ([[0, 13107 / 65535, 1, 1], [1 / 65535, 1, 1, 1]], 5123, 16),
+        ([[0, 0.123, 1, 1], [1, 1, 1, 1]], 5126, 32),
+        ([[0, 2, 1, 1], [1, 1, 1, 1]], 5126, 32),
+    ],
+)
+def test_colours_take_few_bytes_only_without_loss(
+    tmp_path: Path, colours: list[list[float]], component: int, size: int
+) -> None:
+    builder = Builder()
+    shades = np.array(colours, np.float32)
+    attributes = {"POSITION": builder.attribute(CORNERS[:2], bounds=True), "COLOR_0": builder.colours(shades)}
+    primitive = {"attributes": attributes, "indices": builder.triangles([[0, 1, 0]])}
+    builder.add("meshes", {"primitives": [primitive]})
+    builder.save(tmp_path / "a.glb")
+    document, _ = parsed((tmp_path / "a.glb").read_bytes())
+    entry = document["accessors"][1]
+    assert (entry["componentType"], entry.get("normalized", False)) == (component, component != 5126)
+    assert document["bufferViews"][entry["bufferView"]]["byteLength"] == size
+    found = read_gltf(tmp_path / "a.glb").meshes[0].primitives[0].colours
+    assert found is not None
+    assert np.array_equal(found, shades)
+
+
 def test_a_picture_is_kept_once() -> None:
     builder = Builder()
     png = b"\x89PNG\r\n\x1a\n123"

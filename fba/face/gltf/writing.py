@@ -48,9 +48,11 @@ def _primitive(builder: Builder, part: Part, materials: _Materials) -> dict[str,
             f"part {part.name!r} has a texture, but no texture coordinates; leave the texture out"
         )
     attributes = {"POSITION": builder.attribute(part.vertices, bounds=True)}
-    for key, array in (("NORMAL", part.normals), ("TEXCOORD_0", part.texcoords), ("COLOR_0", part.colours)):
+    for key, array in (("NORMAL", part.normals), ("TEXCOORD_0", part.texcoords)):
         if array is not None:
             attributes[key] = builder.attribute(array)
+    if part.colours is not None:
+        attributes["COLOR_0"] = builder.colours(part.colours)
     return {
         "attributes": attributes,
         "indices": builder.triangles(part.triangles),
