@@ -84,7 +84,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
             far[name] = float(away[nearest])
         else:
             found[row] = pool[nearest]
-    tried = [name for name in sought if np.isfinite(points[row_of()[name]]).all()]
+    tried = [name for name in names() if np.isfinite(points[row_of()[name]]).all()]
     if len(far) > len(tried) / 2 and len(far) > 3:
         worst = max(far, key=lambda name: far[name])
         raise ModelError(

@@ -1,8 +1,9 @@
 """MakeHuman's base mesh: the head and neck of it, with eyes, teeth, tongue, lashes and feature points.
 
 Users point it at a copy of their own (the files are CC0). `makehuman.csv` says which vertices of the base
-mesh "hm08" are the feature points, `makehuman_cuts.csv` where head and neck end, where the sockets
-behind the eyeballs are cut off and where the inside of the mouth begins. The base mesh is in decimetres, +x the subject's left, +y up, +z forward.
+mesh "hm08" are the feature points, `makehuman_cuts.csv` where head and neck end, where the sockets behind
+the eyeballs are cut off and where the inside of the mouth begins. The base mesh is in decimetres, +x the
+subject's left, +y up, +z forward.
 """
 
 from __future__ import annotations

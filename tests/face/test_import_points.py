@@ -1,0 +1,231 @@
+"""Files of feature points: CSV, JSON, text FDP, Xface FDP."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fba.errors import FbaWarning, ModelError
+from fba.face.fapu import Fapu
+from fba.face.feature_points import neutral_points, row_of
+from fba.face.importers.fdp import load_fdp, read_fdp
+from fba.face.importers.points_file import given_points, read_points
+
+XFACE = """<?xml version="1.0"?><xfdp><head><file version="0.2"/>
+<fapu ENS0="51" ES0="69" IRISD0="16" MNS0="30" MW0="50"/></head>
+<source><entity alias="Rest" category="Expression"><mesh file="head.wrl" format="wrl"/>
+<bind item="LeftEye" submesh="head.wrl_1"/></entity></source>
+<fdp affects="head.wrl_0" index="2" name="9.3"><indices>0 1 2</indices>
+<influence fap="62" type="RaisedCosInfluenceSph" weight="0.3"/></fdp>
+<fdp affects="head.wrl_1" index="0" name="3.5"><indices/></fdp></xfdp>"""
+WORLD = """#VRML V2.0 utf8
+DEF one Shape { geometry IndexedFaceSet {
+  coord Coordinate { point [ 0 0 0, 10 0 0, # a comment
+    0 10 5 ] } coordIndex [ 0, 1, 2, -1 ]
+  texCoord TextureCoordinate { point [ 0 0, 1 1 ] } } }
+Shape { appearance Appearance { texture ImageTexture { url "a#b.png" } }
+  geometry IndexedFaceSet { coord Coordinate { point [ 3 1 2, 4 1 2, 3 2 2, 4 2 2 ] }
+  coordIndex [ 0 1 3 2 ] } }
+"""
+
+
+def test_csv(tmp_path: Path) -> None:
+    file = tmp_path / "p.csv"
+    file.write_text('point,x,y,z\n# comment\n"9.3",0,-0.5,1e1\n\n2.1,17\n')
+    given = read_points(file)
+    assert given.vertices == {"2.1": 17}
+    np.testing.assert_array_equal(given.points[row_of()["9.3"]], [0, -0.5, 10])
+    assert np.isfinite(given.points).all(axis=1).sum() == 1
+    for separator in (";", "\t", "  "):
+        file.write_text(separator.join(["9.3", "0", "-0.5", "10"]) + "\n")
+        np.testing.assert_array_equal(read_points(file).points[row_of()["9.3"]], [0, -0.5, 10])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("9.3,1,2\n", ":1: 'name,x,y,z'"),
+        ("9.3,1\n9.3,2\n", ":2: feature point 9.3 comes twice"),
+        ("9.99,1\n", ":1: there is no feature point '9.99'"),
+        ("name,x\nnose,1\n", ":2: there is no feature point 'nose'"),
+        ("9.3,a,b,c\n", ":1: a coordinate must be a finite number"),
+        ("9.3,0,0,nan\n", "finite number"),
+        ("9.3,1.5\n", ":1: a vertex must be a whole number"),
+        ("9.3,-1\n", "vertices count from 0"),
+        ("# nothing\n", "no feature point in it"),
+    ],
+)
+def test_bad_csv(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "p.csv"
+    file.write_text(text)
+    with pytest.raises(ModelError) as caught:
+        read_points(file)
+    assert words in str(caught.value)
+    assert "p.csv" in str(caught.value)
+
+
+def test_json(tmp_path: Path) -> None:
+    file = tmp_path / "p.json"
+    file.write_text(json.dumps({"points": {"9.3": [0, 1, 2], "2.1": 5}}))
+    given = read_points(file)
+    assert given.vertices == {"2.1": 5}
+    np.testing.assert_array_equal(given.points[row_of()["9.3"]], [0, 1, 2])
+    for bad in ("{", "[]", '{"9.3": "here"}', '{"9.3": [1, 2]}', '{"9.3": true}', '{"x": 1}', "[" * 100000):
+        file.write_text(bad)
+        with pytest.raises(ModelError, match=r"p\.json"):
+            read_points(file)
+
+
+def test_points_as_arrays_and_mappings() -> None:
+    assert given_points(neutral_points()).points.shape == (84, 3)
+    assert given_points({"9.3": 4}).vertices == {"9.3": 4}
+    for bad in (np.zeros((83, 3)), "", {}, [[1]], 5, np.full((84, 3), np.inf)):
+        with pytest.raises(ModelError):
+            given_points(bad)
+
+
+def text_fdp(points: np.ndarray, **changed: str) -> str:
+    lines = ["# FDP file", "1.0 test 0 0 0 0 0 0"]
+    lines += [
+        f"  {n} {x:.6f} {y:.6f} {z:.6f} 0.{r}"
+        for (n, r), (x, y, z) in zip(row_of().items(), points, strict=True)
+    ]
+    return "\r\n".join([*lines, *changed.values(), "NUL 0", "NLL 0"])
+
+
+def test_text_fdp_gives_points_and_vertices(tmp_path: Path) -> None:
+    file = tmp_path / "a.fdp"
+    file.write_text(text_fdp(neutral_points()))
+    fdp = load_fdp(file)
+    np.testing.assert_allclose(fdp.points, neutral_points(), atol=1e-6)
+    # "0.10" is vertex 10 of mesh 0, not a tenth
+    assert fdp.vertices["2.12"] == ("0", row_of()["2.12"])
+    assert [name for name, row in row_of().items() if row == 10] == [
+        name for name, (_, vertex) in fdp.vertices.items() if vertex == 10
+    ]
+
+
+def test_wrong_sides_are_put_right_with_a_warning(tmp_path: Path) -> None:
+    points, row = neutral_points().copy(), row_of()
+    points[row["10.10"], 0] *= -1
+    points[[row["3.8"], row["3.12"]]] = points[[row["3.12"], row["3.8"]]]
+    points[[row["4.1"], row["4.2"]]] = points[[row["4.2"], row["4.1"]]]
+    file = tmp_path / "a.fdp"
+    file.write_text(text_fdp(points))
+    with pytest.warns(FbaWarning, match=r"4\.1 and 4\.2 .*3\.8 and 3\.12 .*10\.10 is on the other side"):
+        found = read_fdp(file)
+    np.testing.assert_allclose(found, neutral_points(), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("2.1 0 0 0 0.1\n", ":1: an FDP file begins with"),
+        ("1.0 a\n2.1 0 0\n", ":2: a feature point is"),
+        ("1.0 a\n2.1 0 0 x 0.1\n", ":2: a coordinate"),
+        ("1.0 a\n2.1 0 0 0 0.x\n", ":2: the vertex in MESH.VERTEX"),
+        ("1.0 a\n2.1 0 0 0\n2.1 0 0 0\n", ":3: feature point 2.1 comes twice"),
+        ("1.0 a\n", "no feature point in it"),
+    ],
+)
+def test_bad_text_fdp(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "a.fdp"
+    file.write_text(text)
+    with pytest.raises(ModelError) as caught:
+        read_fdp(file)
+    assert words in str(caught.value)
+
+
+def test_xface_names_vertices_of_its_meshes(tmp_path: Path) -> None:
+    file = tmp_path / "head.fdp"
+    file.write_text(XFACE)
+    fdp = load_fdp(file)
+    assert fdp.distances == {"ENS0": 51, "ES0": 69, "IRISD0": 16, "MNS0": 30, "MW0": 50}
+    assert fdp.vertices == {"9.3": ("head.wrl_0", 2), "3.5": ("head.wrl_1", 0)}
+    # such files count FAPs from 0: 62 is FAP 63, raise_nose
+    assert [(i.fap, i.weight, i.vertices) for i in fdp.influences] == [(63, 0.3, (0, 1, 2))]
+    assert fdp.meshes[0].bind == {"head.wrl_1": "LeftEye"}
+    with pytest.raises(ModelError, match=r"needs head\.wrl, whose vertices it names"):
+        read_fdp(file)
+    (tmp_path / "head.wrl").write_text(WORLD)
+    points = read_fdp(file)
+    np.testing.assert_array_equal(points[row_of()["9.3"]], [0, 10, 5])
+    np.testing.assert_array_equal(points[row_of()["3.5"]], [3, 1, 2])
+    assert np.isfinite(points).all(axis=1).sum() == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("</xfdp>", "", "not well-formed"),
+        ("<xfdp>", "<!DOCTYPE a><xfdp>", "DOCTYPE"),
+        ("xfdp>", "face>", "outermost element"),
+        ('name="9.3"', 'name="nose"', "<fdp> number 1: there is no feature point 'nose'"),
+        ('index="2"', 'index="two"', "<fdp> number 1: index"),
+        ("0 1 2<", "0 -1 2<", "vertex -1 is negative"),
+        ('fap="62"', 'fap="68"', "fap 68 of <influence> does not exist"),
+        ('weight="0.3"', 'weight="inf"', "finite number"),
+        ('index="2"', 'index="3"', "vertex 3 of shape 0"),
+        ("head.wrl_0", "head.wrl_7", "shape 7"),
+        ("head.wrl_0", "../head.wrl", "FILE_NUMBER"),
+        ('ES0="69"', 'ES0="x"', "ES0 of <fapu>"),
+    ],
+)
+def test_bad_xface(tmp_path: Path, old: str, new: str, words: str) -> None:
+    (tmp_path / "head.wrl").write_text(WORLD)
+    file = tmp_path / "head.fdp"
+    assert old in XFACE
+    file.write_text(XFACE.replace(old, new))
+    with pytest.raises(ModelError) as caught:
+        read_fdp(file)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("#VRML", "VRML", ":1: a VRML file"),
+        ("0 10 5 ]", "0 10 ]", "not 3 each"),
+        ("0, 1, 2, -1", "0, 1, 9, -1", "coordIndex 9"),
+        ("0, 1, 2, -1", "0, 1, x, -1", "an index must be a whole number"),
+        ("0 10 5", "0 10 nan", ":4: a coordinate"),
+        ("Shape {", "Shape {{", "open brackets"),
+        ("IndexedFaceSet", "IndexedLineSet", "no IndexedFaceSet"),
+        ("DEF one", "}", "closed that is not open"),
+    ],
+)
+def test_bad_vrml(tmp_path: Path, old: str, new: str, words: str) -> None:
+    (tmp_path / "head.fdp").write_text(XFACE)
+    (tmp_path / "head.wrl").write_text(WORLD.replace(old, new))
+    with pytest.raises(ModelError) as caught:
+        read_fdp(tmp_path / "head.fdp")
+    assert words in str(caught.value)
+    assert "head.wrl" in str(caught.value)
+
+
+def test_the_real_xface_file_says_which_mesh_it_needs(shared: Path) -> None:
+    file = shared / "data/xface/alice.fdp"
+    fdp = load_fdp(file)
+    assert fdp.distances == {"ENS0": 51, "ES0": 69, "IRISD0": 16, "MNS0": 30, "MW0": 50}
+    assert (len(fdp.vertices), len(fdp.influences), len(fdp.meshes)) == (33, 43, 29)
+    assert fdp.vertices["2.1"] == ("alice.wrl_3", 2395)
+    if not (file.parent / "alice.wrl").exists():
+        with pytest.raises(ModelError, match=r"needs alice\.wrl"):
+            read_fdp(file)
+
+
+def test_the_real_text_file(shared: Path) -> None:
+    with pytest.warns(FbaWarning) as seen:
+        points = read_fdp(shared / "data/candide/candide3.fdp")
+    said = " ".join(str(warning.message) for warning in seen)
+    for words in ("12.1", "3.5 is on the other side", "3.8 and 3.12 have changed places"):
+        assert words in said
+    assert np.isfinite(points).all(axis=1).sum() == 67
+    # from the lines of the file: 2 x 0.4256 between the pupils, -0.371 - -0.6454 from nose to mouth
+    fapu = Fapu.measure(points)
+    np.testing.assert_allclose(
+        [fapu.ES * 1024, fapu.MNS * 1024, fapu.MW * 1024], [0.8512, 0.2744, 0.6888], rtol=1e-6
+    )
