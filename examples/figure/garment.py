@@ -15,8 +15,8 @@ COLOUR = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 AXIS = -0.088
 THICK = 0.0038
-LOWEST = -0.44
-WIDEST = 0.235
+LOWEST = -0.36
+WIDEST = 0.225
 
 
 def neckline(places: Float64) -> Float64:
@@ -109,7 +109,7 @@ def _on_neckline(places: Float64, skin: Float64) -> Float64:
 def _finer(surface: figure.Surface) -> figure.Surface:
     """Every quad cut into four where the shirt hangs near the neck."""
     middle = surface.vertices[surface.quads].mean(axis=1)
-    refined = refine(surface, middle[:, 1] > neckline(middle) - 0.045)
+    refined = refine(surface, middle[:, 1] > neckline(middle) - 0.016)
     # As quads again: each triangle counts as one with a doubled corner.
     quads = np.concatenate([refined.triangles, refined.triangles[:, 2:]], axis=1)
     return figure.Surface(refined.vertices, quads, quads * 0, refined.uvs)

@@ -74,7 +74,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     square = 2.8
     cx = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** (2 / square)
     cz = np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** (2 / square)
-    rows = np.array([0.0, 0.05, 0.22, 0.55, 0.85, 1.12])  # edge to below the gum
+    rows = np.array([0.0, 0.06, 0.32, 0.75, 1.12])  # edge to below the gum
     # Narrow at the neck, widest near the edge; the edge of a front tooth is thin.
     wide = np.interp(rows, [0, 0.05, 0.25, 0.7, 1.12], [0.86, 0.95, 1.0, 0.93, 0.76])
     deep = np.interp(rows, [0, 0.05, 0.3, 0.8, 1.12], [flat * 0.80, flat, 0.35 + 0.6 * flat, 0.92, 1.0])
@@ -130,7 +130,7 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
     widths = np.array([float(row["width"]) for row in rows]) / 1000
     heights = np.array([float(row["height"]) for row in rows]) / 1000
     ends = np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
-    half = np.linspace(0, ends[-1] - 0.0005, 36)
+    half = np.linspace(0, ends[-1] - 0.0005, 32)
     low = np.zeros(len(half))
     for k, length in enumerate(half):
         tooth = min(int(np.searchsorted(ends, length, side="right")) - 1, len(widths) - 1)
@@ -138,8 +138,7 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
         low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
     places = [_arch(length, inset) for length in half]
     profile = [  # out of the arch (mm), above the scallop (mm)
-        (-3.0, -0.6), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), (0.9, 4.0), (0.2, 7.5), (-2.0, 9.5),
-        (-8.5, 6.0), (-9.0, -0.6),
+        (-2.0, -0.4), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), (0.7, 5.5), (-2.0, 9.5), (-8.8, -0.4),
     ]  # fmt: skip
     band = np.zeros((len(profile), len(half), 3))
     for k, (place, turn) in enumerate(places):
@@ -171,7 +170,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     ])  # fmt: skip
     from scipy.interpolate import PchipInterpolator
 
-    rings, around = 25, 28
+    rings, around = 21, 24
     t = np.linspace(0, 1, rings)
     knots = np.linspace(0, 1, len(spine))
     z, top, half, tall = PchipInterpolator(knots, spine / 1000)(t).T
@@ -203,7 +202,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
     body = int(np.abs(t - 0.52).argmin())
     upward = around // 4
-    found = {"6.1": point, "6.2": body * around + upward, "6.3": body * around + around // 28 * 0, "6.4": 0}
+    found = {"6.1": point, "6.2": body * around + upward, "6.3": body * around + 0, "6.4": 0}
     side = int(np.abs(t - 0.60).argmin())
     found["6.3"], found["6.4"] = side * around, side * around + around // 2
     mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.7)])
