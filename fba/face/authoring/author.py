@@ -15,7 +15,7 @@ from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.eyes import Eye, eye_transforms, eyes, pupil_motions
 from fba.face.authoring.jaw import CHIN, Jaw, jaw, opening, share_of_part, turned
 from fba.face.authoring.landmarks import Landmarks, landmarks
-from fba.face.authoring.lids import LEAST_AREA, LIDS, lash_motion, lid_motion
+from fba.face.authoring.lids import LIDS, lash_motion, lid_motion
 from fba.face.authoring.lips import HANDLES, lip_motions
 from fba.face.authoring.motion import Motion, by_part, tables
 from fba.face.authoring.relax import relaxed
@@ -199,8 +199,8 @@ class _Authoring:
         moving = np.flatnonzero(found.share)
         shifts = turned(points[moving], found, angles) * found.share[moving][:, None]
         whole = Motion(values, moving, shifts)
-        motion = relaxed(self.marks.surface, self.limiter, whole, self._pinned(), LEAST_AREA)
-        motion = guarded(self.limiter, motion, LEAST_AREA)
+        motion = relaxed(self.marks.surface, self.limiter, whole, [self._pinned()], True)
+        motion = guarded(self.limiter, motion, turning=True)
         self._surface(OPEN_JAW, motion)
         # what the skin stops at, teeth and tongue stop at too
         reached = angles_at(motion, values, angles)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 Float64 = npt.NDArray[np.float64]
 Int = npt.NDArray[np.intp]
 
-TANGENT = 0.7
+TANGENT = 1.0
 """1 makes straight lines through the points stay straight, 0 keeps the shares of far points from dipping
 below 0; between them lies what looks best."""
 

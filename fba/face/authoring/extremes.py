@@ -14,6 +14,10 @@ MOST_STRETCH = 5.0
 """No edge gets longer than this many times its neutral length..."""
 TINY_EDGE = 0.25
 """... or, where edges are short, of this share of the typical edge of what moves."""
+FOLDED = -0.3
+"""A triangle whose normal has this cosine with that of its neighbours lies folded on them."""
+SPECK = 0.002
+"""Share of the moving surface that may lie folded where skin closes on itself."""
 DEGENERATE = 1e-5
 """Triangles of less than this share of the typical area have no front to turn."""
 
@@ -57,26 +61,51 @@ class Limiter:
             result = np.minimum(result, stretch)
         return result
 
-    def sound(self, shifts: Float64, triangles: Int, least: float = LEAST_AREA) -> bool:
-        """Whether vertices + shifts (N, 3) keeps all these triangles sound."""
-        return bool(self.soundness(shifts, triangles, least).all())
+    def sound(self, shifts: Float64, triangles: Int, *, turning: bool = False) -> bool:
+        """Whether vertices + shifts (N, 3) keeps all these triangles sound.
 
-    def soundness(
-        self, shifts: Float64, triangles: Int, least: float = LEAST_AREA
-    ) -> npt.NDArray[np.bool_]:
-        """(M,) which triangles stay sound under shifts. least: share of its area that each keeps."""
+        turning: as in `soundness`; then specks that fold in the corners of the eye or mouth may be.
+        """
+        fine = self.soundness(shifts, triangles, turning=turning)
+        if not turning or fine.all():
+            return bool(fine.all())
+        corners = self._vertices[triangles]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        return float(areas[~fine].sum()) <= SPECK * float(areas.sum())
+
+    def soundness(self, shifts: Float64, triangles: Int, *, turning: bool = False) -> npt.NDArray[np.bool_]:
+        """(M,) which triangles stay sound under shifts.
+
+        turning: what moves may turn, as a lid does about the eyeball; then a triangle has folded where it
+        faces away from its neighbours, not where it faces away from its neutral place.
+        """
         p = self._vertices
         q = p + shifts
         e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
         f1, f2 = (q[triangles[:, k]] - q[triangles[:, 0]] for k in (1, 2))
-        normal = np.cross(e1, e2)
-        kept = (np.cross(f1, f2) * normal).sum(axis=1) / (normal**2).sum(axis=1)
-        fine: npt.NDArray[np.bool_] = kept >= 0.8 * least
+        before, after = np.cross(e1, e2), np.cross(f1, f2)
+        if turning:
+            away = _facing(after, triangles, len(p)) < FOLDED
+            fine: npt.NDArray[np.bool_] = ~(away & (_facing(before, triangles, len(p)) > 0))
+        else:
+            fine = (before * after).sum(axis=1) >= 0.8 * LEAST_AREA * (before**2).sum(axis=1)
         lengths = np.linalg.norm(np.stack([e1, e2, e2 - e1]), axis=2)
         typical = float(np.median(lengths)) if lengths.size else 0.0
         now = np.linalg.norm(np.stack([f1, f2, f2 - f1]), axis=2)
         fine &= (now <= 1.1 * MOST_STRETCH * np.maximum(lengths, TINY_EDGE * typical)).all(axis=0)
         return fine
+
+
+def _facing(normals: Float64, triangles: Int, count: int) -> Float64:
+    """(M,) cosine between the normal of each triangle (M, 3) and that of its neighbours without it."""
+    total = np.stack(
+        [np.bincount(triangles.ravel(), np.repeat(normals[:, axis], 3), count) for axis in range(3)], axis=1
+    )
+    around = total[triangles].sum(axis=1) - 3 * normals
+    product = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
+    result: Float64 = (around * normals).sum(axis=1) / np.maximum(product, 1e-30)
+    result[product < 1e-30] = 1.0
+    return result
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:

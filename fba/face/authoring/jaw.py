@@ -53,6 +53,8 @@ TEETH_MARGIN = 0.12
 """In a piece of teeth the jaw's share goes from 0 to 1 within this height about their edge, in MNS0."""
 CHEEK_MARGIN = 0.4
 """The inside of the mouth stretches over at least this height above and below the teeth's edge, in MNS0."""
+MIXED = 0.15
+"""Teeth further than this from half above and half below their common edge belong to one jaw."""
 LIP_DEPTH = 0.16
 """From this far behind the lips on, in ES0, the inside of the mouth belongs to the jaws."""
 
@@ -145,13 +147,32 @@ def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
     margin = TEETH_MARGIN * marks.fapu.MNS * 1024
     each = smooth_step(below_bite(marks, shape.vertices, hinge) / (2 * margin) + 0.5)
     if part.kind == "teeth":
+        row = _by_teeth_points(marks, part)
+        if row is not None:
+            return np.full(len(part.vertices), row)
+        # an overbite does not take the upper teeth along: the whole set decides, then each piece of it
+        if abs(float(each.mean()) - 0.5) > MIXED:
+            return np.full(len(part.vertices), float(each.mean() > 0.5))
         count = np.bincount(shape.component)
         mean = np.bincount(shape.component, each) / count
-        extent = np.array([each[shape.component == k].std() for k in range(len(count))])
-        whole = np.where(mean > 0.5, 1.0, 0.0)
-        each = np.where((np.minimum(mean, 1 - mean) < 0.4) | (extent < 0.2), whole[:], mean)[shape.component]
+        whole = np.abs(mean - 0.5) > MIXED
+        each = np.where(whole[shape.component], (mean > 0.5)[shape.component], each)
     result: Float64 = each[shape.number]
     return result
+
+
+def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
+    """1 for the lower teeth, 0 for the upper, where the feature points of only one row are on a part."""
+    close = {}
+    for row, names in ((0.0, ("9.8", "9.10")), (1.0, ("9.9", "9.11"))):
+        known = [place for name in names if np.isfinite(place := marks.place(name)).all()]
+        if not known:
+            return None
+        away = [float(np.linalg.norm(part.vertices - place, axis=1).min()) for place in known]
+        close[row] = max(away) < 0.05 * marks.fapu.MNS * 1024
+    if close[0.0] == close[1.0]:
+        return None
+    return 1.0 if close[1.0] else 0.0
 
 
 def _share(marks: Landmarks, hinge: Float64) -> Float64:

@@ -18,7 +18,7 @@ from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion, limits
 from fba.face.authoring.relax import relaxed
 from fba.face.authoring.saturation import guarded
-from fba.face.authoring.weights import region, smooth_step, spread, without_hem
+from fba.face.authoring.weights import smooth_step, without_hem
 from fba.face.model import Part
 
 Float64 = npt.NDArray[np.float64]
@@ -28,24 +28,44 @@ LIDS = {19: ("left", "upper"), 20: ("right", "upper"), 21: ("left", "lower"), 22
 CLOSED = 1024
 STEP = 128
 """Values between two borders of the tables: an eighth of the way."""
-REACH = {"upper": 0.6, "lower": 0.4}
-"""How far a lid pulls at the skin around it, in ES0."""
+REACH = 0.6
+"""How far a lid pulls at the skin around it at most, in ES0."""
+CREASE = 0.11
+"""Distance from the margin to the crease in ES0, where its feature point is unknown."""
+FOLD = {
+    ("left", "upper"): "3.13",
+    ("right", "upper"): "3.14",
+    ("left", "lower"): "3.9",
+    ("right", "lower"): "3.10",
+}
+"""The feature points on the creases."""
+AT_CREASE = 0.25
+"""The crease goes this share of the margin's way."""
+ENDS = 3.5
+"""What is this many times as far away as the crease rests."""
+EDGE = 0.4
+"""The lid's edge, up to this share of the distance to the crease, goes as one."""
+FURTHER = 0.2
+"""The front edge of a lid may go this much further than the margin."""
+NARROW = 0.4
+"""At the corners of the eye distances shrink to this."""
+SMOOTHINGS = 4
 STILL = {
     "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
-SLACK = 0.12
 HEM = 0.006
-LEAST_AREA = 0.03
-"""A lid turns and unfolds: a triangle seen along its neutral normal keeps only this share of its area."""
-CORNER = 0.2
-"""Where the opening is lower than this share of its height, the margins give way to folds."""
+CORNERS = (0.15, 0.3, 0.5)
+"""Where the opening is lower than this share of its height, the margins may give way to folds."""
 CLEARANCE = 0.012
 """Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
 FREED = 0.3
 """Share of the way after which a lid has its full clearance."""
 BULGE = np.radians(12.0)
 """The cornea bulges by this much beyond where it is now: the eye may look elsewhere."""
+STRICT = np.radians(4.0)
+OUTSIDE = 0.97
+"""What is this far out, in radii of the eyeball, lies before it."""
 COLUMNS = 65
 
 
@@ -69,7 +89,7 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     opening = measure(marks, eye)
     if opening is None:
         return f"the lids of the {side} eye are not one above the other"
-    share = _share(marks, side, lid, own, other)
+    share = _share(marks, opening, eye, lid, own, other)
     vertices = np.flatnonzero(share > 0)
     points = marks.surface.vertices[vertices]
     values = lid_values(fap)
@@ -78,13 +98,14 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     for k, value in enumerate(values):
         freed = float(smooth_step(np.array([abs(value) / CLOSED / FREED]))[0])
         shifts[k] += profile.lift(points, shifts[k]) * freed
-    pinned = np.zeros(len(marks.surface), dtype=bool)
-    for line in (own, other):
-        at = marks.surface.vertices[line, 0]
-        gap = opening.upper[:, 0] - opening.lower[:, 0]
-        pinned[line[np.interp(at, opening.x, gap) > CORNER * gap.max()]] = True
-    motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), pinned, LEAST_AREA)
-    return guarded(limiter, motion, LEAST_AREA)
+    gap = opening.upper[:, 0] - opening.lower[:, 0]
+    margins = np.concatenate([own, other])
+    apart = np.interp(marks.surface.vertices[margins, 0], opening.x, gap) / gap.max()
+    pins = np.zeros((len(CORNERS), len(marks.surface)), dtype=bool)
+    for pin, corner in zip(pins, CORNERS, strict=True):
+        pin[margins[apart > corner]] = True
+    motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), list(pins), True)
+    return guarded(limiter, motion, turning=True)
 
 
 def lid_values(fap: int) -> Float64:
@@ -119,14 +140,22 @@ def measure(marks: Landmarks, eye: Eye) -> Opening | None:
 
 
 def slid(
-    points: Float64, share: Float64, opening: Opening, eye: Eye, lid: str, way: Float64, lash: bool = False
+    points: Float64,
+    share: Float64,
+    opening: Opening,
+    eye: Eye,
+    lid: str,
+    way: Float64,
+    *,
+    columns: Float64 | None = None,
 ) -> Float64:
     """(K, N, 3): shifts of points (N, 3) when a lid has gone some shares (K,) of the way to the other.
 
-    share: (N,), how much each goes with the margin of its column.
+    share: (N,), how much each goes with the margin of its column. columns: (N,), x of the columns, where
+    they are not the points' own, as of a lash that goes with its root.
     """
     own, other = (opening.upper, opening.lower) if lid == "upper" else (opening.lower, opening.upper)
-    column = np.clip(points[:, 0], opening.x[0], opening.x[-1])
+    column = np.clip(points[:, 0] if columns is None else columns, opening.x[0], opening.x[-1])
     here, there = (
         np.stack([np.interp(column, opening.x, line[:, axis]) for axis in (0, 1)], axis=1)
         for line in (own, other)
@@ -136,7 +165,7 @@ def slid(
     depth = points[:, 2] - eye.centre[2]
     distance = np.hypot(height, depth)
     # what is further out than the margin turns less: it moves no further than the margin does
-    part = share if lash else share * np.minimum(1.0, radius / np.maximum(distance, 1e-12))
+    part = share if columns is not None else share * np.minimum(1.0, radius / np.maximum(distance, 1e-12))
     start = np.arcsin(np.clip(here[:, 0] / np.maximum(radius, 1e-12), -1, 1))
     shifts = np.zeros((len(way), len(points), 3))
     for k, t in enumerate(way):
@@ -158,7 +187,8 @@ class Profile:
     def __init__(self, eye: Eye, parts: Sequence[Part]) -> None:
         self._eye = eye
         self._angles = np.linspace(0, np.pi, 73)
-        self._radii = np.full(73, eye.radius)
+        self._here = np.full(73, 0.0)
+        self._around = np.full(73, eye.radius)
         for part in parts:
             if part.name not in eye.parts:
                 continue
@@ -166,25 +196,29 @@ class Profile:
             reach = np.linalg.norm(arms, axis=1)
             angle = np.arccos(np.clip(arms @ eye.gaze / np.maximum(reach, 1e-12), -1, 1))
             for k, at in enumerate(self._angles):
-                near = np.abs(angle - at) < BULGE
-                if near.any():
-                    self._radii[k] = max(self._radii[k], float(reach[near].max()))
+                for radii, spread_ in ((self._here, STRICT), (self._around, BULGE)):
+                    near = np.abs(angle - at) < spread_
+                    if near.any():
+                        radii[k] = max(radii[k], float(reach[near].max()))
+        self._here[self._here == 0.0] = eye.radius
 
-    def radius(self, points: Float64) -> Float64:
-        """(N,) how far the eyeball reaches in the directions of points (N, 3)."""
+    def radius(self, points: Float64, *, around: bool) -> Float64:
+        """(N,) how far the eyeball reaches in the directions of points (N, 3), or in those around them."""
         arms = points - self._eye.centre
         reach = np.linalg.norm(arms, axis=1)
         angle = np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1))
-        result: Float64 = np.interp(angle, self._angles, self._radii)
+        result: Float64 = np.interp(angle, self._angles, self._around if around else self._here)
         return result
 
     def lift(self, points: Float64, shifts: Float64) -> Float64:
         """(N, 3): what must be added, forwards, so that what was outside the eyeball stays outside."""
         at = points + shifts
-        needed = self.radius(at) + CLEARANCE * self._eye.radius
+        needed = self.radius(at, around=True) + CLEARANCE * self._eye.radius
         arms = at - self._eye.centre
         level = (arms[:, :2] ** 2).sum(axis=1)
-        outside = np.linalg.norm(points - self._eye.centre, axis=1) >= 0.98 * self.radius(points)
+        outside = np.linalg.norm(points - self._eye.centre, axis=1) >= OUTSIDE * self.radius(
+            points, around=False
+        )
         before = np.sqrt(np.maximum(needed**2 - level, 0.0))
         moved = np.linalg.norm(shifts, axis=1) > 1e-9
         push = np.where(outside & moved & (arms[:, 2] > 0), np.maximum(before - arms[:, 2], 0.0), 0.0)
@@ -197,22 +231,59 @@ def _other(lid: str) -> str:
     return "lower" if lid == "upper" else "upper"
 
 
-def _share(marks: Landmarks, side: str, lid: str, own: Int, other: Int) -> Float64:
-    surface, es = marks.surface, marks.fapu.ES * 1024
+def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Int, other: Int) -> Float64:
+    """(N,) how much each vertex goes with the margin of its column.
+
+    All of it on the lid's edge, a quarter at the crease, nothing well before the brow; towards the corners,
+    where the crease comes closer, within a shorter distance.
+    """
+    surface, es, side = marks.surface, marks.fapu.ES * 1024, eye.side
     stays = np.setdiff1d(other, own)
     still = [marks.vertex[name] for name in STILL[side] if marks.has(name)]
-    reach = REACH[lid] * es
-    near = surface.distances(own, reach)
-    far = surface.distances(still, 4 * reach)
-    free = region(near, far, reach, 0.85)
-    fixed = np.concatenate([own, stays])
-    given = np.concatenate([np.ones(len(own)), np.zeros(len(stays))])
-    field = spread(surface, free, fixed, given[:, None], slack=SLACK * es)[:, 0]
-    return without_hem(np.clip(field, 0.0, 1.0), HEM)
+    away = surface.distances(own, 2 * REACH * es)
+    crease = CREASE * es
+    if marks.has(FOLD[side, lid]):
+        crease = float(np.clip(away[marks.vertex[FOLD[side, lid]]], 0.5 * crease, 1.5 * crease))
+    gap = np.maximum(opening.upper[:, 0] - opening.lower[:, 0], 0.0)
+    high = np.interp(surface.vertices[:, 0], opening.x, gap / gap.max())
+    end = min(ENDS, 0.85 * float(away[still].min(initial=np.inf)) / crease)
+    folds = away / (crease * (NARROW + (1 - NARROW) * high))
+    power = np.log(AT_CREASE) / np.log(1 - (1 - EDGE) / (end - EDGE)) if end > 1 + EDGE else 2.0
+    share = np.clip((end - np.maximum(folds, EDGE)) / (end - EDGE), 0.0, 1.0) ** power
+    share *= 1 + _overhang(surface.vertices, opening, eye, lid, gap.max()) * np.clip(
+        2 - folds / EDGE, 0.0, 1.0
+    )
+    # walking along edges makes the distances uneven
+    pinned = np.zeros(len(surface), dtype=bool)
+    pinned[own] = pinned[stays] = True
+    share[own] = 1.0
+    share[stays] = 0.0
+    near = np.flatnonzero((share > 0) & ~pinned)
+    average = surface.graph[near].astype(bool).astype(np.float64)
+    average = average.multiply(1 / np.maximum(average.sum(axis=1), 1)[:, None]).tocsr()
+    for _ in range(SMOOTHINGS):
+        share[near] = 0.5 * share[near] + 0.5 * (average @ share)
+    return without_hem(share, HEM)
+
+
+def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:
+    """(N,) how much further than the margin the front edge of a lid must go to meet that of the other.
+
+    The margin lies on the eyeball; the front edge before it is further away from the other lid.
+    """
+    margin, sign = (opening.upper, 1.0) if lid == "upper" else (opening.lower, -1.0)
+    height, depth = (np.interp(points[:, 0], opening.x, margin[:, axis]) for axis in (0, 1))
+    gap = np.interp(points[:, 0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
+    before = points[:, 2] - eye.centre[2] > depth
+    back = np.maximum(sign * (points[:, 1] - eye.centre[1] - height), 0.0)
+    further = np.clip(2 * back / np.maximum(gap, 0.2 * widest), 0.0, FURTHER)
+    return np.where(before, further, 0.0)
 
 
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -> Motion:
-    """Lashes turn with the margin that they grow on, each connected piece with the nearer one."""
+    """Lashes turn with the margin that they grow on, each vertex as its root does."""
+    from scipy.sparse.csgraph import dijkstra
+
     from fba.face.authoring.surface import Surface
 
     side, name = LIDS[fap]
@@ -232,10 +303,19 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -
     middle = float((opening.upper[:, 0] + opening.lower[:, 0]).mean()) / 2 + eye.centre[1]
     upper = np.where(np.abs(closest[0] - closest[1]) < 0.1 * wide, mean > middle, closest[0] < closest[1])
     grows = (upper == (name == "upper")) & (np.minimum(*closest) < 0.25 * wide)
-    moving = np.flatnonzero(grows[pieces][shape.number])
+    away = reach[0 if name == "upper" else 1]
+    roots = np.flatnonzero(
+        grows[pieces] & (away < closest[0 if name == "upper" else 1][pieces] + 0.03 * wide)
+    )
+    if not len(roots):
+        return Motion(lid.values, np.zeros(0, dtype=np.intp), np.zeros((len(lid.values), 0, 3)))
+    _, _, root = dijkstra(shape.graph, directed=False, indices=roots, min_only=True, return_predecessors=True)
+    moving = np.flatnonzero((grows[pieces] & (root >= 0))[shape.number])
     points = part.vertices[moving].astype(np.float64)
+    columns = shape.vertices[root[shape.number[moving]], 0]
     ways = np.clip(lid.values, *_sound_range(lid)) / CLOSED
-    return Motion(lid.values, moving, slid(points, np.ones(len(points)), opening, eye, name, ways, lash=True))
+    turns = slid(points, np.ones(len(points)), opening, eye, name, ways, columns=columns)
+    return Motion(lid.values, moving, turns)
 
 
 def _sound_range(lid: Motion) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.authoring.extremes import LEAST_AREA, Limiter
+from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.motion import Motion
 from fba.face.authoring.surface import Surface
 
@@ -15,17 +15,19 @@ Float64 = npt.NDArray[np.float64]
 Int = npt.NDArray[np.intp]
 Bool = npt.NDArray[np.bool_]
 
-RINGS = (1, 2, 3, 4, 6, 8)
-"""How many edges around folded triangles may be eased, one after the other."""
-ROUNDS = 3
+RINGS = 4
+"""So many edges around folded triangles may be eased."""
+ROUNDS = 2
 """Easing one place may fold its neighbours; so many times this is looked after."""
 
 
-def relaxed(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, least: float) -> Motion:
+def relaxed(
+    surface: Surface, limiter: Limiter, motion: Motion, pins: Sequence[Bool], turning: bool
+) -> Motion:
     """The same motion with the surroundings of folded triangles stretched evenly.
 
-    pinned: (N,) vertices that must go where they go. least: share of its area that a triangle keeps.
-    Where even that does not help, the folds stay.
+    pins: (N,) vertices that must go where they go; where the first is too much, the next one holds.
+    turning: as in `Limiter.soundness`. Where nothing helps, the folds stay.
     """
     whole = np.zeros((len(motion.values), len(surface), 3))
     whole[:, motion.vertices] = motion.shifts
@@ -34,10 +36,11 @@ def relaxed(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, le
     moved[motion.vertices] = True
     for k in range(len(motion.values)):
         for _ in range(ROUNDS):
-            bad = triangles[~limiter.soundness(whole[k], triangles, least)]
+            bad = triangles[~limiter.soundness(whole[k], triangles, turning=turning)]
             if not len(bad):
                 break
-            whole[k] = _eased(surface, limiter, whole[k], bad, pinned, least)
+            for cluster in _clusters(bad):
+                whole[k] = _eased(surface, limiter, whole[k], cluster, pins, turning)
             moved |= whole[k].any(axis=1)
             triangles = limiter.touched(np.flatnonzero(moved))
     vertices = np.flatnonzero(moved)
@@ -52,7 +55,7 @@ def eased_field(
     for goal in goals:
         moving = np.flatnonzero(result.any(axis=1))
         motion = Motion(np.array([0.0, 1.0]), moving, np.stack([0 * result[moving], result[moving] * goal]))
-        again = relaxed(surface, limiter, motion, pinned, LEAST_AREA)
+        again = relaxed(surface, limiter, motion, (pinned,), False)
         trial = np.zeros_like(field)
         trial[again.vertices] = again.shifts[1] / goal
         if _worst(limiter, trial, goals) > _worst(limiter, result, goals):
@@ -67,59 +70,56 @@ def _worst(limiter: Limiter, field: Float64, goals: Sequence[float]) -> float:
     return min(*reached, 1.0)
 
 
-def _eased(
-    surface: Surface, limiter: Limiter, shifts: Float64, bad: Int, pinned: Bool, least: float
-) -> Float64:
-    """Shifts (N, 3) after easing around some triangles as little as is enough, or as helps most."""
-    best, fewest = shifts, len(bad)
-    core = np.zeros(len(surface), dtype=bool)
-    core[bad] = True
-    core &= ~pinned
-    as_one = _as_one(surface, shifts, bad, core)
-    region, done = core.copy(), 0
-    for rings in RINGS:
-        for _ in range(rings - done):
-            region |= (surface.graph @ region.astype(np.float64)) > 0
-        done = rings
-        touched = limiter.touched(np.flatnonzero(region))
-        for start, held in ((shifts, pinned), (as_one, pinned | core)):
-            trial = _harmonic(surface, start, region & ~held)
-            left = int((~limiter.soundness(trial, touched, least)).sum())
-            if left < fewest:
-                best, fewest = trial, left
-        if not fewest:
-            break
-    return best
-
-
-def _as_one(surface: Surface, shifts: Float64, bad: Int, core: Bool) -> Float64:
-    """Shifts where the vertices of folded triangles that hang together go together."""
+def _clusters(bad: Int) -> list[Int]:
+    """Triangles (M, 3) in groups that hang together."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
-    ends = np.concatenate([bad[:, :2], bad[:, 1:]])
-    graph = csr_array((np.ones(len(ends)), tuple(ends.T)), shape=(len(surface),) * 2)
-    labels = connected_components(graph, directed=False)[1]
-    count = np.bincount(labels[core], minlength=labels.max() + 1)
-    result = shifts.copy()
-    for axis in range(3):
-        total = np.bincount(labels[core], shifts[core, axis], minlength=len(count))
-        result[core, axis] = (total / np.maximum(count, 1))[labels[core]]
-    return result
+    vertices, local = np.unique(bad, return_inverse=True)
+    local = local.reshape(-1, 3)
+    ends = np.concatenate([local[:, :2], local[:, 1:]])
+    graph = csr_array((np.ones(len(ends)), tuple(ends.T)), shape=(len(vertices),) * 2)
+    labels = connected_components(graph, directed=False)[1][local[:, 0]]
+    return [bad[labels == k] for k in range(int(labels.max()) + 1)]
 
 
-def _harmonic(surface: Surface, shifts: Float64, free: Bool) -> Float64:
-    """Shifts with those of the free vertices replaced by what a stretched cloth would do."""
+def _eased(
+    surface: Surface, limiter: Limiter, shifts: Float64, bad: Int, pins: Sequence[Bool], turning: bool
+) -> Float64:
+    """Shifts (N, 3) after easing around some triangles as little as is enough, or as helps most."""
+    best, fewest = shifts, len(bad)
+    for pinned in pins:
+        core = np.unique(bad)
+        core = core[~pinned[core]]
+        as_one = shifts.copy()
+        if len(core):
+            as_one[core] = shifts[core].mean(axis=0)
+        region = core
+        for _ in range(RINGS):
+            region = np.unique(surface.graph[region].indices) if len(region) else region
+            touched = limiter.touched(region)
+            for start, held in ((shifts, region[:0]), (as_one, core)):
+                free = np.setdiff1d(region[~pinned[region]], held)
+                trial = _harmonic(surface, start, free)
+                left = int((~limiter.soundness(trial, touched, turning=turning)).sum())
+                if left < fewest:
+                    best, fewest = trial, left
+            if not fewest:
+                return best
+    return best
+
+
+def _harmonic(surface: Surface, shifts: Float64, free: Int) -> Float64:
+    """Shifts with those of some vertices replaced by what a stretched cloth would do."""
     from scipy.sparse.linalg import splu
 
-    laplacian = surface.laplacian[0]
-    inside = np.flatnonzero(free)
     result = shifts.copy()
-    if len(inside) and not free.all():
-        rows = laplacian[inside]
-        right = -(rows @ np.where(free[:, None], 0.0, shifts))
+    if len(free):
+        rows = surface.laplacian[0][free]
+        known = shifts.copy()
+        known[free] = 0.0
         try:
-            result[inside] = np.nan_to_num(splu(rows[:, inside].tocsc()).solve(right))
+            result[free] = np.nan_to_num(splu(rows[:, free].tocsc()).solve(-(rows @ known)))
         except RuntimeError:  # a piece that hangs on nothing
             return shifts
     return result

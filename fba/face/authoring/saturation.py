@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.authoring.extremes import LEAST_AREA, Limiter
+from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.motion import Motion, limits
 from fba.face.authoring.relax import eased_field
 from fba.face.authoring.surface import Surface
@@ -79,28 +79,28 @@ def _most(limiter: Limiter, field: Float64, triangles: Int, limit: float) -> flo
     return np.inf if FULL * reach >= limit else max(reach, 1.0)
 
 
-def guarded(limiter: Limiter, motion: Motion, least: float = LEAST_AREA) -> Motion:
+def guarded(limiter: Limiter, motion: Motion, *, turning: bool = False) -> Motion:
     """The same motion, stopped on each side where it would fold triangles on its way out."""
     triangles = limiter.touched(motion.vertices)
     zero = int(np.flatnonzero(motion.values == 0)[0])
-    down = _stopped(limiter, motion, range(zero - 1, -1, -1), triangles, least)
-    up = _stopped(limiter, motion, range(zero + 1, len(motion.values)), triangles, least)
+    down = _stopped(limiter, motion, range(zero - 1, -1, -1), triangles, turning)
+    up = _stopped(limiter, motion, range(zero + 1, len(motion.values)), triangles, turning)
     steps = [*down[::-1], (0.0, motion.shifts[zero]), *up]
     return Motion(np.array([v for v, _ in steps]), motion.vertices, np.array([s for _, s in steps]))
 
 
 def _stopped(
-    limiter: Limiter, motion: Motion, side: range, triangles: Int, least: float
+    limiter: Limiter, motion: Motion, side: range, triangles: Int, turning: bool
 ) -> list[tuple[float, Float64]]:
     """(value, shifts) going out from 0, up to where a triangle folds, and from there at rest."""
     steps: list[tuple[float, Float64]] = []
     value, shifts = 0.0, np.zeros_like(motion.shifts[0])
     for k in side:
-        if _sound(limiter, motion, motion.shifts[k], triangles, least):
+        if _sound(limiter, motion, motion.shifts[k], triangles, turning):
             value, shifts = float(motion.values[k]), motion.shifts[k]
             steps.append((value, shifts))
             continue
-        share = _last_sound(limiter, motion, shifts, motion.shifts[k], triangles, least)
+        share = _last_sound(limiter, motion, shifts, motion.shifts[k], triangles, turning)
         end = float(np.round(value + (motion.values[k] - value) * share))
         if end != value:
             # rounded to a whole value, so that the slope up to here stays what it was
@@ -113,19 +113,19 @@ def _stopped(
     return steps
 
 
-def _sound(limiter: Limiter, motion: Motion, shifts: Float64, triangles: Int, least: float) -> bool:
+def _sound(limiter: Limiter, motion: Motion, shifts: Float64, triangles: Int, turning: bool) -> bool:
     whole = np.zeros((len(limiter), 3))
     whole[motion.vertices] = shifts
-    return limiter.sound(whole, triangles, least)
+    return limiter.sound(whole, triangles, turning=turning)
 
 
 def _last_sound(
-    limiter: Limiter, motion: Motion, start: Float64, end: Float64, triangles: Int, least: float
+    limiter: Limiter, motion: Motion, start: Float64, end: Float64, triangles: Int, turning: bool
 ) -> float:
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        if _sound(limiter, motion, start * (1 - middle) + end * middle, triangles, least):
+        if _sound(limiter, motion, start * (1 - middle) + end * middle, triangles, turning):
             low = middle
         else:
             high = middle
