@@ -1,12 +1,16 @@
-"""A small head for tests: a mask through the standard's feature points, eyeballs, teeth and a tongue."""
+"""A small head for tests: a mask through the feature points of `adult.csv`, eyeballs, teeth, a tongue."""
 
 from __future__ import annotations
+
+import csv
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import Delaunay
 
-from fba.face.feature_points import neutral_points, row_of
+from fba.face.feature_points import MIRRORED, row_of
 from fba.face.model import FaceModel, Part
 
 EYE_RADIUS = 0.012
@@ -19,9 +23,21 @@ ON_SKIN = [
 UPPER_LIP, LOWER_LIP = ("2.2", "2.6", "2.7"), ("2.3", "2.8", "2.9")
 
 
+@cache
+def adult_points() -> np.ndarray:
+    """(84, 3) metres, symmetric: an adult by published norms, as the standard wants a neutral face."""
+    points = np.full((len(row_of()), 3), np.nan)
+    for row in csv.DictReader(Path(__file__).with_name("adult.csv").read_text().splitlines()):
+        place = np.array([float(row[axis]) for axis in "xyz"]) / 1000
+        points[row_of()[row["point"]]] = place
+        if row["point"] in MIRRORED:
+            points[row_of()[MIRRORED[row["point"]]]] = place * (-1, 1, 1)
+    return points
+
+
 def small_head(points: np.ndarray | None = None, cell: float = 0.006) -> FaceModel:
     """No tables; about 1000 vertices with the default cell size in metres."""
-    points = neutral_points().copy() if points is None else points
+    points = adult_points().copy() if points is None else points
     row = row_of()
     skin, bound = _mask(points, cell)
     parts = [skin]

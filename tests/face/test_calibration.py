@@ -45,7 +45,7 @@ def rotation(seed: int) -> np.ndarray:
     return Rotation.random(random_state=seed).as_matrix()
 
 
-def person(model: FaceModel, seed: int, spread: float = 0.0015) -> np.ndarray:
+def person(model: FaceModel, seed: int, spread: float = 0.0006) -> np.ndarray:
     """The model's points as another person's: wider or longer by a few per cent, and all a little elsewhere.
 
     Symmetric, lips shut, the pupils in the middle of the lids: a neutral face.

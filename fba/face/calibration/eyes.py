@@ -70,14 +70,15 @@ def fit_eye(
     size: float,
     pupil_given: bool,
     iris: tuple[float, float],
-    given: Float64,
+    given: tuple[Float64, Float64],
 ) -> FittedEye:
     """The sphere that fits under the fitted lids as the old one under the old.
 
     skin, fitted: (V, 3) vertices before and after. pupil: its point before and after. size: of the
     fitted face around the eye by the old one. pupil_given: keep the pupil exactly where it is; the centre
-    lies straight behind it. iris: its diameter before and after, metres. given: (K, 3) where points of the
-    lids must be; if they are inside the eyeball it goes back, and an FbaWarning tells how far.
+    lies straight behind it. iris: its diameter before and after, metres. given: (K, 3) points of the
+    lids before, and where they must be; if they get inside the eyeball it goes back, and an FbaWarning
+    tells how far.
     """
     from scipy.optimize import least_squares
 
@@ -114,19 +115,19 @@ def fit_eye(
         float(np.arcsin(min(across / 2 / ball, np.sin(WIDEST_IRIS))))
         for across, ball in ((iris[0], eye.radius), (iris[1], radius))
     ]
-    values[1] -= _sunk(given, centre(values), radius, eye.side)
+    clear = np.minimum(np.linalg.norm(given[0] - eye.centre, axis=1) / eye.radius, BARELY)
+    values[1] -= _sunk(given[1], clear * radius, centre(values), eye.side)
     fitted_eye = FittedEye(eye, centre(values), radius, angles[1], angles[0])
     # The pupil's own vertex may stand a little off the axis.
     off = (front - fitted_eye(pupil[0][None])[0]) * (1.0, 1.0, 0.0)
     return replace(fitted_eye, centre=fitted_eye.centre + off)
 
 
-def _sunk(given: Float64, centre: Float64, radius: float, side: str) -> float:
-    """How far an eyeball must go back for the given points of its lids to be outside: metres."""
+def _sunk(given: Float64, least: Float64, centre: Float64, side: str) -> float:
+    """How far an eyeball must go back for points (K, 3) to be at least so far from its centre: metres."""
     across = np.hypot(*(given - centre)[:, :2].T)
-    before = across < radius
-    room = np.sqrt(np.maximum((BARELY * radius) ** 2 - across[before] ** 2, 0.0))
-    back = max(0.0, float((centre[2] + room - given[before, 2]).max(initial=0.0)))
+    room = np.sqrt(np.maximum(least**2 - across**2, 0.0))
+    back = float(np.where(room > 0, centre[2] + room - given[:, 2], 0.0).max(initial=0.0))
     if back > DEEP:
         warnings.warn(
             f"the lids of the {side} eye lie {back * 1000:.1f} mm inside its eyeball: "

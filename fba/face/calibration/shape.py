@@ -70,7 +70,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
     vertices = {part.name: field(part.vertices) for part in model.parts}
     fixed = _fixed(model, targets)
     eyes: dict[str, FittedEye] = {}
-    lids = {side: [row[name] for name in lid] for side, lid in LID_POINTS.items()}
+    lids = {side: [row[name] for name in pair if given[row[name]]] for side, pair in LID_POINTS.items()}
     skin = [part for part in model.parts if part.kind in ("skin", "mouth")]
     joined = np.concatenate([part.vertices for part in skin]).astype(np.float64) if skin else np.zeros((0, 3))
     moved = np.concatenate([vertices[part.name] for part in skin]) if skin else joined
@@ -90,7 +90,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
             size=around,
             pupil_given=bool(given[row[PUPIL_POINT[side]]]),
             iris=iris,
-            given=targets[lids[side]][given[lids[side]]],
+            given=(model.points[lids[side]], targets[lids[side]]),
         )
         moved = lids_on(eyes[side], joined, moved, *fixed)
     start = 0

@@ -9,17 +9,15 @@ the distance between the pupils or 0.02 of the mouth's width.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
-from functools import cache
-from importlib.resources import files
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.face.checks.findings import Finding
-from fba.face.checks.locations import AXES, check_locations
+from fba.face.checks.locations import check_locations
+from fba.face.checks.sizes import check_sizes
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, Eyeball, eyeballs, gaze, pupil_diameter
 from fba.face.fapu import PER_DISTANCE
 from fba.face.feature_points import MIRRORED, row_of
@@ -63,7 +61,7 @@ def check_neutral(model: FaceModel) -> list[Finding]:
         *_teeth(model),
         *_tongue(model),
         *_symmetry(model.points),
-        *_sizes(model.points),
+        *check_sizes(model.points),
     ]
 
 
@@ -273,38 +271,6 @@ def _symmetry(points: Float64) -> Iterator[Finding]:
             f"{_mm(SYMMETRY * unit)} on average, unless the face is meant so",
             "warning",
         )
-
-
-@cache
-def _human() -> tuple[tuple[str, str, str, str, float, float, str], ...]:
-    """Smallest and biggest sizes of human heads, in mm.
-
-    From children of three to the biggest adults: published norms of adults and children, four standard
-    deviations beyond the outermost mean, rounded outwards.
-    """
-    with (files(__package__) / "human.csv").open(encoding="utf-8") as file:
-        return tuple(
-            (*(row[key] for key in ("measure", "first", "second", "axis")), *_limits(row), row["what"])  # type: ignore[misc]
-            for row in csv.DictReader(file)
-        )
-
-
-def _limits(row: dict[str, str]) -> Limits:
-    return float(row["low"]), float(row["high"])
-
-
-def _sizes(points: Float64) -> Iterator[Finding]:
-    for measure, first, second, axis, low, high, what in _human():
-        ends = points[[row_of()[first], row_of()[second]], AXES[axis]]
-        size = abs(float(ends[0] - ends[1])) * 1000
-        if np.isfinite(size) and not low <= size <= high:
-            yield Finding(
-                measure,
-                "size of a human face",
-                f"{size:.1f} mm ({first} to {second}: {what})",
-                f"{low:g} to {high:g} mm",
-                "warning",
-            )
 
 
 def _point(model: FaceModel, name: str) -> Float64:
