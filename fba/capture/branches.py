@@ -32,8 +32,8 @@ def choose(
     twists: float64 (T, 2), radians. wrong: (T, 2), angle by which the hinge then bends the unnatural way.
     firm: (T,), 0 where the limb is so straight that its twist says nothing, 1 where it is not. usual: (T,),
     twist that is usual around this frame, without jumps. The cheapest path: bending the wrong way
-    costs by its angle over clear, a twist far from the usual one costs by time over patience (seconds), a
-    sudden change of twist costs once, and nothing counts while straight. period: seconds a frame.
+    costs by its angle over clear, a twist far from the usual one costs by time over patience (seconds),
+    a change of twist costs by its size, and nothing counts while straight. period: seconds a frame.
     """
     count = twists.shape[0]
     turns = 2 * WINDINGS + 1
@@ -57,7 +57,7 @@ def choose(
                 best = math.inf
                 for before in range(states):
                     change = (twist[state] - last[before]) / math.pi
-                    total = float(cost[before]) + sooner * min(3.0, 2.0 * change * change)
+                    total = float(cost[before]) + sooner * 2.0 * abs(change)
                     if total < best:
                         best = total
                         origin[t, state] = before

@@ -24,15 +24,18 @@ from fba.capture.branches import choose
 Float = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-STRAIGHT = 0.02
+STRAIGHT = 0.09
 """Where the twist changes the lower bone's direction by less than this (radians), it follows its
-neighbours in time instead. Also the weight of the preferred twists against the direction."""
-CLEAR_BEND = 0.2
+neighbours in time rather than the direction. Also the weight of the preferred twists against the direction: a
+limb bent sideways by less than this is straightened, by up to 5 degrees, instead of twisted half round."""
+FIRM = 0.03
+"""From this much on, a sudden change of twist would be seen."""
+CLEAR_BEND = 0.3
 """From this angle on, a bend shows which way the hinge opens; less may be a little beyond straight."""
-NEIGHBOURHOOD = 0.1
+NEIGHBOURHOOD = 0.2
 """Seconds over which neighbours in time are asked."""
-PATIENCE = 0.1
-"""Seconds for which a limb may be twisted half round before a sudden half turn is the lesser evil."""
+PATIENCE = 0.3
+"""Seconds for which a limb may bend the wrong way before a sudden half turn is the lesser evil."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +131,10 @@ def _path(twists: Float, bends: Float, reach: Float, rate: float) -> Float:
     anchor = _direction(np.array([sure.sum() + 1e-9]))[0]  # 1 where nothing is known: the source's own twist
     usual = np.unwrap(np.angle(_direction(_smoothed(sure, NEIGHBOURHOOD * rate) + 1e-4 * anchor)))
     chosen = np.zeros(len(twists), dtype=np.int64)
-    firm = np.minimum(1.0, (reach / STRAIGHT) ** 2)
+    firm = np.minimum(1.0, (reach / FIRM) ** 2)
     choose(twists, np.maximum(0.0, -bends), firm, usual, 1 / rate, CLEAR_BEND, PATIENCE, chosen)
     vote = reach * reach * np.exp(1j * twists[frames, chosen])
-    around = _direction(_smoothed(vote, NEIGHBOURHOOD * rate) + 1e-4 * np.exp(1j * usual))
+    around = _direction(_smoothed(vote, NEIGHBOURHOOD * rate) + STRAIGHT * STRAIGHT * np.exp(1j * usual))
     return _centred(np.unwrap(np.angle(vote + STRAIGHT * STRAIGHT * around)))
 
 

@@ -1,19 +1,29 @@
-"""Which source joint is which joint of the standard: families of names, as data (joint_names.csv)."""
+"""Which source joint is which joint of the standard: families of names, as data (joint_names.csv).
+
+A source "(Left|Right)Arm" stands for both sides, its joint "?_shoulder" for l_shoulder and r_shoulder.
+Besides the families of the file, the standard's own names are one, "h-anim".
+"""
 
 from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
 from fba.errors import ModelError
+from fba.parameters import joints
 
 REQUIRED = ("HumanoidRoot",)
 """Joints without which nothing can be placed."""
 FEWEST = 5
 """A family fits where at least so many of its names are found."""
+
+
+PREFIX_NAMES = 8
+"""Of the first so many names, each may be the beginning of the others: "Bip01", "Bip01 Pelvis"."""
 
 
 @cache
@@ -22,7 +32,15 @@ def families() -> dict[str, dict[str, str]]:
     result: dict[str, dict[str, str]] = {}
     text = (files(__package__) / "joint_names.csv").read_text(encoding="utf-8")
     for row in csv.DictReader(text.splitlines()):
-        result.setdefault(row["family"], {})[simplified(row["source"])] = row["joint"]
+        family = result.setdefault(row["family"], {})
+        sides = re.search(r"\((\w+)\|(\w+)\)", row["source"])
+        if sides is None:
+            family[simplified(row["source"])] = row["joint"]
+            continue
+        for side, word in zip("lr", sides.groups(), strict=True):
+            source = row["source"].replace(sides[0], word)
+            family[simplified(source)] = row["joint"].replace("?", side)
+    result["h-anim"] = {simplified(joint.name): joint.name for joint in joints()}
     return result
 
 
@@ -34,7 +52,7 @@ def simplified(name: str) -> str:
 def match(names: Sequence[str]) -> tuple[str, dict[str, int]]:
     """The family that fits most names, and joint of the standard -> number of the source joint.
 
-    A prefix that all names share ("Bob_Hips", "Bob_Spine") is tried without, too. Where two source
+    A prefix that most names share ("Bob_Hips", "Bob_Spine") is tried without, too. Where two source
     joints have the same name, the first counts. ModelError where no family fits.
     """
     best: tuple[str, dict[str, int]] = ("", {})
@@ -58,12 +76,11 @@ def match(names: Sequence[str]) -> tuple[str, dict[str, int]]:
 
 
 def _shared_prefixes(names: Sequence[str]) -> list[str]:
-    if len(names) < 2:
-        return []
-    low, high = min(names), max(names)
-    length = 0
-    while length < min(len(low), len(high)) and low[length] == high[length]:
-        length += 1
-    shared = low[:length]
-    cut = max(shared.rfind(mark) for mark in "_ .-|")
-    return [text for text in (shared[: cut + 1], shared) if text]
+    """Beginnings, up to and with a separator, or the whole of a name, that half of the names or more
+    share."""
+    counts: Counter[str] = Counter()
+    for name in names:
+        counts.update({name[: mark.end()] for mark in re.finditer(r"[_ .|-]+", name)})
+    counts.update({name: sum(n.startswith(name) for n in names) for name in names[:PREFIX_NAMES]})
+    many = [prefix for prefix, count in counts.items() if 2 * count >= len(names) > 1]
+    return sorted(many, key=len)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.body import BapSolver
-from fba.capture import feet, matching, rest, rotations
+from fba.capture import feet, matching, rest
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 
@@ -57,8 +57,8 @@ class RetargetReport:
     """What became of a captured skeleton.
 
     family: of joint names, empty where they were given. bones: in the body's order. feet: None where the
-    source has no ankles, or feet that are never on the ground. unused: joints of the source that move no joint
-    of the body. missing: joints that BAPs could turn, but the source has not.
+    source has no ankles, or feet that are never on the ground. unused: joints of the source that move no
+    joint of the body. missing: joints that BAPs could turn, but the source has not.
     """
 
     family: str

