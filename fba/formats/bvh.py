@@ -52,15 +52,17 @@ def read(
     rate: Fraction | int | str | None = None,
     scale: float | None = None,
     origin: str = "source",
+    ground: str = "floor",
+    spine: str | int = "full",
 ) -> Animation:
-    """A BVH file as BAPs (see `fba.capture.from_skeleton` for rate, scale and origin).
+    """A BVH file as BAPs (see `fba.capture.from_skeleton` for the options).
 
     Raises FormatError for anything that is not BVH or whose skeleton is not a body; warns (FbaWarning)
     of oddities.
     """
     motion = read_motion(path)
     try:
-        return from_skeleton(motion, rate, scale=scale, origin=origin)
+        return from_skeleton(motion, rate, scale=scale, origin=origin, ground=ground, spine=spine)
     except ModelError as error:
         raise FormatError(str(error), path=path) from error
 

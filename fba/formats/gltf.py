@@ -110,23 +110,21 @@ def motion_of(
             linear.append(linear[parent] @ local)
             places[:, number] = places[:, parent] + (linear[parent] @ shift[:, :, None])[:, :, 0]
         turned[:, number] = bind.turned(number, linear[number])
-    motion_turns = np.array(turned)
-    for number, parent in enumerate(parents):
-        if parent >= 0:
-            motion_turns[:, number] = rotations.multiply(
-                turned[:, parent] * [1, -1, -1, -1], turned[:, number]
-            )
-    motion_turns /= np.linalg.norm(motion_turns, axis=-1, keepdims=True)
+    kept = _below(parents, _root([gltf.nodes[node].name for node in nodes]))
+    local_turns = turned[:, kept]
+    for place, number in enumerate(kept[1:], 1):
+        above = turned[:, parents[number]] * [1, -1, -1, -1]
+        local_turns[:, place] = rotations.multiply(above, turned[:, number])
     motion = SkeletonMotion(
-        names=tuple(gltf.nodes[node].name for node in nodes),
-        parents=np.array(parents, dtype=np.int64),
-        offsets=bind.offsets(),
-        rotations=motion_turns,
-        positions=places[:, 0],
+        names=tuple(gltf.nodes[nodes[number]].name for number in kept),
+        parents=np.array([kept.index(parents[n]) if place else -1 for place, n in enumerate(kept)]),
+        offsets=bind.offsets()[kept],
+        rotations=local_turns / np.linalg.norm(local_turns, axis=-1, keepdims=True),
+        positions=places[:, kept[0]],
         rate=frames,
         name=chosen.name,
     )
-    _say_stretched(motion, places)
+    _say_stretched(motion, places[:, kept])
     return motion
 
 
@@ -163,6 +161,23 @@ def _skeleton(gltf: Gltf) -> list[int]:
             stacklevel=5,
         )
     return best
+
+
+def _root(names: list[str]) -> int:
+    """The hips: what stands above them (an armature, the root of a game's figure) moves them as a whole."""
+    try:
+        return matching.match(names)[1]["HumanoidRoot"]
+    except ModelError:
+        return 0
+
+
+def _below(parents: list[int], root: int) -> list[int]:
+    """A joint and all that hang on it, parents first."""
+    result = {root}
+    for number, parent in enumerate(parents):
+        if parent in result:
+            result.add(number)
+    return sorted(result)
 
 
 def _fit(gltf: Gltf, tree: list[int]) -> int:

@@ -32,6 +32,8 @@ class BindPose:
                 if joint in set(nodes):
                     inverse.setdefault(joint, np.asarray(matrix, dtype=np.float64))
         bound = {joint: _inverted(gltf, joint, matrix) for joint, matrix in inverse.items()}
+        if bound and np.ptp([matrix[:3, 3] for matrix in bound.values()], axis=0).max() <= 0:
+            bound = {}  # a skin without inverse bind matrices says nothing about how it was bound
         turn, size = _to_scene(gltf, bound)
         self._turns = np.zeros((len(nodes), 3, 3))
         self.places = np.zeros((len(nodes), 3))

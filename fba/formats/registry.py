@@ -101,6 +101,10 @@ def formats() -> tuple[Format, ...]:
             "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
             place("sniff", "bvh"), place("read", "bvh"), None, ("body",), captured=True,
         ),
+        Format(
+            "gltf", (".glb", ".gltf"), "glTF 2.0: a skeleton and its animation, as exported from FBX",
+            place("sniff", "gltf"), place("read", "gltf"), None, ("body",), captured=True,
+        ),
     )  # fmt: skip
 
 

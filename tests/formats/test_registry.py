@@ -34,7 +34,7 @@ def performance(face: bool = True, body: bool = True, rate: int = 25, first: int
 
 
 def test_the_table() -> None:
-    assert [entry.name for entry in formats()] == ["fba", "fap", "bap", "epf", "bvh"]
+    assert [entry.name for entry in formats()] == ["fba", "fap", "bap", "epf", "bvh", "gltf"]
     by_name = {entry.name: entry for entry in formats()}
     assert by_name["fap"].read_options == ("fps", "name", "salvage", "angle_scale")
     assert by_name["fap"].write_options == by_name["epf"].write_options == ()
