@@ -10,11 +10,13 @@ import numpy.typing as npt
 
 from fba.face.calibration.align import known_rows
 from fba.face.calibration.eyes import FittedEye
+from fba.face.calibration.lid_paths import LID_FAPS, slid
 from fba.face.feature_points import row_of
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
 
 if TYPE_CHECKING:
+    from fba.face.calibration.shape import Shape
     from fba.face.fapu import Fapu
     from fba.face.model import FaceModel, Part
 
@@ -25,32 +27,68 @@ LEAST = 1e-6
 
 
 def carried_tables(
-    model: FaceModel, parts: tuple[Part, ...], points: Float64, fapu: Fapu, eyes: Mapping[str, FittedEye]
+    model: FaceModel, parts: tuple[Part, ...], points: Float64, fapu: Fapu, shape: Shape
 ) -> tuple[FaceDefTables, ...]:
     """The model's tables for its parts in another shape.
 
-    Displacements turn and stretch with the surface they are on, and are then set right as a whole, so
-    that the vertex of the FAP's own feature point moves by as many FAPU as before, in the same direction.
-    Turns keep their angle; if they are counted in a length, they keep what the chin does at its distance.
+    A displacement stays so many FAPU, turned with the face around it. Those of lids stretch with the skin
+    instead, as the opening between them does, and keep to the eyeball. Each FAP's own vertex then moves by
+    as many FAPU as before, in the same direction, and the others with it. Transforms keep their angles; if
+    these are counted in a length, they keep what the chin does at its distance.
     """
-    shapes = {
-        old.name: (old, stretches(old, new.vertices)) for old, new in zip(model.parts, parts, strict=True)
-    }
-    centres = {eye.was.part: eye for eye in eyes.values()}
+    names = {part.name: place for place, part in enumerate(parts)}
+    turns = {part.name: shape.turns.get(part.name) for part in model.parts}
+    stretched = _lid_stretches(model, parts) if LID_FAPS.keys() & model.table_of.keys() else {}
     tables = []
     for table in model.tables:
         fap = faps()[table.fap - 1]
-        ratio = model.fapu[fap.unit] / fapu[fap.unit]
-        right = _correction(model, table, shapes, ratio)
+        units = model.fapu[fap.unit], fapu[fap.unit]
+        lid = table.fap in LID_FAPS
+        local = stretched if lid else turns
+        moved = {}
+        for mesh in table.meshes:
+            moves = mesh.displacements.astype(np.float64)
+            matrices = local.get(mesh.part)
+            if matrices is not None:
+                moves = np.einsum("vij,vkj->vki", matrices[mesh.vertices], moves)
+            moved[mesh.part] = moves * (units[0] / units[1] if lid else 1.0)
+        right = _correction(model, table, moved)
         meshes = []
         for mesh in table.meshes:
-            local = shapes[mesh.part][1][mesh.vertices]
-            moves = np.einsum("vij,vkj->vki", local, mesh.displacements.astype(np.float64)) * ratio
-            moves = np.einsum("kij,vkj->vki", right[: moves.shape[1]], moves) if right is not None else moves
+            moves = moved[mesh.part]
+            if right is not None and len(right) == moves.shape[1]:
+                moves = np.einsum("kij,vkj->vki", right, moves)
+            if lid:
+                old, new = model.parts[names[mesh.part]], parts[names[mesh.part]]
+                places = [part.vertices[mesh.vertices].astype(np.float64) for part in (old, new)]
+                before = places[0], mesh.displacements.astype(np.float64) * units[0]
+                after = places[1], moves * units[1]
+                moves = slid(shape.eyes, table.fap, mesh.borders, before, after) / units[1]
             meshes.append(FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, moves.astype(np.float32)))
-        transforms = [_moved(model, one, points, fap.unit, ratio, centres) for one in table.transforms]
+        balls = {eye.was.part: eye for eye in shape.eyes.values()}
+        ratio = units[0] / units[1]
+        transforms = [_moved(model, one, points, fap.unit, ratio, balls) for one in table.transforms]
         tables.append(FaceDefTables(table.fap, tuple(meshes), tuple(transforms)))
     return tuple(tables)
+
+
+def _lid_stretches(model: FaceModel, parts: tuple[Part, ...]) -> dict[str, Float64]:
+    """How the skin stretched, for skin and for what stands on it: (V, 3, 3) by name of the part."""
+    from scipy.spatial import cKDTree
+
+    found = {
+        old.name: stretches(old, new.vertices)
+        for old, new in zip(model.parts, parts, strict=True)
+        if old.kind in ("skin", "mouth")
+    }
+    skin = [part for part in model.parts if part.name in found]
+    if skin:
+        tree = cKDTree(np.concatenate([part.vertices for part in skin]))
+        joined = np.concatenate([found[part.name] for part in skin])
+        for part in model.parts:
+            if part.name not in found and len(part.vertices):
+                found[part.name] = joined[tree.query(part.vertices)[1]]
+    return found
 
 
 def _moved(
@@ -96,22 +134,16 @@ def _hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Float64,
     return moved, float(arms[0] / arms[1]) if arms[1] > 0 else 1.0
 
 
-def _correction(
-    model: FaceModel,
-    table: FaceDefTables,
-    shapes: Mapping[str, tuple[Part, Float64]],
-    ratio: float,
-) -> Float64 | None:
+def _correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
     """(K, 3, 3) that give the FAP's own point its motion per FAPU back; None where it has none."""
     for name in faps()[table.fap - 1].feature_points:
         vertex = int(model.bound[row_of()[name]])
         for mesh in table.meshes:
-            part, local = shapes[mesh.part]
-            own = vertex - model.starts[part.name]
-            found = np.flatnonzero(mesh.vertices == own)
-            if vertex >= 0 and 0 <= own < len(part.vertices) and len(found):
+            own = vertex - model.starts[mesh.part]
+            found = np.flatnonzero((mesh.vertices == own) & (vertex >= 0))
+            if len(found):
                 wanted = mesh.displacements[found[0]].astype(np.float64)
-                got = wanted @ local[own].T * ratio
+                got = moved[mesh.part][found[0]]
                 return np.stack([_turn(a, b) for a, b in zip(got, wanted, strict=True)])
     return None
 

@@ -148,12 +148,12 @@ def lids_on(eye: FittedEye, skin: Float64, fitted: Float64, sources: Float64, ta
     moved = fitted.copy()
     near = np.linalg.norm(skin - eye.was.centre, axis=1) < REACH * eye.was.radius
     moved[near] = _laid(eye, skin[near], fitted[near])
-    weight = _weight(eye, sources)
+    weight = weight_of(eye, sources)
     local = weight > LEAST
     if local.any():
         # What the given points still want after that, they get, with all that lies between them.
         left = (targets[local] - _laid(eye, sources[local], targets[local])) / weight[local, None]
-        moved[near] += _weight(eye, skin[near])[:, None] * between(sources[local], left)(skin[near])
+        moved[near] += weight_of(eye, skin[near])[:, None] * between(sources[local], left)(skin[near])
     return _outside(eye, skin, moved, near, sources)
 
 
@@ -161,11 +161,11 @@ def _laid(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
     distance = np.linalg.norm(skin - eye.was.centre, axis=1)
     arms = fitted - eye.centre
     length = np.maximum(np.linalg.norm(arms, axis=1), 1e-12)
-    laid: Float64 = fitted + arms * (_weight(eye, skin) * (distance * eye.size / length - 1))[:, None]
+    laid: Float64 = fitted + arms * (weight_of(eye, skin) * (distance * eye.size / length - 1))[:, None]
     return laid
 
 
-def _weight(eye: FittedEye, places: Float64) -> Float64:
+def weight_of(eye: FittedEye, places: Float64) -> Float64:
     """How much a place belongs to the eyeball: 1 on it, 0 out of its reach."""
     distance = np.linalg.norm(places - eye.was.centre, axis=1)
     share = np.clip((distance / eye.was.radius - LID) / (REACH - LID), 0.0, 1.0)

@@ -41,6 +41,12 @@ class Field:
         moved: Float64 = (places - self.origin) @ self.matrix.T + self.target
         return moved
 
+    def turns(self, places: npt.NDArray[np.floating]) -> Float64:
+        """(N, 3, 3): the rotation in the deformation at each place, without its stretch."""
+        u, _, vt = np.linalg.svd(self.jacobians(places))
+        turned: Float64 = u @ vt
+        return turned
+
     def jacobians(self, places: npt.NDArray[np.floating], step: float = 1e-4) -> Float64:
         """(N, 3, 3): how the deformation stretches and turns space at each place."""
         flat = np.asarray(places, dtype=np.float64)

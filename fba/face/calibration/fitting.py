@@ -211,9 +211,7 @@ def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) ->
 
     if not model.tables:
         return fitted
-    carried = replace(
-        fitted, tables=carried_tables(model, fitted.parts, fitted.points, fitted.fapu, shape.eyes)
-    )
+    carried = replace(fitted, tables=carried_tables(model, fitted.parts, fitted.points, fitted.fapu, shape))
     if how == "carry":
         return carried
     if how == "auto":

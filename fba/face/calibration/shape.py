@@ -40,11 +40,15 @@ TONGUE_WIDTH = 0.012
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Vertices of every part by name, the feature points (84, 3), and what became of the eyes."""
+    """Vertices of every part by name, the feature points (84, 3), and what became of the eyes.
+
+    turns: (V, 3, 3), by how much the surroundings of each vertex were turned, for parts that are not rigid.
+    """
 
     vertices: Mapping[str, Float64]
     points: Float64
     eyes: Mapping[str, FittedEye]
+    turns: Mapping[str, Float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +115,10 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
         vertices[part.name] = teeth[_jaw(model, part)](part.vertices)
     for part in model.of_kind("tongue"):
         vertices[part.name] = tongue(part.vertices)
-    return Shape(vertices, _points(model, vertices, field, targets, teeth, tongue), eyes)
+    points = _points(model, vertices, field, targets, teeth, tongue)
+    soft = [part for part in model.parts if part.kind not in ("eye", "teeth", "tongue")]
+    turns = {part.name: field.turns(part.vertices) for part in soft} if model.tables else {}
+    return Shape(vertices, points, eyes, turns)
 
 
 def _snap(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> None:
