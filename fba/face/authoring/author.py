@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fba.errors import ModelError
 from fba.face.authoring.binding import SURFACE_KINDS, Binding, bind_points, face_size, part_lips
-from fba.face.authoring.carry import NEAR, Anchors
+from fba.face.authoring.carry import LARGEST, NEAR, Anchors
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.eyes import Eye, eye_transforms, eyes, pupil_motions
 from fba.face.authoring.jaw import CHIN, Jaw, jaw, opening, share_of_part, turned
@@ -175,12 +175,14 @@ class _Authoring:
 
     def _anchors(self) -> dict[str, Anchors]:
         found = {}
-        near = NEAR * self.marks.fapu.ES * 1024
+        es = self.marks.fapu.ES * 1024
         for part in self.parts:
             if part.kind not in CARRIED_KINDS or not len(part.triangles):
                 continue
+            if part.kind == "other" and np.ptp(part.vertices, axis=0).max() > LARGEST * es:
+                continue
             anchors = Anchors(self.marks.surface, part)
-            if np.median(anchors.distance) < near:
+            if np.median(anchors.distance) < NEAR * es:
                 found[part.name] = anchors
         return found
 
@@ -199,7 +201,7 @@ class _Authoring:
         moving = np.flatnonzero(found.share)
         shifts = turned(points[moving], found, angles) * found.share[moving][:, None]
         whole = Motion(values, moving, shifts)
-        motion = relaxed(self.marks.surface, self.limiter, whole, [self._pinned()], True)
+        motion = relaxed(self.marks.surface, self.limiter, whole, self._pinned(), True)
         motion = guarded(self.limiter, motion, turning=True)
         self._surface(OPEN_JAW, motion)
         # what the skin stops at, teeth and tongue stop at too

@@ -12,6 +12,11 @@ from fba.face.model import Part
 Float64 = npt.NDArray[np.float64]
 Int = npt.NDArray[np.intp]
 
+NEIGHBOURS = 8
+ROOT = 0.3
+"""Vertices of a hair this much further from the skin than its nearest one are roots too, in edge lengths."""
+LARGEST = 1.2
+"""Parts of no special kind are carried where they are smaller than this, in ES0: a mole, not a shirt."""
 NEAR = 0.1
 """Parts with most of their vertices this close to the skin, in ES0, are carried by it."""
 
@@ -28,13 +33,12 @@ class Anchors:
         shape = Surface([part])
         corners = surface.vertices[surface.triangles]
         tree = cKDTree(corners.mean(axis=1))
-        # the root of each connected piece is what lies nearest to the skin; the piece hangs on it
-        _, near = tree.query(shape.vertices, k=min(8, len(corners)))
-        near = near.reshape(len(shape.vertices), -1)
-        best, shares, away = _closest(corners, near, shape.vertices)
+        _, near = tree.query(shape.vertices, k=min(NEIGHBOURS, len(corners)))
+        best, shares, away = _closest(corners, near.reshape(len(shape.vertices), -1), shape.vertices)
+        root = roots(shape, away) if part.kind == "lash" else np.arange(len(shape.vertices))
         self.distance: Float64 = away[shape.number]
-        self._best: Int = best[shape.number]
-        self._shares: Float64 = shares[shape.number]
+        self._best: Int = best[root][shape.number]
+        self._shares: Float64 = shares[root][shape.number]
 
     def carried(self, motion: Motion) -> Motion:
         """What a motion of the surface does to the part: places move, and turn, with their triangles."""
@@ -57,6 +61,22 @@ class Anchors:
             shifts[k] = foot_after + np.einsum("nij,nj->ni", _frames(after), local) - self._points[moving]
         shifts[motion.values == 0] = 0.0
         return Motion(motion.values, moving, shifts)
+
+
+def roots(shape: Surface, away: Float64) -> Int:
+    """(N,) for each vertex of hairs the one that they grow from, along the hair.
+
+    away: (N,) distances from the skin; roots are where a connected piece is as near as anywhere.
+    """
+    from scipy.sparse.csgraph import dijkstra
+
+    nearest = np.full(int(shape.component.max(initial=-1)) + 1, np.inf)
+    np.minimum.at(nearest, shape.component, away)
+    span = float(np.median(np.linalg.norm(np.diff(shape.vertices[shape.edges], axis=1), axis=2)))
+    start = np.flatnonzero(away <= nearest[shape.component] + ROOT * span)
+    found = dijkstra(shape.graph, directed=False, indices=start, min_only=True, return_predecessors=True)[2]
+    result: Int = np.where(found >= 0, found, np.arange(len(found))).astype(np.intp)
+    return result
 
 
 def _closest(corners: Float64, near: Int, points: Float64) -> tuple[Int, Float64, Float64]:

@@ -37,6 +37,8 @@ STILL = (
 )
 REACH = 1.5
 """How far the jaw pulls at cheeks and neck, in ES0."""
+NECK = 0.1
+"""Open edges of the skin this far below the chin, in ES0, are where the neck was cut."""
 CORNER = 0.6
 """How much of the jaw's turn the skin over its corners makes."""
 WIDEST = np.radians(30.0)
@@ -186,7 +188,11 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
     values |= one
     source = np.array(sorted(values))
     lips = marks.on("lower outer lip", "upper outer lip", "lower inner lip", "upper inner lip") | marks.lips
-    still = np.unique([*np.flatnonzero(lips), *(marks.vertex[name] for name in STILL if marks.has(name))])
+    # below, the neck ends at a body that stays
+    end = surface.open_edge & (surface.vertices[:, 1] < marks.place("2.1")[1] - NECK * es)
+    still = np.unique(
+        [*np.flatnonzero(lips | end), *(marks.vertex[name] for name in STILL if marks.has(name))]
+    )
     inside = marks.inside_mouth
     near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
     free = region(near, far, REACH * es) & ~inside & ~lips

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fba.face.authoring.carry import roots
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.eyes import Eye
 from fba.face.authoring.landmarks import Landmarks
@@ -55,8 +56,6 @@ STILL = {
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
 HEM = 0.006
-CORNERS = (0.15, 0.3, 0.5)
-"""Where the opening is lower than this share of its height, the margins may give way to folds."""
 CLEARANCE = 0.012
 """Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
 FREED = 0.3
@@ -98,13 +97,9 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     for k, value in enumerate(values):
         freed = float(smooth_step(np.array([abs(value) / CLOSED / FREED]))[0])
         shifts[k] += profile.lift(points, shifts[k]) * freed
-    gap = opening.upper[:, 0] - opening.lower[:, 0]
-    margins = np.concatenate([own, other])
-    apart = np.interp(marks.surface.vertices[margins, 0], opening.x, gap) / gap.max()
-    pins = np.zeros((len(CORNERS), len(marks.surface)), dtype=bool)
-    for pin, corner in zip(pins, CORNERS, strict=True):
-        pin[margins[apart > corner]] = True
-    motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), list(pins), True)
+    pinned = np.zeros(len(marks.surface), dtype=bool)
+    pinned[own] = pinned[other] = True
+    motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), pinned, True)
     return guarded(limiter, motion, turning=True)
 
 
@@ -282,8 +277,6 @@ def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: flo
 
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -> Motion:
     """Lashes turn with the margin that they grow on, each vertex as its root does."""
-    from scipy.sparse.csgraph import dijkstra
-
     from fba.face.authoring.surface import Surface
 
     side, name = LIDS[fap]
@@ -303,14 +296,8 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -
     middle = float((opening.upper[:, 0] + opening.lower[:, 0]).mean()) / 2 + eye.centre[1]
     upper = np.where(np.abs(closest[0] - closest[1]) < 0.1 * wide, mean > middle, closest[0] < closest[1])
     grows = (upper == (name == "upper")) & (np.minimum(*closest) < 0.25 * wide)
-    away = reach[0 if name == "upper" else 1]
-    roots = np.flatnonzero(
-        grows[pieces] & (away < closest[0 if name == "upper" else 1][pieces] + 0.03 * wide)
-    )
-    if not len(roots):
-        return Motion(lid.values, np.zeros(0, dtype=np.intp), np.zeros((len(lid.values), 0, 3)))
-    _, _, root = dijkstra(shape.graph, directed=False, indices=roots, min_only=True, return_predecessors=True)
-    moving = np.flatnonzero((grows[pieces] & (root >= 0))[shape.number])
+    root = roots(shape, reach[0 if name == "upper" else 1])
+    moving = np.flatnonzero(grows[pieces][shape.number])
     points = part.vertices[moving].astype(np.float64)
     columns = shape.vertices[root[shape.number[moving]], 0]
     ways = np.clip(lid.values, *_sound_range(lid)) / CLOSED

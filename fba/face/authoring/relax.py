@@ -21,13 +21,11 @@ ROUNDS = 2
 """Easing one place may fold its neighbours; so many times this is looked after."""
 
 
-def relaxed(
-    surface: Surface, limiter: Limiter, motion: Motion, pins: Sequence[Bool], turning: bool
-) -> Motion:
+def relaxed(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
     """The same motion with the surroundings of folded triangles stretched evenly.
 
-    pins: (N,) vertices that must go where they go; where the first is too much, the next one holds.
-    turning: as in `Limiter.soundness`. Where nothing helps, the folds stay.
+    pinned: (N,) vertices that must go where they go. turning: as in `Limiter.soundness`. Where nothing
+    helps, the folds stay.
     """
     whole = np.zeros((len(motion.values), len(surface), 3))
     whole[:, motion.vertices] = motion.shifts
@@ -40,7 +38,7 @@ def relaxed(
             if not len(bad):
                 break
             for cluster in _clusters(bad):
-                whole[k] = _eased(surface, limiter, whole[k], cluster, pins, turning)
+                whole[k] = _eased(surface, limiter, whole[k], cluster, pinned, turning)
             moved |= whole[k].any(axis=1)
             triangles = limiter.touched(np.flatnonzero(moved))
     vertices = np.flatnonzero(moved)
@@ -55,7 +53,7 @@ def eased_field(
     for goal in goals:
         moving = np.flatnonzero(result.any(axis=1))
         motion = Motion(np.array([0.0, 1.0]), moving, np.stack([0 * result[moving], result[moving] * goal]))
-        again = relaxed(surface, limiter, motion, (pinned,), False)
+        again = relaxed(surface, limiter, motion, pinned, False)
         trial = np.zeros_like(field)
         trial[again.vertices] = again.shifts[1] / goal
         if _worst(limiter, trial, goals) > _worst(limiter, result, goals):
@@ -84,28 +82,27 @@ def _clusters(bad: Int) -> list[Int]:
 
 
 def _eased(
-    surface: Surface, limiter: Limiter, shifts: Float64, bad: Int, pins: Sequence[Bool], turning: bool
+    surface: Surface, limiter: Limiter, shifts: Float64, bad: Int, pinned: Bool, turning: bool
 ) -> Float64:
     """Shifts (N, 3) after easing around some triangles as little as is enough, or as helps most."""
     best, fewest = shifts, len(bad)
-    for pinned in pins:
-        core = np.unique(bad)
-        core = core[~pinned[core]]
-        as_one = shifts.copy()
-        if len(core):
-            as_one[core] = shifts[core].mean(axis=0)
-        region = core
-        for _ in range(RINGS):
-            region = np.unique(surface.graph[region].indices) if len(region) else region
-            touched = limiter.touched(region)
-            for start, held in ((shifts, region[:0]), (as_one, core)):
-                free = np.setdiff1d(region[~pinned[region]], held)
-                trial = _harmonic(surface, start, free)
-                left = int((~limiter.soundness(trial, touched, turning=turning)).sum())
-                if left < fewest:
-                    best, fewest = trial, left
-            if not fewest:
-                return best
+    core = np.unique(bad)
+    core = core[~pinned[core]]
+    as_one = shifts.copy()
+    if len(core):
+        as_one[core] = shifts[core].mean(axis=0)
+    region = core
+    for _ in range(RINGS):
+        region = np.unique(surface.graph[region].indices) if len(region) else region
+        touched = limiter.touched(region)
+        for start, held in ((shifts, region[:0]), (as_one, core)):
+            free = np.setdiff1d(region[~pinned[region]], held)
+            trial = _harmonic(surface, start, free)
+            left = int((~limiter.soundness(trial, touched, turning=turning)).sum())
+            if left < fewest:
+                best, fewest = trial, left
+        if not fewest:
+            break
     return best
 
 

@@ -59,7 +59,8 @@ def _roll(marks: Landmarks, points: Float64) -> Motion:
     middle, left, right = (marks.place(name) for name in ("6.2", "6.3", "6.4"))
     unit = marks.fapu.AU
     low, high = limits(TONGUE_ROLL)
-    values = np.unique(np.round(np.append(np.linspace(low, 0, 3), np.linspace(0, high, ROLL_STEPS + 1))))
+    steps = np.append(np.linspace(low, 0.0, 3), np.linspace(0.0, high, ROLL_STEPS + 1))
+    values: Float64 = np.unique(np.round(steps)).astype(np.float64)
     half = (left[0] - right[0]) / 2
     x, y = points[:, 0] - middle[0], points[:, 1] - middle[1]
     root, tip = float(points[:, 2].min()), float(points[:, 2].max())

@@ -1,0 +1,120 @@
+"""A face model posed by its tables in plain NumPy, to be measured: a second opinion on the deformer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.binding import SURFACE_KINDS
+from fba.face.authoring.eyes import Eye, eyes
+from fba.face.authoring.landmarks import Landmarks, landmarks
+from fba.face.authoring.surface import Surface
+from fba.face.feature_points import row_of
+from fba.face.model import FaceModel
+from fba.face.tables import HEAD
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+
+KIND_ORDER = ("scale", "rotation", "translation")
+"""In which order the transforms of a part act, as in a Transform node."""
+
+
+class Poser:
+    """A model under measurement."""
+
+    def __init__(self, model: FaceModel) -> None:
+        self.model = model
+        self.neutral: Float64 = model.vertices.astype(np.float64)
+
+    def pose(self, values: Mapping[int, float]) -> Float64:
+        """(V, 3): all vertices under some FAPs, head turns left out."""
+        moved = self.neutral.copy()
+        tables = [
+            (self.model.table_of[fap], value) for fap, value in values.items() if fap in self.model.table_of
+        ]
+        for table, value in tables:
+            unit = self.model.fapu[faps()[table.fap - 1].unit]
+            for mesh in table.meshes:
+                start = self.model.starts[mesh.part]
+                moved[mesh.vertices + start] += mesh.shift(value).astype(np.float64) * unit
+        for part in self.model.parts:
+            turns = [
+                (transform, value * self.model.fapu[faps()[table.fap - 1].unit])
+                for table, value in tables
+                for transform in table.transforms
+                if transform.part == part.name and transform.part != HEAD
+            ]
+            start = self.model.starts[part.name]
+            own = slice(start, start + len(part.vertices))
+            for transform, amount in sorted(turns, key=lambda turn: KIND_ORDER.index(turn[0].kind)):
+                moved[own] = transformed(
+                    moved[own], transform.kind, amount * np.array(transform.amount), transform.centre
+                )
+        return moved
+
+    def shift(self, values: Mapping[int, float]) -> Float64:
+        """(V, 3): how far each vertex moves."""
+        return self.pose(values) - self.neutral
+
+    def vertex(self, point: str) -> int:
+        """The vertex of a feature point, counted through all parts; -1 where it is free."""
+        return int(self.model.bound[row_of()[point]])
+
+    def has(self, *points: str) -> bool:
+        """Whether all these feature points stand on vertices."""
+        return all(self.vertex(point) >= 0 for point in points)
+
+    def place(self, point: str) -> Float64:
+        """(3,) a neutral feature point."""
+        place: Float64 = self.model.points[row_of()[point]]
+        return place
+
+    @cached_property
+    def pool(self) -> Int:
+        """Vertices of skin and inner mouth, counted through all parts."""
+        own = [part for part in self.model.parts if part.kind in SURFACE_KINDS]
+        starts = self.model.starts
+        return np.concatenate(
+            [np.zeros(0, dtype=np.intp)]
+            + [np.arange(starts[part.name], starts[part.name] + len(part.vertices)) for part in own]
+        )
+
+    @cached_property
+    def marks(self) -> Landmarks:
+        """Contours and points on the skin."""
+        surface = Surface([part for part in self.model.parts if part.kind in SURFACE_KINDS])
+        return landmarks(surface, self.model.points, self.model.bound, self.pool)
+
+    @cached_property
+    def eyes(self) -> dict[str, Eye]:
+        """The eyeballs by side."""
+        return eyes(self.marks, self.model.parts)
+
+    def surface(self, moved: Float64) -> Float64:
+        """(N, 3): posed vertices (V, 3) of the model as vertices of `marks.surface`."""
+        result = self.marks.surface.vertices.copy()
+        result[self.marks.surface.number] = moved[self.pool]
+        return result
+
+    def contour(self, name: str, moved: Float64) -> Float64:
+        """(M, 3): a contour of the posed face, corner to corner; empty where the face has none."""
+        return self.surface(moved)[self.marks.contour(name)]
+
+
+def transformed(points: Float64, kind: str, amount: Float64, centre: npt.ArrayLike) -> Float64:
+    """Points (N, 3) turned, scaled or shifted by an amount (3,)."""
+    from scipy.spatial.transform import Rotation
+
+    if kind == "translation":
+        return points + amount
+    arms = points - np.asarray(centre)
+    if kind == "scale":
+        scaled: Float64 = np.asarray(centre) + arms * (1 + amount)
+        return scaled
+    turned: Float64 = Rotation.from_rotvec(amount).apply(arms) + np.asarray(centre)
+    return turned
