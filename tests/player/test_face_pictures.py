@@ -66,11 +66,11 @@ def test_open_jaw_lowers_the_silhouette_of_the_chin() -> None:
     empty = backdrop(camera)
     chin = model.points[point_row("2.1")]
     sunk = 600 * model.fapu.MNS
-    column = round(pixel(camera, chin)[0])
+    before_neck = slice(0, round(pixel(camera, chin - [0, 0, 0.02])[0]))  # the face looks to the left
     lowest = []
     for picture in (neutral, opened):
-        head = np.abs(picture - empty).max(axis=2)[:, column] > 12
-        lowest.append(int(np.flatnonzero(head).max()))
+        head = np.abs(picture - empty).max(axis=2)[:, before_neck] > 12
+        lowest.append(int(np.flatnonzero(head.any(axis=1)).max()))
     expected = pixel(camera, chin - [0, sunk, 0])[1] - pixel(camera, chin)[1]
     assert expected > 10
     assert lowest[1] - lowest[0] == pytest.approx(expected, rel=0.2)
@@ -81,30 +81,26 @@ def test_closed_lids_hide_the_eye(split: tuple[int, int]) -> None:
     camera = eye_camera()
     open_, closed = shown(camera, {}, {19: split[0], 21: split[1]})
     middle = (slice(SIZE[1] // 2 - 20, SIZE[1] // 2 + 20), slice(SIZE[0] // 2 - 20, SIZE[0] // 2 + 20))
-    assert open_[middle].min() < 25  # the pupil
+    assert open_[middle].max(axis=2).min() < 45  # the pupil
     redness = closed[middle][..., 0] - closed[middle][..., 2]
     assert np.median(redness) > 30  # skin
     assert (redness > 10).mean() > 0.9  # lashes may be left
 
 
 def test_the_pupil_grows_and_the_gaze_turns() -> None:
-    camera, model = eye_camera(), FaceModel.default()
-    unit = model.fapu
+    camera = eye_camera()
     straight, wide, aside = shown(camera, {}, {29: 170}, {23: 20000})
-    dark = [picture.max(axis=2) < 45 for picture in (straight, wide, aside)]
-    box = np.zeros(SIZE[::-1], dtype=bool)
-    box[130:230, 150:330] = True  # away from the lashes
-    areas = [float((found & box).sum()) for found in dark]
-    # Diameters (1024 / 3) and (1024 / 3 + 170) units: areas as 1 : 2.24
-    assert areas[1] / areas[0] == pytest.approx((1 + 170 / (1024 / 3)) ** 2, rel=0.15)
-    centres = [np.argwhere(found & box).mean(axis=0)[1] for found in (dark[0], dark[2])]
+    row = SIZE[1] // 2 + 3  # below the light mirrored in the eye
+    dark = [np.flatnonzero(picture[row, 150:330].max(axis=1) < 50) for picture in (straight, wide, aside)]
+    # A third of the iris at rest, and 170 of its 1024ths more.
+    assert len(dark[1]) / len(dark[0]) == pytest.approx(1 + 170 / (1024 / 3), rel=0.12)
+    centres = [columns.mean() for columns in (dark[0], dark[2])]
     eye = scene().figure.eyes(vector({}), np.eye(4))[0]
     centre, radius = eye.matrix[:3, 3], float(np.linalg.norm(eye.matrix[:3, 0]))
     turned = centre + radius * np.array([np.sin(0.2), 0, np.cos(0.2)])
     ahead = centre + radius * np.array([0, 0, 1.0])
     expected = pixel(camera, turned)[0] - pixel(camera, ahead)[0]
     assert centres[1] - centres[0] == pytest.approx(expected, abs=3)
-    assert unit.IRISD > 0
 
 
 def test_the_texture_is_on_the_skin() -> None:
