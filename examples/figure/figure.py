@@ -46,9 +46,7 @@ class Surface:
         """Only some faces, and the vertices that they use."""
         used, quads = np.unique(self.quads[faces], return_inverse=True)
         used_uvs, corners = np.unique(self.corners[faces], return_inverse=True)
-        return Surface(
-            self.vertices[used], quads.reshape(-1, 4), corners.reshape(-1, 4), self.uvs[used_uvs]
-        )
+        return Surface(self.vertices[used], quads.reshape(-1, 4), corners.reshape(-1, 4), self.uvs[used_uvs])
 
     def rings(self, start: npt.NDArray[np.integer], most: int) -> Int64:
         """(V,) edges from the start vertices, -1 beyond `most`."""

@@ -26,7 +26,10 @@ def neckline(places: Float64) -> Float64:
 
 
 def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
-    """Vertices, triangles and colours (V, 4) of the shirt. origin: of the head, in the frame of `figure.head`."""
+    """Vertices, triangles and colours (V, 4) of the shirt.
+
+    origin: of the head, in the frame of `figure.head`.
+    """
     whole, _ = figure.load()
     surface = figure.Surface(
         whole.vertices - (0.0, figure.EYE_LEVEL, 0.0) - origin, whole.quads, whole.corners, whole.uvs
@@ -73,7 +76,9 @@ def _in_order(torso: figure.Surface, top: Int64) -> Float64:
 
     The edge climbs in steps along the quads; a collar runs round evenly.
     """
-    after = {int(a): int(b) for a, b in _open_edges(torso) if a in set(top.tolist()) and b in set(top.tolist())}
+    after = {
+        int(a): int(b) for a, b in _open_edges(torso) if a in set(top.tolist()) and b in set(top.tolist())
+    }
     chain = [int(top[torso.vertices[top, 2].argmax()])]
     while after[chain[-1]] != chain[0]:
         chain.append(after[chain[-1]])
@@ -98,7 +103,7 @@ def _on_neckline(places: Float64, skin: Float64) -> Float64:
 
     neck = skin[(skin[:, 1] > -0.24) & (np.hypot(skin[:, 0], skin[:, 2] - AXIS) < 0.13)]
     chart = np.stack([around(neck), neck[:, 1]], axis=1)
-    chart = np.concatenate([chart + (turn, 0) for turn in (-2 * np.pi, 0, 2 * np.pi)])
+    chart = np.concatenate([chart + np.array([turn, 0]) for turn in (-2 * np.pi, 0, 2 * np.pi)])
     away = np.tile(np.hypot(neck[:, 0], neck[:, 2] - AXIS), 3)
     turn, height = around(places), neckline(places)
     radius = LinearNDInterpolator(chart, away)(turn, height)

@@ -23,7 +23,10 @@ BROW = np.array([
 
 
 def scalp(places: Float64, soft: float = 0.004) -> Float64:
-    """(N,) how much hair grows at places (N, 3): 0 on the face, 1 on the scalp. soft: width of the edge, m."""
+    """(N,) how much hair grows at places (N, 3): 0 on the face, 1 on the scalp.
+
+    soft: width of the edge, metres.
+    """
     from scipy.interpolate import PchipInterpolator
 
     with (Path(__file__).parent / "hairline.csv").open(encoding="utf-8") as file:

@@ -15,17 +15,19 @@ import eyeballs
 import figure
 import garment
 import hair
+import landmarks
 import lashes
 import mouth
 import numpy as np
 import numpy.typing as npt
 import paint
 import sculpt
-from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS
+from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
 from subdivide import Refined, refine
 
 from fba.face.authoring import author
-from fba.face.feature_points import MIRRORED, names, row_of
+from fba.face.compact import compact
+from fba.face.feature_points import row_of
 from fba.face.model import FaceModel, Material, Part
 from fba.face.normals import vertex_normals
 
@@ -33,11 +35,9 @@ Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
 NEUTRAL = TARGET.parents[1] / "neutral.csv"
-ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
-"""Between the pupils, in the frame of `figure.head`."""
 TEETH = np.array([0.0, -0.0713, 0.0823])
 """Where the edges of the middle incisors meet."""
-TONGUE = TEETH + (0.0, 0.0002, -0.0022)
+TONGUE = TEETH + np.array([0.0, 0.0002, -0.0022])
 
 
 def skin() -> tuple[Refined, sculpt.Marks]:
@@ -52,7 +52,7 @@ def skin() -> tuple[Refined, sculpt.Marks]:
     eyes = (from_eye < 0.026) & (z > 0.066)
     lips = (np.abs(x) < 0.034) & (y < -0.025) & (y > -0.098) & (z > 0.07)
     refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
-    vertices = sculpt.laid_on_eyeballs(refined.vertices, carried(refined, where.eye)) - ORIGIN
+    vertices = sculpt.laid_on_eyeballs(refined.vertices, sculpt.carried(refined, where.eye)) - ORIGIN
     normals = vertex_normals(vertices, refined.triangles)
     vertices = vertices + normals * (hair.THICKNESS * hair.scalp(vertices, 0.012))[:, None]
     vertices = exactly_symmetric(vertices)
@@ -60,13 +60,6 @@ def skin() -> tuple[Refined, sculpt.Marks]:
         Refined(vertices, refined.triangles, refined.corners, refined.uvs, refined.quads, refined.blend),
         where,
     )
-
-
-def carried(refined: Refined, ring: npt.NDArray[np.int64]) -> Float64:
-    """A ring number on the coarse vertices, on the fine ones between them too."""
-    value = refined.blend @ ring.astype(np.float64)
-    far = refined.blend @ (ring == sculpt.FAR).astype(np.float64)
-    return np.where(far > 0, sculpt.FAR, value)
 
 
 def exactly_symmetric(vertices: Float64) -> Float64:
@@ -86,7 +79,13 @@ def shells() -> tuple[dict[str, mouth.Mesh], dict[str, int]]:
     upper, upper_points = mouth.teeth(TEETH, upper=True)
     lower, lower_points = mouth.teeth(TEETH, upper=False)
     tongue, tongue_points = mouth.tongue(TONGUE)
-    meshes = {"eye_left": ball, "eye_right": other, "teeth_upper": upper, "teeth_lower": lower, "tongue": tongue}
+    meshes = {
+        "eye_left": ball,
+        "eye_right": other,
+        "teeth_upper": upper,
+        "teeth_lower": lower,
+        "tongue": tongue,
+    }
     found = {"3.5": 0, "3.6": 0, "9.8": upper_points["root"], "9.10": upper_points["edge"],
              "9.9": lower_points["root"], "9.11": lower_points["edge"], **tongue_points}  # fmt: skip
     return {name: (mesh[0] - ORIGIN, mesh[1], mesh[2]) for name, mesh in meshes.items()}, found
@@ -99,24 +98,29 @@ KINDS = {
 ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.95}
 
 
-def parts_and_points() -> tuple[tuple[Part, ...], Float64, npt.NDArray[np.int32]]:
-    """Everything of the head but its tables: parts, feature points (84, 3) and bound vertices (84,)."""
+def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64, npt.NDArray[np.int32]]:
+    """Everything of the head but its tables: parts, feature points (84, 3) and bound vertices (84,).
+
+    painted: whether to paint the texture of the skin, which takes most of the time.
+    """
     surface, where = skin()
     meshes, found = shells()
-    parts = [_skin_part(surface, where)]
+    parts = [_skin_part(surface, where, painted)]
     meshes |= _lashes(surface, where)
     meshes["shirt"] = garment.shirt(ORIGIN)
     for name, (vertices, triangles, colours) in meshes.items():
         material = Material(KINDS[name], (1.0, 1.0, 1.0), ROUGHNESS[KINDS[name]])
         parts.append(Part(name, KINDS[name], vertices, triangles, colours=colours, material=material))
-    starts = dict(zip([p.name for p in parts], np.cumsum([0, *(len(p.vertices) for p in parts)]), strict=False))
-    points, bound = _points(surface, where, meshes, found, starts)
+    starts = dict(
+        zip([p.name for p in parts], np.cumsum([0, *(len(p.vertices) for p in parts)]), strict=False)
+    )
+    points, bound = landmarks.bound_points(surface, where, found, starts)
     for row in np.flatnonzero(bound >= 0):
         points[row] = np.concatenate([p.vertices for p in parts])[bound[row]]
     return tuple(parts), points, bound
 
 
-def _skin_part(surface: Refined, where: sculpt.Marks) -> Part:
+def _skin_part(surface: Refined, where: sculpt.Marks, painted: bool) -> Part:
     """The skin, its vertices doubled along the seam of the texture."""
     pairs = np.stack([surface.triangles.ravel(), surface.corners.ravel()], axis=1)
     inner = np.repeat(surface.uvs[surface.corners].mean(axis=1)[:, 0] >= 1.0, 3)
@@ -129,21 +133,19 @@ def _skin_part(surface: Refined, where: sculpt.Marks) -> Part:
     extra = pairs[pairs[:, 1] != first[pairs[:, 0]]]
     unique = np.unique(extra, axis=0)
     number = {tuple(pair): len(surface.vertices) + k for k, pair in enumerate(unique.tolist())}
-    flat = [
-        vertex if uv == first[vertex] else number[vertex, uv] for vertex, uv in pairs.tolist()
-    ]
+    flat = [vertex if uv == first[vertex] else number[vertex, uv] for vertex, uv in pairs.tolist()]
     vertices = np.concatenate([surface.vertices, surface.vertices[unique[:, 0]]])
     uv_rows = np.concatenate([first, unique[:, 1]])
     source = np.concatenate([np.arange(len(surface.vertices)), unique[:, 0]])
     # The insides take the colour of their border: of the lips, or of the corner of the eyes.
-    lips = surface.uvs[first[np.flatnonzero(carried(surface, where.mouth) == 0)]].mean(axis=0)
-    corner = surface.vertices[:, 0] * 1000 - 50 * np.abs(carried(surface, where.eye) - 1)
+    lips = surface.uvs[first[np.flatnonzero(sculpt.carried(surface, where.mouth) == 0)]].mean(axis=0)
+    corner = surface.vertices[:, 0] * 1000 - 50 * np.abs(sculpt.carried(surface, where.eye) - 1)
     eye = surface.uvs[first[np.where(first >= 0, -np.abs(corner - 17), -np.inf).argmax()]]
     inner_uv = np.where((vertices[:, 1] > -0.03)[:, None], eye, lips)
     texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], inner_uv)
     texcoords = np.stack([texcoords[:, 0], 1 - texcoords[:, 1]], axis=1)
     triangles = np.array(flat).reshape(-1, 3)
-    texture = paint.encoded(paint.paint(_chart(surface, where)))
+    texture = paint.encoded(paint.paint(_chart(surface, where))) if painted else None
     return Part(
         "skin", "skin", vertices, triangles,
         texcoords=texcoords, colours=_finish(surface, where)[source],
@@ -154,7 +156,7 @@ def _skin_part(surface: Refined, where: sculpt.Marks) -> Part:
 def _chart(surface: Refined, where: sculpt.Marks) -> paint.Chart:
     outside = surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0
     lip = surface.blend @ where.lip.astype(np.float64)
-    values = np.stack([carried(surface, where.mouth), carried(surface, where.eye), lip], axis=1)
+    values = np.stack([sculpt.carried(surface, where.mouth), sculpt.carried(surface, where.eye), lip], axis=1)
     return paint.chart(
         surface.vertices, values, surface.triangles[outside], surface.uvs[surface.corners[outside]]
     )
@@ -162,7 +164,7 @@ def _chart(surface: Refined, where: sculpt.Marks) -> paint.Chart:
 
 def _finish(surface: Refined, where: sculpt.Marks) -> Float64:
     """(V, 4) what the texture is multiplied by, and how glossy the skin is."""
-    ring, eye = carried(surface, where.mouth), carried(surface, where.eye)
+    ring, eye = sculpt.carried(surface, where.mouth), sculpt.carried(surface, where.eye)
     near = ring != sculpt.FAR
     colours = np.ones((len(surface.vertices), 4))
     depth = np.where(near & (ring < 0), -ring, 0.0)
@@ -194,7 +196,7 @@ def _nostrils(surface: Refined) -> Float64:
 
 def _lashes(surface: Refined, where: sculpt.Marks) -> dict[str, mouth.Mesh]:
     """Lashes along the outer edge of each upper lid's margin."""
-    ring = carried(surface, where.eye)
+    ring = sculpt.carried(surface, where.eye)
     v = surface.vertices
     edge = (np.abs(ring - sculpt.MARGIN_RING - 1) < 1e-6) & (v[:, 0] > 0)
     inner, outer = v[edge, 0].argmin(), v[edge, 0].argmax()
@@ -206,79 +208,6 @@ def _lashes(surface: Refined, where: sculpt.Marks) -> dict[str, mouth.Mesh]:
     return {"lashes_left": mesh, "lashes_right": mirrored}
 
 
-def _points(
-    surface: Refined,
-    where: sculpt.Marks,
-    meshes: dict[str, mouth.Mesh],
-    found: dict[str, int],
-    starts: dict[str, int],
-) -> tuple[Float64, npt.NDArray[np.int32]]:
-    points, bound = np.full((len(names()), 3), np.nan), np.full(len(names()), -1, dtype=np.int32)
-    finder = Finder(surface, where)
-    with (HERE / "points.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            name, part = row["point"], row["part"]
-            place = np.array([float(row[axis]) for axis in "xyz"])
-            pair = [(name, place, 1.0)]
-            if name in MIRRORED:
-                pair.append((MIRRORED[name], place, -1.0))
-            for point, target, side in pair:
-                at = row_of()[point]
-                if row["rule"] == "free":
-                    points[at] = target / 1000
-                elif part == "skin":
-                    bound[at] = finder.find(row["rule"], target, side)
-                else:
-                    own = part.replace("left", "right") if side < 0 else part
-                    bound[at] = starts[own] + found[point]
-    return points, bound
-
-
-class Finder:
-    """Vertices of the skin by where they are."""
-
-    def __init__(self, surface: Refined, where: sculpt.Marks) -> None:
-        self.vertices = surface.vertices
-        self.eye, self.mouth = carried(surface, where.eye), carried(surface, where.mouth)
-        self.lip = surface.blend @ where.lip.astype(np.float64)
-        self.normals = vertex_normals(surface.vertices, surface.triangles)
-        self.outside = np.zeros(len(self.vertices), dtype=bool)
-        self.outside[surface.triangles[surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0]] = True
-
-    def find(self, rule: str, target: Float64, side: float) -> int:
-        """The vertex of a rule of points.csv, on the left (side 1) or right (-1)."""
-        places = self.vertices * (side, 1.0, 1.0)
-        return int(getattr(self, f"_{rule}")(places, target))
-
-    def _best(self, score: Float64, chosen: npt.NDArray[np.bool_]) -> int:
-        return int(np.where(chosen, score, np.inf).argmin())
-
-    def _near(self, places: Float64, target: Float64) -> int:
-        face = self.outside & ((self.mouth == sculpt.FAR) | (self.mouth > 2))
-        on_midline = np.abs(places[:, 0]) < 1e-6 if target[0] == 0 else np.abs(places[:, 0]) > 1e-6
-        return self._best(np.linalg.norm(places - target / 1000, axis=1), face & on_midline)
-
-    def _lip(self, places: Float64, target: Float64) -> int:
-        ring = np.abs(self.mouth - sculpt.CONTACT_RING) < 1e-6
-        widest = places[ring, 0].max()
-        lips = ring & (self.lip * target[1] > 0) if target[1] else ring
-        return self._best(np.abs(places[:, 0] - target[0] * widest), lips)
-
-    def _lid(self, places: Float64, target: Float64) -> int:
-        ring = (np.abs(self.eye - sculpt.MARGIN_RING) < 1e-6) & (places[:, 0] > 0)
-        if target[0]:
-            return self._best(-places[:, 0] * target[0], ring)
-        height = places[:, 1] * target[1]
-        centre = EYE_CENTRE - ORIGIN
-        return self._best(np.abs(places[:, 0] - centre[0]), ring & (height > 0.002))
-
-    def _top(self, places: Float64, target: Float64) -> int:
-        return self._best(-places[:, 1], np.abs(places[:, 0]) < 1e-6)
-
-    def _back(self, places: Float64, target: Float64) -> int:
-        return self._best(places[:, 2], (np.abs(places[:, 0]) < 1e-6) & (places[:, 1] > -0.03))
-
-
 def head() -> FaceModel:
     """The whole head with its tables."""
     parts, points, bound = parts_and_points()
@@ -287,7 +216,7 @@ def head() -> FaceModel:
         "licence": "Apache-2.0",
         "made by": "examples/figure/make_head.py",
     }
-    return author(parts, points, bound=bound, name="built-in head", notes=notes)
+    return compact(author(parts, points, bound=bound, name="built-in head", notes=notes))
 
 
 def write_neutral(model: FaceModel) -> None:
@@ -305,4 +234,6 @@ if __name__ == "__main__":
     made = head()
     made.save(TARGET)
     write_neutral(made)
-    print(f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs")
+    print(
+        f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs"
+    )

@@ -88,7 +88,9 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
         vertices[1, :, 1] += sign * 0.0007 * np.abs(cx)
     corner = 0.0001 * np.abs(cx) ** 6 * sign
     vertices[0, :, 1] += corner
-    cap = vertices[0].mean(axis=0) * np.array([1, 0, 1]) + np.array([0, sign * (0.0 if flat < 0.5 else 0.0006), 0])
+    cap = vertices[0].mean(axis=0) * np.array([1, 0, 1]) + np.array(
+        [0, sign * (0.0 if flat < 0.5 else 0.0006), 0]
+    )
     flat_vertices = np.concatenate([vertices.reshape(-1, 3), cap[None]])
     triangles = _tube(len(rows), AROUND, sign)
     last = len(flat_vertices) - 1
@@ -151,7 +153,9 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
     columns = band.shape[1]
     grid = np.arange(len(profile) * columns).reshape(len(profile), columns)
     a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-    triangles = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    triangles = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
     if sign < 0:
         triangles = triangles[:, ::-1].copy()
     shade = 1 - 0.55 * np.abs(np.linspace(-1, 1, columns)) ** 1.5
@@ -166,7 +170,8 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
         (-68, -12, 17, 17), (-58, -4, 20, 21), (-48, 0.5, 22, 21), (-38, 2.0, 22.5, 19), (-28, 2.2, 21.5, 16),
-        (-19, 1.9, 19, 12.5), (-11, 1.4, 15.5, 9.0), (-5, 0.9, 11.5, 6.2), (-2, 0.5, 8.2, 4.4), (-0.5, 0.25, 4.6, 2.8),
+        (-19, 1.9, 19, 12.5), (-11, 1.4, 15.5, 9.0), (-5, 0.9, 11.5, 6.2), (-2, 0.5, 8.2, 4.4),
+        (-0.5, 0.25, 4.6, 2.8),
     ])  # fmt: skip
     from scipy.interpolate import PchipInterpolator
 
@@ -181,7 +186,9 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     vertices = np.zeros((rings, around, 3))
     vertices[..., 0] = half[:, None] * cx
     vertices[..., 1] = top[:, None] + tall[:, None] * (cy - 1) / 2
-    groove = 0.0011 * np.exp(-((vertices[..., 0] / 0.0022) ** 2)) * (cy > 0.3) * np.clip((t[:, None]) * 3, 0, 1)
+    groove = (
+        0.0011 * np.exp(-((vertices[..., 0] / 0.0022) ** 2)) * (cy > 0.3) * np.clip((t[:, None]) * 3, 0, 1)
+    )
     vertices[..., 1] -= groove * np.clip((1 - t[:, None]) * 6, 0, 1)
     vertices[..., 2] = z[:, None]
     flat = np.concatenate([vertices.reshape(-1, 3), [[0, top[0] - tall[0] / 2, z[0]]], [[0, 0.0, 0.0]]])

@@ -87,8 +87,11 @@ def paint(lay: Chart) -> Image.Image:
     # Hairs end at the seam of the texture, at the back of the head: a darker ground hides it.
     seam = np.exp(-((p[:, 0] / 0.003) ** 2)) * (p[:, 2] < -0.12)
     colour = _towards(colour, HAIR, hair * seam * 0.25)
-    colour = colour * (1 - 0.72 * (cover * (1 - 0.3 * seam))[:, None]) + SCALP * 0.72 * (cover * (1 - 0.3 * seam))[:, None]
-    along, density = brow(p)
+    colour = (
+        colour * (1 - 0.72 * (cover * (1 - 0.3 * seam))[:, None])
+        + SCALP * 0.72 * (cover * (1 - 0.3 * seam))[:, None]
+    )
+    _, density = brow(p)
     colour = colour * (1 - 0.30 * density[:, None]) + HAIR * 0.30 * density[:, None]
     image = np.zeros((*lay.known.shape, 3))
     image[:] = SKIN
@@ -121,7 +124,8 @@ def _complexion(p: Float64) -> Float64:
     colour = _towards(colour, NECK, smooth((-0.095 - p[:, 1]) / 0.05) * 0.9)
     broad = 0.75 + 0.5 * noise(p, 0.011, 1)
     for centre, radius, share in (
-        ((40, -40, -4), 40, 0.55), ((0, -38, 33), 24, 0.45), ((14, -40, 14), 14, 0.35), ((0, -104, 6), 26, 0.25),
+        ((40, -40, -4), 40, 0.55), ((0, -38, 33), 24, 0.45), ((14, -40, 14), 14, 0.35),
+        ((0, -104, 6), 26, 0.25),
         ((84, -15, -98), 44, 0.5), ((0, 40, 12), 40, 0.10),
     ):  # fmt: skip
         colour = _towards(colour, BLUSH, _spot(p, centre, radius) * share * broad)
@@ -193,7 +197,9 @@ def _strokes(picture: Image.Image, lay: Chart) -> None:
     chosen = random.choice(len(p), 130000, p=weight / weight.sum())
     away = p[chosen] - CROWN
     swirl = np.cross(away, (0.0, 1.0, 0.0)) * 0.35
-    direction = _unit(away + swirl + random.normal(0, 0.018, away.shape)) * random.uniform(0.002, 0.0045, (len(chosen), 1))
+    direction = _unit(away + swirl + random.normal(0, 0.018, away.shape)) * random.uniform(
+        0.002, 0.0045, (len(chosen), 1)
+    )
     layers.append((chosen, direction, 0.66))
     along, density = brow(p)
     weight = area[rows, columns] * density**1.2
@@ -203,7 +209,9 @@ def _strokes(picture: Image.Image, lay: Chart) -> None:
         mask = Image.new("L", (SIZE * 2, SIZE * 2), 0)
         draw = ImageDraw.Draw(mask)
         at = np.stack([columns[chosen], rows[chosen]], axis=1).astype(np.float64)
-        move = _in_texels(step_x[rows[chosen], columns[chosen]], step_y[rows[chosen], columns[chosen]], direction)
+        move = _in_texels(
+            step_x[rows[chosen], columns[chosen]], step_y[rows[chosen], columns[chosen]], direction
+        )
         good = np.abs(move).max(axis=1) < 60
         for (x0, y0), (dx, dy) in zip(at[good] * 2, move[good] * 2, strict=True):
             draw.line((x0 - dx / 2, y0 - dy / 2, x0 + dx / 2, y0 + dy / 2), fill=255, width=2)

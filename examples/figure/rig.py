@@ -158,7 +158,9 @@ def _weights(
         # The shoulder girdle: what is near the arm goes with the blade.
         out = np.abs(surface.vertices[:, 0])
         far = _smooth((out - 0.07) / 0.06)
-        inner, outer = (default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular"))
+        inner, outer = (
+            default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular")
+        )
         weights[:, outer] += weights[:, inner] * far
         weights[:, inner] *= 1 - far
     return weights / weights.sum(axis=1, keepdims=True)

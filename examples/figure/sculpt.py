@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from figure import Surface
+from subdivide import Refined
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
@@ -48,6 +49,15 @@ class Marks:
 
 
 FAR = 99
+ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
+"""Of the finished head, between the pupils, in the frame of `figure.head`."""
+
+
+def carried(refined: Refined, ring: npt.NDArray[np.int64]) -> Float64:
+    """A ring number on the coarse vertices, on the fine ones between them too."""
+    value = refined.blend @ ring.astype(np.float64)
+    far = refined.blend @ (ring == FAR).astype(np.float64)
+    return np.where(far > 0, FAR, value)
 
 
 def marks(head: Surface) -> Marks:
@@ -202,7 +212,11 @@ def _mouth(vertices: Float64, where: Marks) -> Float64:
     x = vertices[:, 0]
     corner = vertices[contact][np.abs(vertices[contact, 0]).argmax()]
     for side, line in lines.items():  # both lines end in the corners
-        ends = np.array([corner * (-1.0, 1.0, 1.0), corner]) if corner[0] > 0 else np.array([corner, corner * (-1.0, 1.0, 1.0)])
+        ends = (
+            np.array([corner * (-1.0, 1.0, 1.0), corner])
+            if corner[0] > 0
+            else np.array([corner, corner * (-1.0, 1.0, 1.0)])
+        )
         lines[side] = np.concatenate([ends[:1], line, ends[1:]])
     y = {side: np.interp(x, line[:, 0], line[:, 1]) for side, line in lines.items()}
     z = {side: np.interp(x, line[:, 0], line[:, 2]) for side, line in lines.items()}

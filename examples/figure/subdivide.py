@@ -73,9 +73,7 @@ class _Scheme:
         count = len(surface.vertices)
         key = {tuple(edge): row for row, edge in enumerate(self.edges.tolist())}
         sides = np.stack([self.quads, np.roll(self.quads, -1, axis=1)], axis=-1)
-        self.face_edges = np.array(
-            [[key[min(a, b), max(a, b)] for a, b in face] for face in sides.tolist()]
-        )
+        self.face_edges = np.array([[key[min(a, b), max(a, b)] for a, b in face] for face in sides.tolist()])
         self.uses = np.bincount(self.face_edges.ravel(), minlength=len(self.edges))
         self.open = self.uses == 1
         self.border = np.zeros(count, dtype=bool)
@@ -147,7 +145,10 @@ def _cut(
         if chosen[face]:
             centre, centre_uv = int(face_row[face]), uv_between(*uv)
             polygons = [
-                ([quad[k], middles[k], centre, middles[k - 1]], [uv[k], mid_uvs[k], centre_uv, mid_uvs[k - 1]])
+                (
+                    [quad[k], middles[k], centre, middles[k - 1]],
+                    [uv[k], mid_uvs[k], centre_uv, mid_uvs[k - 1]],
+                )
                 for k in range(4)
             ]
         else:
@@ -168,9 +169,7 @@ def _cut(
     return np.array(triangles), np.array(corners), np.array(uvs), np.array(owner)
 
 
-def _triangulated(
-    ring: list[int], vertices: Float64, straight: list[bool]
-) -> list[tuple[int, int, int]]:
+def _triangulated(ring: list[int], vertices: Float64, straight: list[bool]) -> list[tuple[int, int, int]]:
     """A polygon as triangles, always across its shortest diagonal; ties alike on both sides of a face.
 
     straight: corners that are none, in the middle of a side; cutting them off would leave slivers.
@@ -181,7 +180,10 @@ def _triangulated(
         best = min(
             [k for k in range(len(left)) if not straight[left[k]]] or range(len(left)),
             key=lambda k: round(
-                float(np.linalg.norm(vertices[ring[left[k - 1]]] - vertices[ring[left[(k + 1) % len(left)]]])), 9
+                float(
+                    np.linalg.norm(vertices[ring[left[k - 1]]] - vertices[ring[left[(k + 1) % len(left)]]])
+                ),
+                9,
             ),
         )
         found.append((left[best - 1], left[best], left[(best + 1) % len(left)]))
