@@ -16,7 +16,7 @@ TINY_EDGE = 0.25
 """... or, where edges are short, of this share of the typical edge of what moves."""
 FOLDED = -0.3
 """A triangle whose normal has this cosine with that of its neighbours lies folded on them."""
-SPECK = 0.002
+SPECK = 0.0015
 """Share of the moving surface that may lie folded where skin closes on itself."""
 DEGENERATE = 1e-5
 """Triangles of less than this share of the typical area have no front to turn."""

@@ -48,6 +48,8 @@ EDGE = 0.4
 """The lid's edge, up to this share of the distance to the crease, goes as one."""
 FURTHER = 0.2
 """The front edge of a lid may go this much further than the margin."""
+OWN_SIDE = 0.6
+"""What is closer to the other lid than this share of the way goes less and less with this one."""
 NARROW = 0.4
 """At the corners of the eye distances shrink to this."""
 SMOOTHINGS = 4
@@ -94,12 +96,12 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     values = lid_values(fap)
     shifts = slid(points, share[vertices], opening, eye, lid, values / CLOSED)
     profile = Profile(eye, parts)
-    for k, value in enumerate(values):
-        freed = float(smooth_step(np.array([abs(value) / CLOSED / FREED]))[0])
-        shifts[k] += profile.lift(points, shifts[k]) * freed
+    shifts = _freed(profile, points, shifts, values)
     pinned = np.zeros(len(marks.surface), dtype=bool)
     pinned[own] = pinned[other] = True
     motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), pinned, True)
+    points = marks.surface.vertices[motion.vertices]
+    motion = Motion(values, motion.vertices, _freed(profile, points, motion.shifts, values))
     return guarded(limiter, motion, turning=True)
 
 
@@ -248,6 +250,9 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Int, oth
     share *= 1 + _overhang(surface.vertices, opening, eye, lid, gap.max()) * np.clip(
         2 - folds / EDGE, 0.0, 1.0
     )
+    opposite = surface.distances(stays, 4 * REACH * es)
+    with np.errstate(invalid="ignore"):
+        share *= smooth_step(np.nan_to_num(opposite / (away + opposite), nan=1.0) / OWN_SIDE)
     # walking along edges makes the distances uneven
     pinned = np.zeros(len(surface), dtype=bool)
     pinned[own] = pinned[stays] = True
@@ -259,6 +264,14 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Int, oth
     for _ in range(SMOOTHINGS):
         share[near] = 0.5 * share[near] + 0.5 * (average @ share)
     return without_hem(share, HEM)
+
+
+def _freed(profile: Profile, points: Float64, shifts: Float64, values: Float64) -> Float64:
+    """Shifts (K, N, 3) with what would cut the eyeball brought before it, the more the further on its way."""
+    result = shifts.copy()
+    for k, share in enumerate(smooth_step(np.abs(values) / CLOSED / FREED)):
+        result[k] += profile.lift(points, shifts[k]) * share
+    return result
 
 
 def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:

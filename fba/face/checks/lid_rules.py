@@ -77,16 +77,18 @@ def lid_cut(poser: Poser, side: str, split: float) -> float:
     before = surface.vertices
     after = poser.surface(poser.pose({upper: split, lower: CLOSED - split}))
     moving = np.abs(after - before).max(axis=1) > 1e-6
-    triangles = surface.triangles[moving[surface.triangles].any(axis=1)]
     profile = _Front(poser, side)
+    # a lid's inner side may run into the eyeball where nobody sees it
+    outside = profile.depth(before) < (1 - OUTSIDE) * eye.radius
+    triangles = surface.triangles[
+        moving[surface.triangles].any(axis=1) & outside[surface.triangles].all(axis=1)
+    ]
     deepest = 0.0
     # the middles of edges and triangles dip deeper than their corners
     for shares in ((1, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3)):
         was, now = (np.einsum("fkd,k->fd", place[triangles], shares) for place in (before, after))
-        neutral, depth = profile.depth(was), profile.depth(now)
-        counted = (neutral < (1 - OUTSIDE) * eye.radius) & (now[:, 2] > eye.centre[2])
-        if counted.any():
-            deepest = max(deepest, float((depth - np.maximum(neutral, 0.0))[counted].max()))
+        deeper = profile.depth(now) - np.maximum(profile.depth(was), 0.0)
+        deepest = max(deepest, float(deeper[now[:, 2] > eye.centre[2]].max(initial=0.0)))
     return deepest / eye.radius
 
 

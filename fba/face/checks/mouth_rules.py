@@ -17,7 +17,7 @@ PAIRS = ((4, 5), (8, 10), (9, 11))
 """Inner lip FAPs one above the other."""
 OUTER_PAIRS = ((51, 52), (55, 57), (56, 58))
 TOGETHER = 150.0
-APART = 0.04
+APART = 0.06
 """How much further apart lips that move together may get, as a share of MNS0."""
 OPEN = 400.0
 STILL = 0.03
