@@ -28,6 +28,12 @@ NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
 """Shapes without which the points of the FAPU are not found."""
 FREE = ("7.1", "11.5")
 """Points that stand on no surface."""
+OUTSIDE = 0.2
+"""Skin of the face whose normal goes less than this forward is the inside of the mouth, or an ear."""
+MOST_IN_COLUMN = 3000
+"""So many vertices of one column of the face are compared with each other."""
+PARTED = 0.25
+"""Lips go apart by more than this share of the jaw's way."""
 SMOOTHING = 0.1
 """How little the bending minds single points: some lie at one place on the adult head, apart on another."""
 FEWEST_FAPS = 20
@@ -56,6 +62,8 @@ class _Shapes:
 
     def __init__(self, skin: Piece) -> None:
         self.vertices: Float64 = skin.part.vertices.astype(np.float64)
+        assert skin.part.normals is not None
+        self.normals: Float64 = skin.part.normals.astype(np.float64)
         self.arkit = {shape: skin.morphs[name] for shape, name in canonical(skin.morphs).items()}
         self.by_fap = {fap_of(name): morph for name, morph in skin.morphs.items() if fap_of(name)}
         self.faps = len(self.by_fap)
@@ -174,17 +182,20 @@ def _mouth(
         beside = (vertices[:, 0] - middle[0]) * sign > 0.15 * apart
         front = vertices[:, 2] > middle[2] - 0.6 * apart
         size = np.linalg.norm(shapes[shape], axis=1)
-        place = np.where(level & beside & front, size, -1.0)
-        # of what moves nearly furthest, what is nearest to the line of the lips
-        far = place > 0.9 * place.max()
-        across = np.abs(vertices[:, 1] - vertices[upper, 1]) + 0.2 * np.abs(vertices[:, 0] - middle[0])
-        corner = vertices[int(np.where(far, across, np.inf).argmin())]
-        beyond = (vertices[:, 0] - corner[0]) * sign > 0.015 * apart
-        away = np.linalg.norm(vertices - corner - (0.035 * apart * sign, 0, 0), axis=1)
-        found[inner] = corner
-        found[outer] = vertices[int(np.where(beyond & front, away, np.inf).argmin())]
-        half = _lip_pair(vertices, drop, ahead, float(middle[0] + corner[0]) / 2, apart)
-        if half is not None and np.abs(vertices[list(half), 1] - vertices[upper, 1]).max() < 0.1 * apart:
+        # what moves furthest is the corner of the mouth, or the cheek behind it; only the outside counts
+        off = np.abs(vertices[:, 1] - vertices[upper, 1]) / apart
+        place = level & beside & front & (shapes.normals[:, 2] > OUTSIDE)
+        if not place.any():
+            continue
+        best = np.where(place, size / max(float(size[place].max()), 1e-12) - 2 * off, -np.inf)
+        corner = vertices[int(best.argmax())]
+        within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
+        away = np.linalg.norm(vertices - corner + (0.035 * apart * sign, 0, 0), axis=1)
+        found[outer] = corner
+        found[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
+        line = ahead & (np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.1 * apart)
+        half = _lip_pair(vertices, drop, line, float(middle[0] + found[inner][0]) / 2, apart)
+        if half is not None and np.linalg.norm(vertices[half[0]] - vertices[half[1]]) < 0.08 * apart:
             found[{"2.4": "2.6", "2.5": "2.7"}[inner]] = vertices[half[0]]
             found[{"2.4": "2.8", "2.5": "2.9"}[inner]] = vertices[half[1]]
     return found
@@ -193,19 +204,27 @@ def _mouth(
 def _lip_pair(
     vertices: Float64, drop: Float64, ahead: Bool, x: float, apart: float
 ) -> tuple[int, int] | None:
-    """Upper and lower lip where they touch at some x: what an opening jaw takes along, and what stays."""
-    column = (np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead
-    if not column.any() or not drop[column].max() > 0:
+    """Upper and lower lip at some x: vertices close together that an opening jaw parts the furthest."""
+    column = np.flatnonzero((np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead)
+    if not len(column) or not drop[column].max() > 0:
         return None
-    moved = column & (drop > 0.5 * drop[column].max())
-    still = column & (drop < 0.3 * drop[column].max())
-    if not still.any():
+    if len(column) > MOST_IN_COLUMN:  # a very fine mesh: every so many-th vertex shows as much
+        column = column[:: len(column) // MOST_IN_COLUMN + 1]
+    places, falls = vertices[column], drop[column]
+    between = np.linalg.norm(places[:, None] - places[None], axis=2)
+    differs = falls[None] - falls[:, None]
+    for reach in (0.04, 0.08, 0.16):
+        near = np.where(between < reach * apart, differs, -np.inf)
+        above, below = np.unravel_index(int(near.argmax()), near.shape)
+        if near[above, below] > PARTED * falls.max():
+            break
+    else:
         return None
-    lower = int(np.where(moved, vertices[:, 1], -np.inf).argmax())
-    gap = np.where(still, np.linalg.norm(vertices - vertices[lower], axis=1), np.inf)
-    # the edge of the upper lip is the lowest of what stays near the lower lip
-    close = gap < gap.min() + 0.03 * apart
-    return int(np.where(close, vertices[:, 1], np.inf).argmin()), lower
+    half = (falls[above] + falls[below]) / 2
+    around = between[above] < reach * apart
+    upper = np.where(around & (falls < half), places[:, 1], np.inf)
+    lower = np.where(around & (falls >= half), places[:, 1], -np.inf)
+    return int(column[int(upper.argmin())]), int(column[int(lower.argmax())])
 
 
 def _warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:

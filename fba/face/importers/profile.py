@@ -11,6 +11,7 @@ import numpy.typing as npt
 from fba.face.model import Part
 
 Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
 
 STEPS = 400
 """Heights at which the profile is taken."""
@@ -41,24 +42,26 @@ def profile_points(skin: Part, found: Mapping[str, Float64]) -> dict[str, Float6
     if tip is None:
         return result
     result["9.3"] = place(tip)
-    between = (heights > lip[1] + 0.1 * (heights[tip] - lip[1])) & (np.arange(STEPS) < tip)
-    if between.any():
-        base = int(np.where(between & np.isfinite(front), front, np.inf).argmin())
-        result["9.15"] = place(base)
-        upper = foremost(lip[1], float(heights[base]))
-        if upper is not None:
+    upper = foremost(lip[1], float(lip[1] + 0.5 * (heights[tip] - lip[1])))
+    if upper is not None:
+        # the nose ends where the profile stands furthest behind the line from its tip to the lip
+        along = (heights - heights[upper]) / (heights[tip] - heights[upper])
+        behind = front[upper] + along * (front[tip] - front[upper]) - front
+        between = (np.arange(STEPS) > upper) & (np.arange(STEPS) < tip) & np.isfinite(front)
+        if between.any():
             result["8.1"] = place(upper)
-    chin = foremost(found["2.3"][1] - 0.8 * tall, found["2.3"][1] - 0.25 * tall)
+            result["9.15"] = place(int(np.where(between, behind, -np.inf).argmax()))
+    chin = _hill(front, (heights > found["2.3"][1] - 0.8 * tall) & (heights < found["2.3"][1] - 0.2 * tall))
     if chin is None:
         return result
     result["2.10"] = place(chin)
     dent = (heights > heights[chin]) & (heights < found["2.3"][1] - 0.02 * tall) & np.isfinite(front)
     if dent.any():
-        # the lower lip ends half way from its foremost to the dent above the chin
+        # the lower lip ends on the way from its foremost to the dent above the chin
         low = int(np.where(dent, front, np.inf).argmin())
         lower = foremost(float(heights[low]), float(found["2.3"][1]))
         if lower is not None:
-            result["8.2"] = place((low + lower) // 2)
+            result["8.2"] = place((low + 3 * lower) // 4)
     below = np.flatnonzero(
         np.isfinite(front) & (heights < heights[chin]) & (front > front[chin] - 0.3 * apart)
     )
@@ -91,6 +94,13 @@ def _front(skin: Part, x: float, heights: Float64) -> Float64:
         depth = low[1] + (heights[inside] - low[0]) / rise * (high[1] - low[1])
         result[inside] = np.fmax(result[inside], depth)
     return result
+
+
+def _hill(front: Float64, inside: Bool) -> int | None:
+    """The foremost place of the profile within a stretch from which it falls back on both sides."""
+    around = np.stack([np.roll(front, shift) for shift in (-6, -3, -1, 1, 3, 6)])
+    hills = inside & np.isfinite(front) & (front[None] >= np.nan_to_num(around, nan=-np.inf)).all(axis=0)
+    return int(np.where(hills, front, -np.inf).argmax()) if hills.any() else None
 
 
 def _head(vertices: Float64, pupils: Float64, apart: float) -> dict[str, Float64]:
