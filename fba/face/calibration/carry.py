@@ -11,12 +11,12 @@ import numpy.typing as npt
 from fba.face.calibration.align import known_rows
 from fba.face.calibration.eyes import FittedEye
 from fba.face.calibration.lid_paths import LID_FAPS, slid
+from fba.face.calibration.shape import Shape, similar
 from fba.face.feature_points import row_of
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
 
 if TYPE_CHECKING:
-    from fba.face.calibration.shape import Shape
     from fba.face.fapu import Fapu
     from fba.face.model import FaceModel, Part
 
@@ -51,8 +51,11 @@ def carried_tables(
             matrices = local.get(mesh.part)
             if matrices is not None:
                 moves = np.einsum("vij,vkj->vki", matrices[mesh.vertices], moves)
+            if fap.unit == "AU":  # an angle, so the way is as long as the part is big
+                old, new = model.parts[names[mesh.part]], parts[names[mesh.part]]
+                moves = moves * similar(old.vertices, new.vertices.astype(np.float64)).size
             moved[mesh.part] = moves * (units[0] / units[1] if lid else 1.0)
-        right = _correction(model, table, moved)
+        right = _correction(model, table, moved) if fap.unit != "AU" else None
         meshes = []
         for mesh in table.meshes:
             moves = moved[mesh.part]
