@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +16,13 @@ from fba.face.expressions import Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, row_of
 from fba.face.tables import HEAD, FaceDefTables
+from fba.mesh import Material, joined, mesh_arrays
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
 if TYPE_CHECKING:
     from fba.face.interpolation_table import InterpolationTable
+
+__all__ = ["PART_KINDS", "FaceModel", "Material", "Part", "bind", "point_row"]
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -28,20 +31,8 @@ Int32 = npt.NDArray[np.int32]
 PART_KINDS = ("skin", "eye", "teeth", "tongue", "mouth", "brow", "lash", "hair", "other")
 """What a part is. "mouth" is the inside of the mouth where it is not part of the skin; "eye" a whole
 eyeball, left or right by the side of its centre."""
-NORMAL_TOLERANCE = 1e-4
-"""Lengths of normals within this of 1 are taken as 1."""
 SHARED_POINT = 1e-4
 """A bound feature point may stand this far from its vertex, as a share of the face's height."""
-
-
-@dataclass(frozen=True, slots=True)
-class Material:
-    """How a surface looks. colour: linear light, 0..1. roughness: 0..1. texture: PNG or JPEG bytes, sRGB."""
-
-    name: str = "plain"
-    colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
-    roughness: float = 0.6
-    texture: bytes | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,30 +62,8 @@ class Part:
             raise ModelError(f"{where}: a part needs a name, and {HEAD!r} stands for all of them")
         if self.kind not in PART_KINDS:
             raise ModelError(f"{where}: its kind {self.kind!r} is none of {', '.join(PART_KINDS)}")
-        vertices = _array(self.vertices, (-1, 3), f"{where}: vertices")
-        count = len(vertices)
-        triangles = np.array(self.triangles)
-        if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
-            raise ModelError(f"{where}: triangles must be whole numbers, (F, 3), not {triangles.shape}")
-        if triangles.size and (int(triangles.min()) < 0 or int(triangles.max()) >= count):
-            bad = int(np.argwhere(((triangles < 0) | (triangles >= count)).any(axis=1))[0, 0])
-            raise ModelError(
-                f"{where}: triangle {bad} names vertex {triangles[bad].tolist()}, but there are {count}"
-            )
-        arrays: dict[str, Any] = {"vertices": vertices, "triangles": triangles.astype(np.int32)}
-        from fba.face.normals import vertex_normals
-
-        arrays["normals"] = (
-            vertex_normals(vertices, arrays["triangles"])
-            if self.normals is None
-            else _unit(_array(self.normals, (count, 3), f"{where}: normals"))
-        )
-        if self.texcoords is not None:
-            arrays["texcoords"] = _array(self.texcoords, (count, 2), f"{where}: texture coordinates")
-        if self.colours is not None:
-            arrays["colours"] = _array(self.colours, (count, 4), f"{where}: colours")
+        arrays = mesh_arrays(where, self.vertices, self.triangles, self.normals, self.texcoords, self.colours)
         for name, array in arrays.items():
-            array.flags.writeable = False
             object.__setattr__(self, name, array)
 
 
@@ -168,12 +137,12 @@ class FaceModel:
     @cached_property
     def vertices(self) -> Float32:
         """float32 (V, 3): the neutral face, all parts in order, metres; read-only."""
-        return _joined([part.vertices for part in self.parts])
+        return joined([part.vertices for part in self.parts])
 
     @cached_property
     def normals(self) -> Float32:
         """float32 (V, 3): unit normals of the neutral face; read-only."""
-        return _joined([part.normals for part in self.parts if part.normals is not None])
+        return joined([part.normals for part in self.parts if part.normals is not None])
 
     @cached_property
     def triangles(self) -> Int32:
@@ -294,30 +263,3 @@ def point_row(name: str) -> int:
     if name not in row_of():
         raise ModelError(f"there is no feature point {name!r}")
     return row_of()[name]
-
-
-def _array(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
-    array = np.array(values, dtype=np.float32)
-    if array.ndim != 2 or array.shape[1] != shape[1] or (shape[0] >= 0 and len(array) != shape[0]):
-        wanted = f"({'V' if shape[0] < 0 else shape[0]}, {shape[1]})"
-        raise ModelError(f"{what} must have shape {wanted}, not {array.shape}")
-    if not np.isfinite(array).all():
-        row = int(np.argwhere(~np.isfinite(array))[0, 0])
-        raise ModelError(f"{what}: number {row} is {array[row].tolist()}, which is not finite")
-    return array
-
-
-def _unit(normals: Float32) -> Float32:
-    """The same with length 1; those that have it already stay exactly as they are."""
-    length = np.linalg.norm(normals.astype(np.float64), axis=1)
-    off = np.abs(length - 1.0) > NORMAL_TOLERANCE
-    if off.any():
-        turned = normals[off] / np.maximum(length[off], 1e-30)[:, None]
-        normals[off] = np.where(length[off, None] > 1e-20, turned, (0.0, 0.0, 1.0))
-    return normals
-
-
-def _joined(arrays: list[Float32]) -> Float32:
-    joined = np.concatenate(arrays)
-    joined.flags.writeable = False
-    return joined

@@ -1,0 +1,107 @@
+"""What meshes of faces and bodies have in common: their looks, their normals, and checks of their arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+
+Float32 = npt.NDArray[np.float32]
+Int32 = npt.NDArray[np.int32]
+
+NORMAL_TOLERANCE = 1e-4
+"""Lengths of normals within this of 1 are taken as 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """How a surface looks. colour: linear light, 0..1. roughness: 0..1. texture: PNG or JPEG bytes, sRGB."""
+
+    name: str = "plain"
+    colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    roughness: float = 0.6
+    texture: bytes | None = None
+
+
+def vertex_normals(vertices: npt.NDArray[np.floating], triangles: npt.NDArray[np.integer]) -> Float32:
+    """Unit normals weighted by area: float32 (V, 3); +z where no triangle touches a vertex."""
+    corners = np.asarray(vertices, dtype=np.float64)[triangles]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    summed = np.zeros((len(vertices), 3))
+    for corner in range(3):
+        for axis in range(3):
+            summed[:, axis] += np.bincount(triangles[:, corner], faces[:, axis], minlength=len(vertices))
+    length = np.linalg.norm(summed, axis=1, keepdims=True)
+    unit = np.where(length > 1e-20, summed / np.maximum(length, 1e-20), (0.0, 0.0, 1.0))
+    return unit.astype(np.float32)
+
+
+def mesh_arrays(
+    where: str,
+    vertices: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    normals: npt.ArrayLike | None,
+    texcoords: npt.ArrayLike | None,
+    colours: npt.ArrayLike | None,
+) -> dict[str, Float32 | Int32]:
+    """Checked, read-only copies of a mesh's arrays by name; normals are worked out where there are none.
+
+    where: begins messages. ModelError for other shapes, indices out of range, numbers not finite.
+    """
+    places = float_rows(vertices, (-1, 3), f"{where}: vertices")
+    count = len(places)
+    corners = np.array(triangles)
+    if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
+        raise ModelError(f"{where}: triangles must be whole numbers, (F, 3), not {corners.shape}")
+    if corners.size and (int(corners.min()) < 0 or int(corners.max()) >= count):
+        bad = int(np.argwhere(((corners < 0) | (corners >= count)).any(axis=1))[0, 0])
+        raise ModelError(
+            f"{where}: triangle {bad} names vertex {corners[bad].tolist()}, but there are {count}"
+        )
+    corners = corners.astype(np.int32)
+    arrays: dict[str, Float32 | Int32] = {"vertices": places, "triangles": corners}
+    arrays["normals"] = (
+        vertex_normals(places, corners)
+        if normals is None
+        else unit_rows(float_rows(normals, (count, 3), f"{where}: normals"))
+    )
+    if texcoords is not None:
+        arrays["texcoords"] = float_rows(texcoords, (count, 2), f"{where}: texture coordinates")
+    if colours is not None:
+        arrays["colours"] = float_rows(colours, (count, 4), f"{where}: colours")
+    for array in arrays.values():
+        array.flags.writeable = False
+    return arrays
+
+
+def float_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
+    """A float32 copy of finite numbers; shape: rows, -1 for any number, and columns. Else ModelError."""
+    array = np.array(values, dtype=np.float32)
+    if array.ndim != 2 or array.shape[1] != shape[1] or (shape[0] >= 0 and len(array) != shape[0]):
+        wanted = f"({'V' if shape[0] < 0 else shape[0]}, {shape[1]})"
+        raise ModelError(f"{what} must have shape {wanted}, not {array.shape}")
+    if not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0, 0])
+        raise ModelError(f"{what}: number {row} is {array[row].tolist()}, which is not finite")
+    return array
+
+
+def unit_rows(normals: Float32) -> Float32:
+    """The same with length 1; those that have it already stay exactly as they are."""
+    length = np.linalg.norm(normals.astype(np.float64), axis=1)
+    off = np.abs(length - 1.0) > NORMAL_TOLERANCE
+    if off.any():
+        turned = normals[off] / np.maximum(length[off], 1e-30)[:, None]
+        normals[off] = np.where(length[off, None] > 1e-20, turned, (0.0, 0.0, 1.0))
+    return normals
+
+
+def joined(arrays: Sequence[Float32]) -> Float32:
+    """All rows, one array after the other; read-only."""
+    rows = np.concatenate(arrays)
+    rows.flags.writeable = False
+    return rows
