@@ -11,8 +11,8 @@ in vec3 normal;
 in vec3 local;
 out vec4 pixel;
 
-const float CORNEA = 0.26;    // how far the cornea's centre lies before the eyeball's
-const float DEEP = 0.11;      // the iris lies this far below the cornea's rim
+const float CORNEA = 0.26;    // the centre of the cornea lies this far before that of the eyeball
+const float DEEP = 0.02;      // the iris lies this far below the rim of the cornea
 
 float grain(vec2 at) {
     return fract(sin(dot(at, vec2(12.9898, 78.233))) * 43758.5453);
@@ -45,16 +45,18 @@ void main() {
     float rim = at.z > 0.0 ? length(at.xy) : 2.0;
     float cornea = 1.0 - smoothstep(iris * 0.92, iris * 1.16, rim);
 
-    // Through the cornea the iris is seen where refraction takes the look.
+    // Through the cornea the iris is seen where refraction takes the look; straight on, it and the pupil
+    // have the size that they are said to have.
     vec3 bulge = normalize(at - vec3(0.0, 0.0, CORNEA));
-    vec3 look = -(transpose(ball) * view);
-    vec3 bent = refract(look, mix(at, bulge, 0.7), 1.0 / 1.336);
-    float plane = sqrt(1.0 - iris * iris) - DEEP;
-    vec3 behind = at + bent * ((at.z + 0.05 * cornea - plane) / max(-bent.z, 0.3));
-    float r = mix(rim, length(behind.xy), cornea);
+    vec3 bend = normalize(mix(at, bulge, 0.7));
+    vec3 bent = refract(-(transpose(ball) * view), bend, 1.0 / 1.336);
+    vec3 straight = refract(vec3(0.0, 0.0, -1.0), bend, 1.0 / 1.336);
+    float below = at.z + 0.05 * cornea - sqrt(1.0 - iris * iris) + DEEP;
+    vec2 inside = at.xy + below * (bent.xy / max(-bent.z, 0.3) - straight.xy / max(-straight.z, 0.3));
+    float r = mix(rim, length(inside), cornea);
     float soft = clamp(fwidth(rim) * 1.2, 0.012, 0.2);
 
-    float angle = atan(behind.y, behind.x);
+    float angle = atan(inside.y, inside.x);
     float across = clamp((r - pupil) / max(iris - pupil, 1e-3), 0.0, 1.0);
     vec3 ring = mix(tint * vec3(1.75, 1.25, 0.75) + vec3(0.03, 0.014, 0.0), tint, smoothstep(0.1, 0.55, across));
     ring *= 0.45 + 1.1 * fibres(angle, across);
@@ -68,9 +70,9 @@ void main() {
     base = mix(base, white, smoothstep(edge - soft * 1.5 - 0.05, edge + soft * 1.5 + 0.03, rim));
 
     // Lids shade the eyeball, the upper one most.
-    float below = margin(in_head.x, lids[0]) - in_head.y;
+    float under = margin(in_head.x, lids[0]) - in_head.y;
     float above = in_head.y - margin(in_head.x, lids[1]);
-    float shade = smoothstep(-0.06, 0.40, below);
+    float shade = smoothstep(-0.06, 0.40, under);
     shade = (0.18 + 0.82 * shade) * (0.45 + 0.55 * smoothstep(-0.05, 0.20, above));
     shade *= 1.0 - 0.45 * aside;
     // The iris is lit from the side opposite to the light, as a hollow is.
@@ -89,7 +91,7 @@ void main() {
     float spark = within.x * within.y * step(0.0, dot(mirrored, KEY_DIRECTION));
     float graze = 1.0 - max(dot(wet, view), 0.0);
     float fresnel = 0.03 + 0.6 * graze * graze * graze * graze;
-    float lit = smoothstep(0.02, 0.10, below);
+    float lit = smoothstep(0.02, 0.10, under);
     shown += spark * mix(0.55, 1.7, cornea) * vec3(1.0, 0.97, 0.93) * lit;
     shown += mix(FLOOR, SKY, mirrored.y * 0.5 + 0.5) * fresnel * (0.3 + 0.7 * shade);
     pixel = vec4(encode(shown), 1.0);
