@@ -23,8 +23,9 @@ HINGES = (("shoulder", "elbow"), ("hip", "knee"))
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 LOOSE = 1e-3
 """Weight of a free preference against a bone's direction."""
-STIFF = 0.1
-"""The same for fingers, which are often straight: their knuckles then turn no further than this lets them."""
+STIFF = {"thumb": 0.4, "index": 0.1, "middle": 0.1, "ring": 0.1, "pinky": 0.1}
+"""The same for fingers, which are often straight: their knuckles then turn no further than this lets them.
+Thumbs bend in another plane in every source: a knuckle that turned all the way would stand unnaturally."""
 FOREARM_SHARE = 0.5
 """Of the hand's twist against the forearm, what the forearm takes: radius and ulna turn about each other."""
 CLAVICLE_SHARE = 0.5
@@ -36,7 +37,8 @@ class Retarget:
     """Wanted world rotations of the body's joints, then their BAPs.
 
     wanted: joint -> (T, 3, 3). aims: joint -> the joint at the other end of its bone, where the source has
-    both. scale: metres for one unit of the source. groups: of the spine, 0 for the source's own joints only.
+    both. scale: metres for one unit of the source. groups: of the spine, 0 for none but the source's own
+    joints; with_anchors: for these besides.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class Retarget:
         solver: BapSolver,
         scale: float | None,
         groups: int,
+        with_anchors: bool,
     ) -> None:
         self.solver, self.motion, self.mapped = solver, motion, mapped
         self.skeleton = solver.skeleton
@@ -63,7 +66,7 @@ class Retarget:
         anchors = [joint for joint in spine.joints(self.skeleton) if joint in mapped]
         if groups and len(anchors) > 1:
             at = {joint: self.places[:, mapped[joint]] for joint in anchors}
-            spine.spread(self.skeleton, self.wanted, at, anchors, groups)
+            spine.spread(self.skeleton, self.wanted, at, anchors, groups, with_anchors)
         for side in "lr":
             self._clavicle(side)
             self._forearm(side)
@@ -216,7 +219,7 @@ class Retarget:
             targets.append(aiming.Target(pieces, _in(above, self._direction(joint))))
         turned = np.array(axes)
         start = np.concatenate(starts, axis=1)
-        angles = aiming.aim_all(turned, start, targets, np.full(len(turned), STIFF))
+        angles = aiming.aim_all(turned, start, targets, np.full(len(turned), STIFF[finger[2:]]))
         used = 0
         frame = above
         for joint, own_angles in zip(joints, starts, strict=True):

@@ -19,10 +19,15 @@ from fba.parameters import BAP_COUNT, baps
 
 ORIGINS = ("source", "start", "middle")
 GROUNDS = ("floor", "source", "none")
-SPINES = {"joints": 0, "simple": 1, "full": spines.GROUPS}
+SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spines.GROUPS}
 MOST_FRAMES = 500_000
 """More than an hour at 120 frames/s; every frame needs some 20 kB while it is worked on."""
-LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+LIMBS = tuple(
+    tuple(f"{side}_{joint}" for joint in chain)
+    for side in "lr"
+    for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+)
+"""Of a limb that the source has at all, it should have all joints."""
 
 
 def from_skeleton(
@@ -33,7 +38,7 @@ def from_skeleton(
     scale: float | None = None,
     origin: str = "source",
     ground: str = "floor",
-    spine: str | int = "full",
+    spine: str | int = "spread",
     solver: BapSolver | None = None,
 ) -> Animation:
     """BAPs of a captured motion: a body track whose mask holds the BAPs of the joints that were found.
@@ -45,10 +50,11 @@ def from_skeleton(
     "start", the first frame; "middle", the middle of the path, which keeps long walks within what a stream
     can carry. ground: the height of the feet is corrected for the body's own proportions such that they stand
     where the source's stand: "floor", on the ground, height 0, whatever the height of the source's ground;
-    "source", at the source's own height; "none", uncorrected. spine: "full" spreads the spine's rotations
-    over all vertebrae, "simple" over those of group Spine1, 2 to 4 over the groups Spine1 up to that;
-    "joints" turns one vertebra for each joint of the source. solver: skeleton and axes; the default body
-    where None.
+    "source", at the source's own height; "none", uncorrected. spine: "spread" shares the spine's rotations
+    out over the vertebrae of groups Spine1 and Spine2 and those that the source's joints are, "full" over
+    all; both keep the source's bones exactly. "simple" turns the four of group Spine1 only, a number the
+    groups Spine1 up to that: these keep the head, and the rest as closely as they can. "joints" turns one
+    vertebra for each joint of the source. solver: skeleton and axes; the default body where None.
 
     Bones point where the source's bones point; the spine's parts turn the vertebrae that carry them;
     where the source turns about an axis that a joint lacks, the joint before or after it turns instead.
@@ -56,7 +62,7 @@ def from_skeleton(
     clamped to the standard's ranges.
 
     Raises ModelError where no family of names fits, the skeleton has no size or there are more than 500,000
-    frames, ValueError for a bad option or joint name. Warns (FbaWarning) of limbs that the source lacks: they
+    frames, ValueError for a bad option or joint name. Warns (FbaWarning) of joints that a limb lacks: they
     stay in the default posture. `fba.capture.retarget_report` says how close the result comes.
     """
     solver = solver if solver is not None else BapSolver()
@@ -79,9 +85,7 @@ def from_skeleton(
     if not isinstance(groups, int) or not 0 <= groups <= spines.GROUPS:
         raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {spine!r}")
     lacking = [
-        joint
-        for joint in (f"{side}_{limb}" for side in "lr" for limb in LIMBS)
-        if joint not in mapped and joint in solver.skeleton
+        joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
     ]
     if lacking:
         warnings.warn(
@@ -89,7 +93,7 @@ def from_skeleton(
             FbaWarning,
             stacklevel=2,
         )
-    retarget = Retarget(motion, mapped, solver, scale, groups)
+    retarget = Retarget(motion, mapped, solver, scale, groups, spine in ("spread", "joints"))
     values = retarget.values(origin, ground)
     moved = np.zeros(BAP_COUNT, dtype=bool)
     turned = {*retarget.wanted, solver.skeleton.names[0]}

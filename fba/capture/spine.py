@@ -45,13 +45,19 @@ def turning(skeleton: Skeleton, groups: int) -> list[str]:
 
 
 def spread(
-    skeleton: Skeleton, wanted: dict[str, Float], places: dict[str, Float], anchors: list[str], groups: int
+    skeleton: Skeleton,
+    wanted: dict[str, Float],
+    places: dict[str, Float],
+    anchors: list[str],
+    groups: int,
+    with_anchors: bool,
 ) -> None:
     """Replaces the rotations of anchors in wanted by those of all vertebrae that turn.
 
-    anchors: joints of the spine that the source has, root first and upwards, two at least. wanted: joint
-    -> (T, 3, 3), rotations of the bones above them; the last one's is its own. places: anchor -> (T, 3), the
-    source's places of the anchors.
+    anchors: joints of the spine that the source has, root first and upwards, two at least. wanted: joint ->
+    (T, 3, 3), rotations of the bones above them; the last one's is its own. places: anchor -> (T, 3), the
+    source's places of the anchors. groups: of the standard. with_anchors: the anchors turn besides the
+    groups.
     """
     chain = joints(skeleton)
     first, last = chain.index(anchors[0]), chain.index(anchors[-1])
@@ -74,10 +80,11 @@ def spread(
         result: Float = places[anchors[upper - 1]] * (1 - share) + places[anchors[upper]] * share
         return result
 
-    free = [joint for joint in turning(skeleton, groups) if first < chain.index(joint) <= last]
+    turn_too = {*turning(skeleton, groups), *(anchors if with_anchors else ())}
+    free = [joint for joint in chain[first + 1 : last + 1] if joint in turn_too]
     if not free:
         return
-    pinned = anchors if groups >= GROUPS else [anchors[0], *free]
+    pinned = anchors if groups >= GROUPS or with_anchors else [anchors[0], *free]
     if pinned[-1] != anchors[-1]:
         pinned = [*pinned, anchors[-1]]
     head = wanted[anchors[-1]]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
 import click
 
 from fba.animation import Animation
-from fba.cli import options
+from fba.cli import capture_report, options
 from fba.errors import FbaWarning, FormatError
 
 
@@ -19,6 +20,7 @@ from fba.errors import FbaWarning, FormatError
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
         "fba encode talk.fap -o talk.fba --epf talk.epf",
+        "fba encode walk.bvh -o walk.fba --bap-steps visage --report --limits report",
     )
 )
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=options.EXISTING)
@@ -64,6 +66,35 @@ from fba.errors import FbaWarning, FormatError
 @click.option(
     "--epf", type=options.EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says."
 )
+@click.option(
+    "--spine",
+    type=click.Choice(["spread", "full", "simple", "joints"]),
+    default="spread",
+    show_default=True,
+    help="Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
+)
+@click.option(
+    "--ground",
+    type=click.Choice(["floor", "source", "none"]),
+    default="floor",
+    show_default=True,
+    help="Motion capture: feet stand at height 0, at the height of the source's ground, or uncorrected.",
+)
+@click.option(
+    "--origin",
+    type=click.Choice(["source", "start", "middle"]),
+    default="source",
+    show_default=True,
+    help="Motion capture: what stands at the default place.",
+)
+@click.option(
+    "--limits",
+    type=click.Choice(["off", "report", "clamp"]),
+    default="off",
+    show_default=True,
+    help="Say where joints go beyond normal human motion, or hold them within it.",
+)
+@click.option("--report", is_flag=True, help="Motion capture: how close each bone comes to the source's.")
 @options.salvage_option
 @options.json_option
 def command(
@@ -81,6 +112,11 @@ def command(
     gender: str,
     clamp: bool | None,
     epf: Path | None,
+    spine: str,
+    ground: str,
+    origin: str,
+    limits: str,
+    report: bool,
     salvage: bool,
     as_json: bool,
 ) -> None:
@@ -92,7 +128,13 @@ def command(
     from fba.codec import EncoderOptions, encode_planes, encode_with_statistics
 
     with options.progress("reading", len(inputs)) as step:
-        animation = _joined(inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step)
+        animation = _joined(
+            inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step,
+            capture={"spine": spine, "ground": ground, "origin": origin},
+        )  # fmt: skip
+    animation, said = capture_report.limited(animation, limits)
+    if report:
+        said = capture_report.compared([path for path in inputs if _captured(path)], animation) | said
     if clamp is None:
         clamp = any(_captured(path) for path in inputs)
         if clamp and bap_steps == "iso" and bap_quant > 0:
@@ -137,6 +179,7 @@ def command(
                 "duration": float(animation.duration),
                 "bits_per_second": round(rate, 3),
                 "clamped": clamped,
+                **said,
             }
         )
         return
@@ -148,6 +191,8 @@ def command(
     if clamped:
         text += f"; {clamped} values clamped"
     click.echo(text, err=str(output) == "-")
+    for line in capture_report.lines(said):
+        click.echo(line, err=str(output) == "-")
 
 
 def _captured(path: Path) -> bool:
@@ -164,13 +209,16 @@ def _joined(
     bap_steps: str,
     salvage: bool,
     step: options.Progress,
+    capture: Mapping[str, object],
 ) -> Animation:
     """Face and body of all inputs as one animation."""
     from fba.formats import merge
 
     result: Animation | None = None
     for path in inputs:
-        animation = options.read_input(path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage)
+        animation = options.read_input(
+            path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture
+        )
         step(1)
         if not len(animation):
             raise FormatError("the file holds no frames; there is nothing to encode", path=path)

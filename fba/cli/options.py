@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
@@ -94,9 +94,9 @@ def read_model(path: Path | None) -> FaceModel | None:
     """The face of `--model`, or None for the built-in one."""
     if path is None:
         return None
-    from fba.face.model import FaceModel
+    from fba.face.importers import import_model
 
-    return FaceModel.load(path)
+    return import_model(path)
 
 
 def camera_option(command: Command) -> Command:
@@ -168,14 +168,17 @@ def read_input(
     header_fps: Fraction | None = None,
     name: str | None = None,
     salvage: bool = False,
+    capture: Mapping[str, object] | None = None,
 ) -> Animation:
     """Read a file of any format.
 
-    fps resamples what was read; it, or header_fps, and name stand in for a header that a file lacks.
+    fps resamples what was read, motion capture while it still turns by rotations; it, or header_fps, and name
+    stand in for a header that a file lacks. capture: options for the readers of motion capture.
     """
     from fba.formats import format_of, read
 
-    wanted = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name, "salvage": salvage or None}
+    wanted: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
+    wanted |= {"salvage": salvage or None, "rate": fps, **(capture or {})}
     with input_file(path) as file:
         found = format_of(file)
         taken = {

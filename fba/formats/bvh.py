@@ -53,7 +53,7 @@ def read(
     scale: float | None = None,
     origin: str = "source",
     ground: str = "floor",
-    spine: str | int = "full",
+    spine: str | int = "spread",
 ) -> Animation:
     """A BVH file as BAPs (see `fba.capture.from_skeleton` for the options).
 

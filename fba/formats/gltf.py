@@ -43,7 +43,7 @@ def read(
     scale: float | None = None,
     origin: str = "source",
     ground: str = "floor",
-    spine: str | int = "full",
+    spine: str | int = "spread",
     clip: str | int | None = None,
 ) -> Animation:
     """A glTF skeleton's animation as BAPs (see `fba.capture.from_skeleton`, and `read_motion` for clip).
@@ -113,8 +113,8 @@ def motion_of(
     kept = _below(parents, _root([gltf.nodes[node].name for node in nodes]))
     local_turns = turned[:, kept]
     for place, number in enumerate(kept[1:], 1):
-        above = turned[:, parents[number]] * [1, -1, -1, -1]
-        local_turns[:, place] = rotations.multiply(above, turned[:, number])
+        back = turned[:, parents[number]] * [1, -1, -1, -1]
+        local_turns[:, place] = rotations.multiply(back, turned[:, number])
     motion = SkeletonMotion(
         names=tuple(gltf.nodes[nodes[number]].name for number in kept),
         parents=np.array([kept.index(parents[n]) if place else -1 for place, n in enumerate(kept)]),

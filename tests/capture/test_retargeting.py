@@ -50,7 +50,7 @@ def test_spine_bends_in_all_vertebrae() -> None:
         "Spine": Rotation.from_euler("x", [24], degrees=True),
         "Spine1": Rotation.from_euler("x", 24, degrees=True),
     }
-    upright, bowed = (from_skeleton(motion("standing", turns=t)) for t in ({}, bow))
+    upright, bowed = (from_skeleton(motion("standing", turns=t), spine="full") for t in ({}, bow))
     assert sent(bowed) >= set(SPINE)
     tilts = np.array([value(bowed, f"{j}_tilt")[0] - value(upright, f"{j}_tilt")[0] for j in SPINE]) * 1e-5
     assert np.degrees(tilts.sum()) + np.degrees(value(bowed, "HumanoidRoot_rt_body_tilt")[0] * -1e-5) < -24

@@ -239,6 +239,7 @@ def changed(tmp_path: Path, change: Any) -> Path:
     return path
 
 
+@pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_files_without_a_body(tmp_path: Path) -> None:
     def no_animation(document: dict[str, Any]) -> None:
         document.pop("animations")
@@ -264,8 +265,7 @@ def test_files_without_a_body(tmp_path: Path) -> None:
         (circle, "child"),
         (flat, "scale|coincide"),
     ):
-        with warnings.catch_warnings(), pytest.raises((FormatError, ModelError), match=text):
-            warnings.simplefilter("ignore", FbaWarning)
+        with pytest.raises((FormatError, ModelError), match=text):
             fba.read(changed(tmp_path, change))
 
 

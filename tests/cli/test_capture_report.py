@@ -1,0 +1,113 @@
+"""`fba encode` of motion capture: options, report, limits."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba.body import Limits
+from fba.parameters import baps
+
+BVH = """HIERARCHY
+ROOT Hips
+{ OFFSET 0 95 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Spine { OFFSET 0 10 0 CHANNELS 3 Zrotation Xrotation Yrotation
+    JOINT Neck { OFFSET 0 40 0 CHANNELS 3 Zrotation Xrotation Yrotation
+      JOINT Head { OFFSET 0 10 0 CHANNELS 3 Zrotation Xrotation Yrotation End Site { OFFSET 0 15 0 } } } }
+  JOINT LeftUpLeg { OFFSET 10 -5 0 CHANNELS 3 Zrotation Xrotation Yrotation
+    JOINT LeftLeg { OFFSET 0 -45 0 CHANNELS 3 Zrotation Xrotation Yrotation
+      JOINT LeftFoot { OFFSET 0 -40 0 CHANNELS 3 Zrotation Xrotation Yrotation
+        End Site { OFFSET 0 -5 12 } } } }
+  JOINT RightUpLeg { OFFSET -10 -5 0 CHANNELS 3 Zrotation Xrotation Yrotation
+    JOINT RightLeg { OFFSET 0 -45 0 CHANNELS 3 Zrotation Xrotation Yrotation
+      JOINT RightFoot { OFFSET 0 -40 0 CHANNELS 3 Zrotation Xrotation Yrotation
+        End Site { OFFSET 0 -5 12 } } } }
+}
+MOTION
+Frames: 3
+Frame Time: 0.033333
+"""
+
+
+def bvh(tmp_path: Path) -> Path:
+    """Legs and a spine; in the last frame, the left thigh is raised by 150 degrees."""
+    rows = np.zeros((3, 33))
+    rows[:, 1] = 95
+    rows[:, 16] = [0, -60, -150]  # X of LeftUpLeg
+    path = tmp_path / "kick.bvh"
+    path.write_text(BVH + "\n".join(" ".join(f"{n:g}" for n in row) for row in rows) + "\n")
+    return path
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fba", "encode", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_report_and_limits_as_text(tmp_path: Path) -> None:
+    result = run(
+        bvh(tmp_path), "-o", tmp_path / "out.fba", "--bap-steps", "visage", "--report", "--limits", "report"
+    )
+    assert result.returncode == 0, result.stderr
+    assert "l_hip - l_knee" in result.stdout
+    assert "feet on the ground" in result.stdout
+    assert "joints that the source lacks:" in result.stdout
+    assert "left thigh flexion: beyond -20..120 degrees in 1 frames" in result.stdout
+
+
+def test_report_as_json(tmp_path: Path) -> None:
+    result = run(bvh(tmp_path), "-o", tmp_path / "out.fba", "--json", "--report", "--limits", "report")
+    said = json.loads(result.stdout)
+    (capture,) = said["captures"]
+    assert capture["family"] == "collar"
+    assert {bone["joint"] for bone in capture["bones"]} >= {"l_hip", "l_knee", "r_knee", "vc7"}
+    assert all(bone["mean"] < 1 and bone["worst"] < 5 for bone in capture["bones"])
+    thigh = next(limit for limit in said["limits"] if limit["limit"] == "left thigh flexion")
+    assert thigh["frames"] == 1
+    assert thigh["first"] == 2
+    assert thigh["worst"] == pytest.approx(30, abs=4)
+    assert not said["limits_clamped"]
+
+
+def test_limits_clamp(tmp_path: Path) -> None:
+    out = tmp_path / "out.fba"
+    path = bvh(tmp_path)
+    for limits, beyond in (("off", True), ("clamp", False)):
+        result = run(path, "-o", out, "--bap-steps", "visage", "--bap-quant", "1", "--limits", limits)
+        assert result.returncode == 0, result.stderr
+        body = fba.decode(out.read_bytes(), bap_steps="visage").body
+        assert body is not None
+        excess = {e.limit.name: e.worst for e in Limits.human().check(body.values)}
+        assert (excess.get("left thigh flexion", 0) > 1) == beyond  # one step of the quantiser is 0.1 degrees
+
+
+def test_spine_of_the_stream(tmp_path: Path) -> None:
+    path = bvh(tmp_path)
+    counts = {}
+    for spine in ("spread", "full", "simple", "joints"):
+        out = tmp_path / f"{spine}.fba"
+        assert (
+            run(path, "-o", out, "--spine", spine, "--ground", "source", "--origin", "start").returncode == 0
+        )
+        body = fba.decode(out.read_bytes()).body
+        assert body is not None
+        sent = {baps()[column].joint for column in np.flatnonzero(body.mask[0])}
+        counts[spine] = sum(joint.startswith(("vl", "vt", "vc", "skull")) for joint in sent)
+    assert counts == {"spread": 10, "full": 25, "simple": 4, "joints": 3}
+
+
+def test_fps_resamples_by_rotation(tmp_path: Path) -> None:
+    """Half way between -60 and -150 degrees is -105, whatever the BAPs in between are."""
+    out = tmp_path / "out.fba"
+    assert run(bvh(tmp_path), "-o", out, "--bap-steps", "visage", "--fps", "60").returncode == 0
+    body = fba.decode(out.read_bytes(), bap_steps="visage").body
+    assert body is not None
+    flexion = next(b.number - 1 for b in baps() if b.name == "l_hip_flexion")
+    assert len(body.values) == 5
+    assert np.degrees(body.values[3, flexion] * 1e-5) == pytest.approx(105, abs=4)
