@@ -19,8 +19,9 @@ from fba.face.feature_points import names, row_of
 from fba.face.gltf.extension import NAME, VERSION
 from fba.face.gltf.tables import read_tables
 from fba.face.interpolation_table import InterpolationTable
-from fba.face.model import PART_KINDS, FaceModel, Float32, Float64, Int32, Material, Part
+from fba.face.model import PART_KINDS, FaceModel, Float32, Float64, Int32, Part
 from fba.gltf.document import Document
+from fba.gltf.looks import material_of
 from fba.gltf.reader import read_document
 from fba.gltf.scene import Gltf
 from fba.gltf.values import Budget, Value, optional
@@ -108,17 +109,8 @@ def _part(entry: Value, where: Value, gltf: Gltf, number: int, budget: Budget) -
             normals=primitive.normals,
             texcoords=primitive.texcoords[0] if primitive.texcoords else None,
             colours=primitive.colours,
-            material=_material(entry, gltf, primitive.material),
+            material=material_of(entry, gltf, primitive.material),
         )
-
-
-def _material(entry: Value, gltf: Gltf, index: int | None) -> Material:
-    given = entry.get("colour")
-    if index is None:
-        return Material()
-    shown = gltf.materials[index]
-    red, green, blue = shown.colour[:3] if given is None else given.numbers(3, 0.0, 1.0)
-    return Material(shown.name, (red, green, blue), shown.roughness, shown.texture)
 
 
 def _points(content: Value, parts: tuple[Part, ...]) -> tuple[Float64, Int32]:
