@@ -17,6 +17,7 @@ from fba.face.calibration import UNITS, fit, points_of_distances
 from fba.face.calibration.align import align
 from fba.face.calibration.carry import stretches
 from fba.face.calibration.folds import turned_over
+from fba.face.checks.findings import Finding
 from fba.face.eyeball import eyeballs
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names, row_of
@@ -245,13 +246,22 @@ def test_an_open_mouth_is_shut(small: FaceModel, gap: float) -> None:
 
 
 def test_two_points_on_one_spot(small: FaceModel) -> None:
-    """As in a file where somebody forgot to change a copied line: 10.10 where 10.9 is."""
+    """As in a file where somebody forgot to change a copied line: 4.3 where 4.1 is."""
     given = person(small, 10)
-    given[ROW["10.10"]] = given[ROW["10.9"]]
-    with pytest.warns(FbaWarning, match=r"10\.10 is left out"):
+    given[ROW["4.3"]] = given[ROW["4.1"]]
+    with pytest.warns(FbaWarning, match=r"4\.3 is left out"):
         fitted = fit(small, given)
-    mirror = fitted.points[ROW["10.9"]] * (-1, 1, 1)
-    np.testing.assert_allclose(fitted.points[ROW["10.10"]], mirror, atol=1e-6)
+    mirror = fitted.points[ROW["4.4"]] * (-1, 1, 1)
+    np.testing.assert_allclose(fitted.points[ROW["4.3"]], mirror, atol=1e-6)
+
+
+def test_corners_that_changed_places(small: FaceModel) -> None:
+    given = person(small, 19)
+    wanted = centred(given, small)
+    given[[ROW["3.8"], ROW["3.12"]]] = given[[ROW["3.12"], ROW["3.8"]]]
+    with pytest.warns(FbaWarning, match=r"3\.8 and 3\.12 have changed places"):
+        fitted = fit(small, given @ np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]) * 1000)
+    np.testing.assert_allclose(fitted.points[SOFT], wanted[SOFT], atol=1e-6)
 
 
 def test_one_point_far_away(small: FaceModel) -> None:
@@ -443,3 +453,28 @@ def test_names_and_notes_are_kept(small: FaceModel) -> None:
     assert "84 feature points" in fitted.notes["fitted"]
     assert fit(noted, small.points, name="Ada").name == "Ada"
     assert len(names()) == 84
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("who", ["alice", "broad", "narrow", "long"])
+def test_every_faps_of_a_fitted_head_keeps_the_standard(
+    head: FaceModel, request: pytest.FixtureRequest, who: str
+) -> None:
+    """Of alice.fdp, and of people two standard deviations off the mean in face width or height."""
+    from fba.face.checks import check_faps, check_neutral
+    from fba.face.importers.fdp import load_fdp
+
+    if who == "alice":
+        alice = request.getfixturevalue("shared") / "data/xface/alice.fdp"
+        given = points_of_distances(head, load_fdp(alice).distances)
+    else:
+        # Norms of adults: width 137 mm, sd 4.3; nasion to chin 121 mm, sd 6.0 (means of men and women).
+        width, height = {"broad": (2, 0), "narrow": (-2, 0), "long": (0, 2)}[who]
+        given = head.points * (1 + width * 4.3 / 137, 1 + height * 6.0 / 121, 1.0) * 1000
+    fitted = fit(head, given)
+
+    def errors(findings: list[Finding]) -> list[str]:
+        return [str(finding) for finding in findings if finding.severity == "error"]
+
+    assert errors(check_neutral(fitted)) == []
+    assert len(errors(check_faps(fitted))) <= len(errors(check_faps(head))), errors(check_faps(fitted))

@@ -67,7 +67,7 @@ def fit(
             FbaWarning,
             stacklevel=2,
         )
-    kept = without_mistakes(aligned.points, aligned.expected)
+    kept = without_mistakes(_on_their_sides(aligned.points), aligned.expected)
     full, added = mirrored(kept)
     full, unsure = between_lids(shut(full, aligned.expected))
     targets = centred(full, model.points)
@@ -136,6 +136,17 @@ def _checked(points: npt.ArrayLike) -> Float64:
         row = int(np.flatnonzero(half | wild)[0])
         raise ModelError(f"feature point {names()[row]} at {given[row].tolist()} has no usable position")
     return given
+
+
+def _on_their_sides(points: Float64) -> Float64:
+    from fba.face.importers.fdp import sides
+
+    right, swaps, wrong = sides(points)
+    changed = [f"{a} and {b} have changed places" for a, b in swaps]
+    changed += [f"{one} is on the other side" for one in wrong]
+    if changed:
+        warnings.warn(f"put right: {'; '.join(changed)}", FbaWarning, stacklevel=3)
+    return right
 
 
 def _size(here: Float64, there: Float64) -> float:

@@ -153,13 +153,20 @@ def on_their_sides(points: Float64, path: str, *, stacklevel: int = 2) -> Float6
 
 
 def sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[str]]:
-    """Points (84, 3) on their sides of the face; the pairs that had changed places, and those mirrored."""
+    """Points (84, 3) on their sides of the face; the pairs that had changed places, and those mirrored.
+
+    As they are where most pairs have no left and right in x: then the axes are others than the standard's.
+    """
     points = points.copy()
     row = row_of()
     midline = points[[row[name] for name in ("2.1", "2.2", "2.3", "2.10", "8.1", "8.2", "9.3", "9.15")], 0]
     middle = float(np.nanmedian(midline)) if np.isfinite(midline).any() else 0.0
     swaps: list[tuple[str, str]] = []
     mirrored: list[str] = []
+    pairs = points[[(row[left], row[right]) for left, right in MIRRORED.items()], 0] - middle
+    apart = np.sign(pairs[:, 0]) * np.sign(pairs[:, 1])
+    if (apart == -1).sum() < (apart >= 0).sum():
+        return points, swaps, mirrored
 
     def swap(a: str, b: str) -> None:
         points[[row[a], row[b]]] = points[[row[b], row[a]]]
