@@ -11,6 +11,7 @@ import numpy.typing as npt
 from fba.errors import ModelError
 from fba.face.authoring.binding import SURFACE_KINDS, Binding, bind_points, face_size, part_lips
 from fba.face.authoring.carry import LARGEST, NEAR, Anchors
+from fba.face.authoring.ears import ear_motions
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.eyes import Eye, eye_transforms, eyes, pupil_motions
 from fba.face.authoring.jaw import CHIN, Jaw, jaw, opening, share_of_part, turned
@@ -147,7 +148,8 @@ class _Authoring:
 
     def run(self) -> None:
         self._jaw()
-        for motions, lost in (lip_motions(self.marks, self.limiter), spot_motions(self.marks, self.limiter)):
+        for make in (lip_motions, spot_motions, ear_motions):
+            motions, lost = make(self.marks, self.limiter)
             for fap, motion in motions.items():
                 self._surface(fap, motion)
             self.lost |= lost

@@ -19,7 +19,7 @@ from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion, limits
 from fba.face.authoring.relax import relaxed
 from fba.face.authoring.saturation import guarded
-from fba.face.authoring.weights import smooth_step, without_hem
+from fba.face.authoring.weights import smooth_step, smoothed, without_hem
 from fba.face.model import Part
 
 Float64 = npt.NDArray[np.float64]
@@ -258,11 +258,7 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Int, oth
     pinned[own] = pinned[stays] = True
     share[own] = 1.0
     share[stays] = 0.0
-    near = np.flatnonzero((share > 0) & ~pinned)
-    average = surface.graph[near].astype(bool).astype(np.float64)
-    average = average.multiply(1 / np.maximum(average.sum(axis=1), 1)[:, None]).tocsr()
-    for _ in range(SMOOTHINGS):
-        share[near] = 0.5 * share[near] + 0.5 * (average @ share)
+    share = np.where(pinned, share, smoothed(surface, share, SMOOTHINGS))
     return without_hem(share, HEM)
 
 

@@ -17,7 +17,7 @@ from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion, limits
 from fba.face.authoring.relax import eased_field
-from fba.face.authoring.saturation import goals, guarded, held_back, knots, linear, values_between
+from fba.face.authoring.saturation import caps, goals, guarded, held_back, knots, linear, values_between
 from fba.face.authoring.weights import region, smooth_step, spread, without_hem
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
@@ -78,7 +78,6 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
         mate = faps()[number - 1].lip_mate
         if number in lost or number in found:
             continue
-        low, high = limits(number)
         whole = _direction(marks, number)[None] * _whole(lips, number)[:, None]
         if number in PUSH:
             share = lips.inward + OUTER_PUSH * (1 - lips.inward)
@@ -89,7 +88,7 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
         elif number < mate:
             whole = eased_field(marks.surface, limiter, whole, goals(number), marks.on(*LINES))
             inward = lips.inward[:, None]
-            pair = _coupled(limiter, whole * inward, whole * (1 - inward), low, high)
+            pair = _coupled(limiter, whole * inward, whole * (1 - inward), number)
             found[number], found[mate] = pair
     return found, lost
 
@@ -169,23 +168,22 @@ def _linear(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Mot
     return linear(marks.surface, limiter, vertices, field[vertices], fap, marks.on(*LINES))
 
 
-def _coupled(
-    limiter: Limiter, inner: Float64, outer: Float64, low: float, high: float
-) -> tuple[Motion, Motion]:
+def _coupled(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:
     """Motions of an inner and an outer FAP whose sum stays straight although each alone has its limit.
 
     Where one contour has come as close to the other as the skin between them can take, it stops, and
     from there on the other one, moving away, takes it along.
     """
+    low, high = limits(fap)
     vertices = np.flatnonzero((np.abs(inner) + np.abs(outer)).max(axis=1) > 0)
     triangles = limiter.touched(vertices)
     most = {}
-    for sign, end in ((-1.0, low), (1.0, high)):
+    for sign, end, cap in zip((-1.0, 1.0), (low, high), caps(fap), strict=True):
         reach = [
             float(limiter.reach(sign * f, triangles).min(initial=np.inf))
             for f in (inner, outer, inner + outer)
         ]
-        together = np.inf if 0.98 * reach[2] >= abs(end) else max(reach[2], 1.0)
+        together = min(cap, np.inf if 0.98 * reach[2] >= abs(end) else max(reach[2], 1.0))
         apart = min(reach[0], reach[1])
         most[sign] = (together, np.inf if 0.98 * apart >= abs(end) else max(apart, 1.0), reach[0] <= reach[1])
     bends = []

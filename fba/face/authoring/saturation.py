@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+from functools import cache
+from importlib.resources import files
+
 import numpy as np
 import numpy.typing as npt
 
@@ -42,6 +46,21 @@ def values_between(low: float, high: float, *bends: float) -> Float64:
     return np.array(sorted({round(low), round(high)} | inner), dtype=np.float64)
 
 
+@cache
+def _caps() -> dict[int, tuple[float, float]]:
+    with (files(__package__) / "caps.csv").open(encoding="utf-8") as file:
+        return {
+            int(fap): (float(row["low"]), float(row["high"]))
+            for row in csv.DictReader(file)
+            for fap in row["faps"].split()
+        }
+
+
+def caps(fap: int) -> tuple[float, float]:
+    """How far down and up a FAP goes at most, as values: what a face can do, with some to spare."""
+    return _caps().get(fap, (np.inf, np.inf))
+
+
 def linear(
     surface: Surface, limiter: Limiter, vertices: Int, field: Float64, fap: int, pinned: Bool
 ) -> Motion:
@@ -49,12 +68,11 @@ def linear(
 
     pinned: (N,) vertices that go exactly so; around others what folds too early is eased.
     """
-    low, high = limits(fap)
     whole = np.zeros((len(limiter), 3))
     whole[vertices] = field
     whole = eased_field(surface, limiter, whole, goals(fap), pinned)
     vertices = np.flatnonzero(whole.any(axis=1))
-    return straight(limiter, vertices, whole[vertices], low, high)
+    return straight(limiter, vertices, whole[vertices], *limits(fap), caps(fap))
 
 
 def goals(fap: int) -> list[float]:
@@ -62,15 +80,25 @@ def goals(fap: int) -> list[float]:
     return [float(np.sign(end)) * min(MODERATE / EASE[0], abs(end)) for end in limits(fap) if abs(end) > 1]
 
 
-def straight(limiter: Limiter, vertices: Int, field: Float64, low: float, high: float) -> Motion:
-    """The same without easing."""
+def straight(
+    limiter: Limiter,
+    vertices: Int,
+    field: Float64,
+    low: float,
+    high: float,
+    most: tuple[float, float] = (np.inf, np.inf),
+) -> Motion:
+    """The same without easing, between two values. most: how far down and up it goes in any case."""
     whole = np.zeros((len(limiter), 3))
     whole[vertices] = field
     triangles = limiter.touched(vertices)
-    most = [_most(limiter, whole * sign, triangles, abs(end)) for sign, end in ((-1, low), (1, high))]
-    bends = [-bend for bend in knots(most[0], -low)] + knots(most[1], high)
+    stops = [
+        min(cap, _most(limiter, whole * sign, triangles, abs(end)))
+        for sign, end, cap in zip((-1, 1), (low, high), most, strict=True)
+    ]
+    bends = [-bend for bend in knots(stops[0], -low)] + knots(stops[1], high)
     values = values_between(low, high, *bends)
-    held = np.array([held_back(value, most[int(value > 0)]) for value in values])
+    held = np.array([held_back(value, stops[int(value > 0)]) for value in values])
     return guarded(limiter, Motion(values, vertices, held[:, None, None] * field))
 
 

@@ -1,4 +1,4 @@
-"""Brows, cheeks, chin, nose and ears: FAPs whose feature points pull at the skin around them.
+"""Brows, cheeks, chin and nose: FAPs whose feature points pull at the skin around them.
 
 Which points share a region, what bounds it and what a FAP takes along is in `regions.csv` and
 `handles.csv`; the right side mirrors the left.
@@ -18,7 +18,7 @@ from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion
 from fba.face.authoring.saturation import linear
-from fba.face.authoring.weights import region, spread, without_hem
+from fba.face.authoring.weights import region, smoothed, spread, through, without_hem
 from fba.face.feature_points import MIRRORED
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
@@ -26,14 +26,18 @@ from fba.parameters import faps
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
-SLACK = 0.2
-"""Distance in ES0 beyond which the skin does not spring back."""
+SMOOTHINGS = 5
 HEM = 0.006
 
 
 @dataclass(frozen=True)
 class Region:
-    """Points that pull at the same skin; reach in ES0; share of the way to what stays that moves."""
+    """Points that pull at the same skin.
+
+    reach, in ES0. share: of the way to what stays that moves. slack: over longer distances, in ES0, the
+    skin does not spring back. through: in ES0, over what depth skin takes along what is behind it, or 0.
+    behind: what that is, the inside of the "mouth" or "all".
+    """
 
     name: str
     points: tuple[str, ...]
@@ -41,6 +45,9 @@ class Region:
     contours: tuple[str, ...]
     reach: float
     share: float
+    slack: float
+    through: float
+    behind: str
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,9 @@ def regions() -> dict[str, Region]:
             tuple(c for c in row["contours"].split("|") if c),
             float(row["reach"]),
             float(row["share"]),
+            float(row["slack"]),
+            float(row["through"]),
+            row["behind"],
         )
         for row in _rows("regions.csv")
     }
@@ -94,7 +104,7 @@ def spot_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion],
         for handle in handles():
             if handle.region != area.name:
                 continue
-            point = faps()[handle.fap - 1].feature_points[0]
+            point = _point(handle.fap)
             if marks.has(point):
                 own.append(handle)
             else:
@@ -123,7 +133,18 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
     values = np.concatenate([given, np.zeros((len(stays), len(own)))])
     pinned = np.zeros(len(surface), dtype=bool)
     pinned[fixed] = True
-    return without_hem(spread(surface, free, fixed, values, slack=SLACK * es), HEM), pinned
+    solved = spread(surface, free, fixed, values, slack=area.slack * es)
+    if area.through:
+        behind = surface.distances(pulled, 1.6 * reach) < np.inf
+        behind &= marks.inside_mouth if area.behind == "mouth" else ~marks.lips & ~marks.on_inner_lips
+        behind[stays] = False
+        for k, handle in enumerate(own):
+            targets = np.setdiff1d(np.flatnonzero(behind), marks.vertex[_point(handle.fap)])
+            lifted = through(surface, solved[:, k], targets, area.through * es)
+            for _ in range(SMOOTHINGS):
+                lifted[targets] = smoothed(surface, lifted, 1)[targets]
+            solved[:, k] = lifted
+    return without_hem(solved, HEM), pinned
 
 
 def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:
@@ -134,6 +155,10 @@ def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, 
     swell = handle.bulge * np.clip(weight * (1 - weight), 0, None) * marks.surface.normals[vertices]
     field = (weight * direction + swell) * marks.fapu[fap.unit]
     return linear(marks.surface, limiter, vertices, field, handle.fap, pinned)
+
+
+def _point(fap: int) -> str:
+    return faps()[fap - 1].feature_points[0]
 
 
 def _rows(name: str) -> list[dict[str, str]]:

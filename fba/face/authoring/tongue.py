@@ -8,7 +8,7 @@ import numpy.typing as npt
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.landmarks import Landmarks
 from fba.face.authoring.motion import Motion, limits
-from fba.face.authoring.saturation import guarded, straight
+from fba.face.authoring.saturation import caps, guarded, straight
 from fba.face.authoring.weights import smooth_step
 from fba.face.model import Part
 from fba.face.points import DIRECTIONS, TONGUE_ROLL
@@ -50,8 +50,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
         share = length**TIP_BEND
     entry = faps()[fap - 1]
     direction = np.array(DIRECTIONS[entry.positive]) * marks.fapu[entry.unit]
-    low, high = limits(fap)
-    return straight(limiter, np.arange(len(points)), share[:, None] * direction, low, high)
+    return straight(limiter, np.arange(len(points)), share[:, None] * direction, *limits(fap), caps(fap))
 
 
 def _roll(marks: Landmarks, points: Float64) -> Motion:

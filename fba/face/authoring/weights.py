@@ -75,3 +75,33 @@ def without_hem(field: Float64, hem: float) -> Float64:
     """A field with what is below `hem` taken off, 1 staying 1: far vertices that barely move rest."""
     result: Float64 = np.sign(field) * np.maximum(np.abs(field) - hem, 0.0) / (1 - hem)
     return result
+
+
+def smoothed(surface: Surface, field: Float64, rounds: int) -> Float64:
+    """A field averaged with that of the neighbours, some rounds."""
+    graph = surface.graph.astype(bool).astype(np.float64)
+    count = np.maximum(graph.sum(axis=1), 1)
+    result = field
+    for _ in range(rounds):
+        result = 0.5 * result + 0.5 * (graph @ result) / count
+    return result
+
+
+def through(surface: Surface, field: Float64, targets: Int, length: float) -> Float64:
+    """A field (N,) that some vertices share with skin near them as the crow flies, up to `length` metres.
+
+    What lies behind moving skin, such as the inside of a nostril, goes along with it.
+    """
+    from scipy.spatial import cKDTree
+
+    sources = np.flatnonzero(field > 0.02)
+    result = field.copy()
+    if not len(sources) or not len(targets):
+        return result
+    tree, goal = cKDTree(surface.vertices[sources]), cKDTree(surface.vertices[targets])
+    pairs = tree.sparse_distance_matrix(goal, length, output_type="ndarray")
+    lifted = field[sources][pairs["i"]] * (1 - (pairs["v"] / length) ** 2) ** 2
+    best = np.zeros(len(targets))
+    np.maximum.at(best, pairs["j"], lifted)
+    result[targets] = np.maximum(field[targets], best)
+    return result
