@@ -31,8 +31,13 @@ LARGEST_PICTURE = 4096
 MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
               51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
 """FAPs of a mouth open so far that light falls in."""
+ROUGH = 0.36
+RELIEF = 0.022
+"""Strength of the skin's relief, and metres until it repeats."""
 NECK = 2.3
 """Length over which a neck bends, in distances from eyes to nose (ENS)."""
+FREE = (0.9, 0.8, 0.0, 0.3)
+"""The light that reaches a tongue put out."""
 CUT = 0.45
 """On a body, what sways less than this is left out: the body has a neck of its own."""
 
@@ -76,6 +81,7 @@ class FaceFigure:
         self._lit: tuple[tuple[float, ...], Float32] | None = None
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
+        self._tongues = [part.name for part in model.of_kind("tongue")]
 
     @cached_property
     def between_eyes(self) -> Float64:
@@ -156,18 +162,33 @@ class FaceFigure:
             self._visibility = self._baked()
         share = self._mouth_open(pose.positions)
         into = (matrix[:3, :3] @ pose.turn[:3, :3]).T
-        key = (*np.round(into.ravel(), 3), round(share, 2))
+        out = {name: self._out_of_mouth(name, pose.positions) for name in self._tongues}
+        key = (*np.round(into.ravel(), 3), round(share, 2), *(float(o.sum()) for o in out.values()))
         if self._lit is None or self._lit[0] != key:
             shut, wide = (_reaching(each, into) for each in self._visibility)
-            self._lit = (key, (shut + (wide - shut) * np.float32(share)).astype(np.float32))
+            light = (shut + (wide - shut) * np.float32(share)).astype(np.float32)
+            for name, outside in out.items():
+                rows = self._ranges[name]
+                light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
+            self._lit = (key, light)
         return self._lit[1]
+
+    def _out_of_mouth(self, name: str, positions: Float32) -> Float32:
+        """(V,) how far the vertices of a tongue are out between the lips, 0..1."""
+        if self._lips is None:
+            return np.zeros(len(self.model.part(name).vertices), dtype=np.float32)
+        lips = positions[self._lips, 2].min()
+        reach = 0.2 * self.model.fapu.ENS * 1024
+        share: Float32 = np.clip((positions[self._ranges[name], 2] - lips + reach) / reach, 0.0, 1.0)
+        return share.astype(np.float32)
 
     def _mouth_open(self, positions: Float32) -> float:
         if self._lips is None:
             return 0.0
         upper, lower = self._lips
         gap = float(np.linalg.norm(positions[upper] - positions[lower]))
-        return float(np.clip((gap - self._gaps[0]) / max(self._gaps[1] - self._gaps[0], 1e-6), 0.0, 1.0))
+        share = np.clip((gap - self._gaps[0]) / max(self._gaps[1] - self._gaps[0], 1e-6), 0.0, 1.0)
+        return float(np.sqrt(share))  # the first millimetres let most of the light in
 
     def _baked(self) -> tuple[Visibility, Visibility]:
         """What reaches the vertices with the mouth shut, and open."""
@@ -257,9 +278,24 @@ def _shape(part: Part, sways: Float32) -> FaceShape:
         part.texcoords,
         picture,
         SCATTER.get(part.kind, 0.0),
-        1.0 if part.kind == "skin" and part.texcoords is not None else 0.0,
+        _relief(part),
         part.kind in TWO_SIDED,
     )
+
+
+def _relief(part: Part) -> tuple[float, float]:
+    """Strength of the skin's relief and its repeats, so that a repeat is `RELIEF` metres wide."""
+    if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
+        return (0.0, 1.0)
+    corners, flat = part.vertices[part.triangles], part.texcoords[part.triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    spread = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    laid = spread > 1e-9
+    if not laid.any():
+        return (0.0, 1.0)
+    metres = float(np.sqrt(np.median(area[laid] / spread[laid])))  # across the whole picture
+    return (ROUGH, min(metres / RELIEF, 200.0))
 
 
 def _picture(part: Part) -> npt.NDArray[np.uint8] | None:

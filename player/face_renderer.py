@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from player.programs import matrix_bytes, set_uniform
+from player.relief import relief
 from player.shapes import FaceMesh, FaceShape
 
 MOST_SHAPES = 64
@@ -23,6 +24,7 @@ class FaceRenderer:
         self._gl = context
         self._program = program
         self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
+        self._relief: Any = None
         self._white = context.texture((1, 1), 4, bytes([255] * 4))
 
     def draw(self, meshes: list[FaceMesh]) -> None:
@@ -47,6 +49,8 @@ class FaceRenderer:
             _release(parts)
         self._kept.clear()
         self._white.release()
+        if self._relief is not None:
+            self._relief.release()
 
     def _draw(self, mesh: FaceMesh) -> None:
         parts, shape, program = self._parts(mesh), mesh.shape, self._program
@@ -64,6 +68,9 @@ class FaceRenderer:
         set_uniform(program, "textured", 0.0 if shape.picture is None else 1.0)
         set_uniform(program, "scatter", shape.scatter)
         set_uniform(program, "fine", shape.fine)
+        if shape.fine[0] > 0:
+            self._relief_texture().use(1)
+            set_uniform(program, "relief", 1)
         set_uniform(program, "two_sided", 1.0 if shape.two_sided else 0.0)
         (parts["picture"] or self._white).use(0)
         parts["array"].render()
@@ -104,6 +111,15 @@ class FaceRenderer:
         parts["see_through"] = shape.see_through
         parts["lit"] = None
         return parts
+
+    def _relief_texture(self) -> Any:
+        if self._relief is None:
+            pixels = relief()
+            height, width = pixels.shape[:2]
+            self._relief = self._gl.texture((width, height), 3, pixels.tobytes())
+            self._relief.build_mipmaps()
+            self._relief.filter = (self._gl.LINEAR_MIPMAP_LINEAR, self._gl.LINEAR)
+        return self._relief
 
     def _texture(self, shape: FaceShape) -> Any:
         if shape.picture is None:

@@ -78,7 +78,7 @@ class PointView:
             if id(mesh.shape) not in self._ghosts:
                 colours = np.tile(np.array(GHOST, dtype=np.float32), (len(mesh.positions), 1))
                 self._ghosts[id(mesh.shape)] = replace(
-                    mesh.shape, colours=colours, picture=None, scatter=0.0, fine=0.0
+                    mesh.shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0)
                 )
             found.append(replace(mesh, shape=self._ghosts[id(mesh.shape)]))
         return found

@@ -29,6 +29,8 @@ SMOOTH_RATES = (Fraction(10), Fraction(120))
 """A film's own rate lies between these where none is asked for."""
 MOST_FRAMES = 1_000_000
 """A longer film is refused: its times are damaged, or a part of it was meant."""
+PICTURE_SAMPLES = 4
+"""Samples a pixel of a single picture, which may take its time."""
 JPEG_QUALITY = 90
 QUALITY = "18"
 """H.264 constant rate factor."""
@@ -74,7 +76,7 @@ def render(
     if fps is not None or end is not None or (start is not None and time is not None):
         raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
     at = _moment(scene, frame, time if time is not None else start)
-    with Offscreen(scene, size, camera) as offscreen:
+    with Offscreen(scene, size, camera, samples=PICTURE_SAMPLES) as offscreen:
         write_picture(target, offscreen.frame(at))
     if progress is not None:
         progress(1, 1)

@@ -52,7 +52,8 @@ class FaceShape:
     fourth how glossy. sway: float32 (V,), 1 where it goes with the head, 0 where it stands, as shoulders
     do. texcoords: float32 (V, 2), origin at the picture's top left. picture: uint8 (H, W, 4), sRGB, by
     which the colours are multiplied. scatter: how far light wanders below the surface: 1 skin, 0 cloth.
-    fine: strength of the skin's relief. two_sided: False where the inside is to look dark.
+    fine: strength of the skin's relief, and how often it repeats over the picture. two_sided: False where
+    the inside is to look dark.
     """
 
     triangles: npt.NDArray[np.int32]
@@ -61,7 +62,7 @@ class FaceShape:
     texcoords: Float32 | None = None
     picture: npt.NDArray[np.uint8] | None = None
     scatter: float = 0.0
-    fine: float = 0.0
+    fine: tuple[float, float] = (0.0, 1.0)
     two_sided: bool = False
 
     @property

@@ -2,7 +2,8 @@
 //include lighting.glsl
 uniform sampler2D picture;
 uniform float textured;    // 1: the picture times the colour
-uniform float fine;        // strength of the skin's relief, 0 for none
+uniform sampler2D relief;  // noise of three channels
+uniform vec2 fine;         // strength of the skin's relief, 0 for none, and how often it repeats
 uniform float scatter;     // how far light goes below the surface: 1 skin, 0 cloth
 uniform float two_sided;   // 0: what is seen from inside is a dark hollow
 in vec3 place;
@@ -25,6 +26,12 @@ void main() {
         opaque = texel.a;
     }
     vec3 n = normalize(gl_FrontFacing ? normal : -normal);
-    vec3 shown = surface(normalize(eye - place), n, n, albedo, colour.a, light, scatter);
+    vec3 rough = n;
+    if (fine.x > 0.0) {
+        vec3 grain = texture(relief, texture_at * fine.y).rgb - 0.5;
+        rough = normalize(n + grain * fine.x);
+        n += grain * (fine.x * 0.45);
+    }
+    vec3 shown = surface(normalize(eye - place), n, rough, albedo, colour.a, light, scatter);
     pixel = vec4(encode(shown), opaque);
 }

@@ -66,13 +66,13 @@ float mirrored(float nv, float nl, float vl, float sharp, float soft) {
 // reach: what reaches it of the key light, the open sky, through it from behind, of the rim light.
 vec3 surface(vec3 view, vec3 n, vec3 fine, vec3 albedo, float gloss, vec4 reach, float scatter) {
     // Light that wanders below the surface softens the edge of the shade, the red most.
-    vec3 wander = vec3(0.36, 0.15, 0.09) * scatter;
+    vec3 wander = vec3(0.30, 0.14, 0.09) * scatter;
     vec3 key = clamp((dot(n, KEY_DIRECTION) + wander) / (1.0 + wander), 0.0, 1.0);
     key *= 1.0 - wander + wander * key;
     key *= reach.x * (1.0 + (1.0 - reach.x) * vec3(0.55, 0.12, 0.0) * scatter);
     // Light bounces on in folds, and through flesh, which leaves the red of it.
     vec3 open = reach.y * (1.0 + (1.0 - reach.y) * 0.85 * albedo);
-    open += (1.0 - reach.y) * vec3(0.16, 0.07, 0.06) * scatter;
+    open += (1.0 - reach.y) * vec3(0.24, 0.10, 0.085) * scatter;
     vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) + mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;
     float rim = max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
     vec3 diffuse = KEY * key + dome * open + RIM * (rim + vec3(1.5, 0.32, 0.16) * (reach.z * scatter));
@@ -82,9 +82,9 @@ vec3 surface(vec3 view, vec3 n, vec3 fine, vec3 albedo, float gloss, vec4 reach,
     float soft = rough * rough * rough * rough;
     float sharp = soft * 0.16 + 0.0004;
     float nl = max(dot(fine, KEY_DIRECTION), 0.0);
-    float bl = max(dot(fine, RIM_DIRECTION), 0.0);
+    float bl = max(dot(n, RIM_DIRECTION), 0.0);
     vec3 shine = KEY * (mirrored(nv, nl, dot(view, KEY_DIRECTION), sharp, soft) * reach.x);
-    shine += RIM * (mirrored(nv, bl, dot(view, RIM_DIRECTION), soft, soft) * reach.w);
+    shine += RIM * (mirrored(nv, bl, dot(view, RIM_DIRECTION), soft, soft) * reach.w * 0.6);
     float graze = 1.0 - nv;
     graze *= graze;
     float around = (0.028 + 0.8 * graze * graze) * (1.0 - 0.6 * rough) * reach.y * reach.y;
