@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fba.body.conventions import convention_names
+    from fba.body.definition import BodyDefinition
     from fba.body.limits import Excess, Limit, Limits
     from fba.body.skeleton import Skeleton
     from fba.body.solver import BapSolver
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "BapSolver": "fba.body.solver",
+    "BodyDefinition": "fba.body.definition",
     "Excess": "fba.body.limits",
     "Limit": "fba.body.limits",
     "Limits": "fba.body.limits",
@@ -22,7 +24,16 @@ _PLACES = {
     "wrapped": "fba.body.wrapping",
 }
 
-__all__ = ["BapSolver", "Excess", "Limit", "Limits", "Skeleton", "convention_names", "wrapped"]
+__all__ = [
+    "BapSolver",
+    "BodyDefinition",
+    "Excess",
+    "Limit",
+    "Limits",
+    "Skeleton",
+    "convention_names",
+    "wrapped",
+]
 
 
 def __getattr__(name: str) -> Any:

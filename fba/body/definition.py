@@ -1,0 +1,178 @@
+"""Body definition parameters: what a sender says of the body that its BAPs are to move.
+
+Three behaviours of a decoder (digest faces-and-emotions.md, 1.4): "simple" ignores the definition and moves
+its own generic body; "calibration" scales the generic body's segments to the joint centres that were sent;
+and "predictable" takes the sent model in its place, whole.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.skeleton import MAX_JOINTS, Skeleton
+from fba.errors import ModelError
+from fba.source import Path, read_whole
+
+Float = npt.NDArray[np.float64]
+
+PROFILES = ("simple", "calibration", "predictable")
+
+
+@dataclass(frozen=True)
+class BodyDefinition:
+    """Joints as they were sent. centres: name -> metres, default posture, origin on the ground.
+
+    parents: name -> parent, None for the root; empty where only centres were sent. Raises ModelError where a
+    centre is not three finite numbers.
+    """
+
+    centres: Mapping[str, Sequence[float]]
+    parents: Mapping[str, str | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if len(self.centres) > MAX_JOINTS:
+            raise ModelError(f"BodyDefinition: {len(self.centres)} joints are more than {MAX_JOINTS}")
+        for name, centre in self.centres.items():
+            if (
+                not isinstance(centre, Sequence | np.ndarray)
+                or len(centre) != 3
+                or not all(map(_finite, centre))
+            ):
+                raise ModelError(
+                    f"BodyDefinition: the centre of {name!r} must be 3 finite numbers, not {centre!r}"
+                )
+
+    @classmethod
+    def load(cls, path: Path) -> BodyDefinition:
+        """From JSON: {"joints": {"l_hip": {"centre": [x, y, z], "parent": "sacroiliac"}, ...}}.
+
+        "parent" may be left out, by all. FormatError where the file cannot be read, ModelError for another
+        content.
+        """
+        file = os.fspath(path) if isinstance(path, str | os.PathLike) else "the file"
+        try:
+            document = json.loads(read_whole(path))
+        except (ValueError, RecursionError) as error:
+            raise ModelError(f"{file}: is no JSON: {error}") from None
+        joints = document.get("joints") if isinstance(document, dict) else None
+        if not isinstance(joints, dict) or not all(
+            isinstance(j, dict) and "centre" in j for j in joints.values()
+        ):
+            raise ModelError(f'{file}: expected {{"joints": {{name: {{"centre": [x, y, z]}}}}}}')
+        parents: dict[str, Any] = {
+            name: joint["parent"] for name, joint in joints.items() if "parent" in joint
+        }
+        if not all(parent is None or isinstance(parent, str) for parent in parents.values()):
+            raise ModelError(f"{file}: a parent must be the name of a joint, or null for the root")
+        return cls({name: joint["centre"] for name, joint in joints.items()}, parents)
+
+    def skeleton(self, profile: str = "calibration", generic: Skeleton | None = None) -> Skeleton:
+        """The skeleton that a decoder of this profile moves; generic: its own body, the default one where
+        None.
+
+        ModelError where "predictable" lacks parents, or they contradict each other.
+        """
+        if profile not in PROFILES:
+            raise ValueError(f"profile must be one of {', '.join(PROFILES)}, not {profile!r}")
+        generic = generic if generic is not None else Skeleton.default()
+        if profile == "simple":
+            return generic
+        if profile == "calibration":
+            return calibrated(generic, self.centres)
+        missing = [name for name in self.centres if name not in self.parents]
+        if missing or not self.centres:
+            raise ModelError(
+                "BodyDefinition: a predictable body needs the parents of all joints; "
+                f"missing: {', '.join(missing[:5]) or 'all'} (profile 'calibration' needs centres only)"
+            )
+        lacking = [name for name in self.parents if name not in self.centres]
+        if lacking:
+            raise ModelError(f"BodyDefinition: joint {lacking[0]!r} has a parent, but no centre")
+        return Skeleton.from_parents(self.parents, self.centres)
+
+
+def calibrated(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Skeleton:
+    """A skeleton with its segments scaled such that joints stand at given centres; others follow.
+
+    A joint between two given ones keeps its place along the line between them; one beyond the last given
+    joint keeps its direction from it, at that joint's scale. Joints that the skeleton lacks have no effect.
+    """
+    given = {generic.number(name): np.array(place, dtype=np.float64) for name, place in centres.items()
+             if name in generic}  # fmt: skip
+    if not given:
+        return generic
+    old, parents = generic.centres, generic.parents
+    first_below = _first_given_below(parents, given)
+    whole = _size(np.array([given[n] for n in given])) / max(_size(old[list(given)]), 1e-12) or 1.0
+    places = np.zeros_like(old)
+    scales = np.full(len(generic), whole)
+    for number in range(len(generic)):
+        parent, below = int(parents[number]), first_below[number]
+        if parent < 0:
+            rooted = number in given
+            places[number] = given[number] if rooted else given[below] + whole * (old[number] - old[below])
+            continue
+        if number in given:
+            places[number] = given[number]
+        elif below < 0:
+            places[number] = places[parent] + scales[parent] * (old[number] - old[parent])
+        else:
+            share = _share(old, parents, parent, number, below)
+            line = given[below] - places[parent]
+            turned = _aside(old[number] - old[parent], old[below] - old[parent], line)
+            places[number] = places[parent] + share * line + turned
+        before = float(np.linalg.norm(old[number] - old[parent]))
+        after = float(np.linalg.norm(places[number] - places[parent]))
+        scales[number] = after / before if before > 1e-6 else scales[parent]
+    return Skeleton(generic.names, parents, places)
+
+
+def _first_given_below(parents: npt.NDArray[np.int64], given: Mapping[int, Float]) -> list[int]:
+    """For each joint the closest given joint on the way down, -1 for none; of several ways, the first."""
+    result = [-1] * len(parents)
+    depth = [0] * len(parents)
+    for number in range(len(parents) - 1, -1, -1):
+        if number in given:
+            result[number], depth[number] = number, 0
+        parent = int(parents[number])
+        closer = result[parent] < 0 or depth[number] + 1 <= depth[parent]
+        if parent >= 0 and parent not in given and result[number] >= 0 and closer:
+            result[parent], depth[parent] = result[number], depth[number] + 1
+    return result
+
+
+def _share(old: Float, parents: npt.NDArray[np.int64], parent: int, number: int, below: int) -> float:
+    """How far along the line from a parent to a given joint below, in the generic body, a joint stands."""
+    line = old[below] - old[parent]
+    length = float(line @ line)
+    return float((old[number] - old[parent]) @ line) / length if length > 1e-12 else 1.0
+
+
+def _aside(offset: Float, line: Float, new_line: Float) -> Float:
+    """What of an offset is not along the line, at the scale of the new line."""
+    length = float(line @ line)
+    if length <= 1e-12:
+        return np.zeros(3)
+    result: Float = (offset - line * (offset @ line) / length) * math.sqrt(
+        float(new_line @ new_line) / length
+    )
+    return result
+
+
+def _size(places: Float) -> float:
+    """The extent of joints: the diagonal of their box, or the height of a single one."""
+    if len(places) == 1:
+        return abs(float(places[0, 1]))
+    return float(np.linalg.norm(np.ptp(places, axis=0)))
+
+
+def _finite(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
