@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -146,6 +147,17 @@ class Value:
 
     def _unexpected(self, wanted: str) -> ModelError:
         return self.error(f"expected {wanted}, found {_kind(self.data)}")
+
+
+@contextlib.contextmanager
+def located(value: Value) -> Iterator[None]:
+    """Give errors of the data model their place in the file."""
+    try:
+        yield
+    except ModelError as error:
+        if str(error).startswith(f"{value.file}: "):
+            raise  # it has one already
+        raise value.error(str(error)) from error
 
 
 def optional(value: Value | None, key: str) -> Value | None:

@@ -7,13 +7,10 @@ is a ModelError that names the place, such as
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from fba.errors import ModelError
 from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.feature_points import names, row_of
 from fba.face.gltf.extension import NAME, VERSION
@@ -24,7 +21,7 @@ from fba.gltf.document import Document
 from fba.gltf.looks import material_of
 from fba.gltf.reader import read_document
 from fba.gltf.scene import Gltf
-from fba.gltf.values import Budget, Value, optional
+from fba.gltf.values import Budget, Value, located, optional
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
 MAX_PARTS = 1000
@@ -62,17 +59,6 @@ def read_model(document: Document) -> FaceModel:
             lost={_fap(key, value): value.text() for key, value in _members(content, "lost", FAP_COUNT)},
             notes={key: value.text() for key, value in _members(content, "notes", MAX_NOTES)},
         )
-
-
-@contextlib.contextmanager
-def located(value: Value) -> Iterator[None]:
-    """Give errors of the data model their place in the file."""
-    try:
-        yield
-    except ModelError as error:
-        if str(error).startswith(f"{value.file}: "):
-            raise  # it has one already
-        raise value.error(str(error)) from error
 
 
 def _parts(listed: Value, gltf: Gltf, budget: Budget) -> tuple[Part, ...]:

@@ -1,0 +1,19 @@
+"""The built-in person: `body.glb`, made by `examples/figure/make_body.py`; see NOTICE.txt for its origin."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyModel
+
+
+@cache
+def default() -> BodyModel:
+    """The built-in person; read on first use."""
+    from fba.body.storage import load
+
+    with as_file(files(__package__) / "body.glb") as path:
+        return load(path)

@@ -1,0 +1,263 @@
+"""A body: meshes, the skeleton that carries them, and how far each joint carries each vertex."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.skeleton import Skeleton
+from fba.errors import ModelError
+from fba.mesh import Material, joined, mesh_arrays
+
+if TYPE_CHECKING:
+    from fba.body.skinning import Skinner
+
+__all__ = ["BODY_PART_KINDS", "INFLUENCES", "BodyModel", "BodyPart", "Material"]
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+BODY_PART_KINDS = ("skin", "neck", "cloth", "shoe", "hair", "other")
+"""What a part is. "neck": neck and shoulders under the clothes, shown only where the face that stands on the
+body brings none of its own."""
+INFLUENCES = 4
+"""Joints that carry a vertex, at most."""
+WEIGHT_TOLERANCE = 1e-3
+"""Weights of a vertex may miss a sum of 1 by this; they are then scaled to it."""
+RIGID_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPart:
+    """One mesh of a body, as it is modelled.
+
+    name: unique in its model. kind: one of `BODY_PART_KINDS`. vertices: float32 (V, 3), metres. triangles:
+    int32 (F, 3), counter-clockwise from outside. joints: int32 (V, 4), numbers of joints in the model's
+    skeleton. weights: float32 (V, 4), how far each carries the vertex, 0..1, with a sum of 1. normals,
+    texcoords, colours, material: as those of `fba.face.Part`.
+
+    Arrays are read-only copies. ModelError for other shapes, indices out of range, numbers not finite,
+    negative weights, or a sum that is not 1.
+    """
+
+    name: str
+    kind: str
+    vertices: Float32
+    triangles: Int32
+    joints: Int32
+    weights: Float32
+    normals: Float32 | None = None
+    texcoords: Float32 | None = None
+    colours: Float32 | None = None
+    material: Material = field(default_factory=Material)
+
+    def __post_init__(self) -> None:
+        where = f"part {self.name!r}"
+        if not self.name:
+            raise ModelError("a part of a body needs a name")
+        if self.kind not in BODY_PART_KINDS:
+            raise ModelError(f"{where}: its kind {self.kind!r} is none of {', '.join(BODY_PART_KINDS)}")
+        arrays: dict[str, Any] = dict(
+            mesh_arrays(where, self.vertices, self.triangles, self.normals, self.texcoords, self.colours)
+        )
+        arrays["joints"], arrays["weights"] = checked_weights(
+            where, self.joints, self.weights, len(arrays["vertices"])
+        )
+        for name, array in arrays.items():
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyModel:
+    """A body that joint matrices move.
+
+    parts: its meshes; vertices of the whole model are counted through them in order. skeleton: its joints
+    in the default posture, named as in the standard where BAPs are to move them. bind: float64 (J, 4, 4),
+    the joints as the meshes are modelled, each rotation relative to the default posture, as
+    `BapSolver.pose` gives them. eyes: float64 (2, 3), where the pupils of a face on this body are as
+    modelled (feature points 3.5 and 3.6), or None where there is no place for one. name, notes: what it
+    is, its origin, licence and the like.
+
+    Axes: +x the subject's left, +y up, +z forward; metres. Raises ModelError naming the place of what is
+    wrong.
+    """
+
+    parts: tuple[BodyPart, ...]
+    skeleton: Skeleton
+    bind: Float64
+    eyes: Float64 | None = None
+    name: str = ""
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", tuple(self.parts))
+        object.__setattr__(self, "notes", dict(self.notes))
+        if not self.parts:
+            raise ModelError("a body needs at least one part")
+        names = [part.name for part in self.parts]
+        for name in names:
+            if names.count(name) > 1:
+                raise ModelError(f"two parts of the body are named {name!r}")
+        count = len(self.skeleton)
+        for part in self.parts:
+            if len(part.joints) and int(part.joints.max()) >= count:
+                raise ModelError(
+                    f"part {part.name!r}: names joint {part.joints.max()}, but the skeleton has {count}"
+                )
+        bind = np.array(self.bind, dtype=np.float64)
+        if bind.shape != (count, 4, 4):
+            raise ModelError(f"bind matrices must have shape ({count}, 4, 4), not {bind.shape}")
+        for number, matrix in enumerate(bind):
+            if not is_rigid(matrix):
+                raise ModelError(
+                    f"the bind matrix of {self.skeleton.names[number]!r} is no rotation with a place: "
+                    f"{np.round(matrix, 4).tolist()}"
+                )
+        bind.flags.writeable = False
+        object.__setattr__(self, "bind", bind)
+        if self.eyes is not None:
+            eyes = np.array(self.eyes, dtype=np.float64)
+            if eyes.shape != (2, 3) or not np.isfinite(eyes).all() or np.allclose(eyes[0], eyes[1]):
+                raise ModelError(f"the pupils must be two places (2, 3), not {eyes.tolist()}")
+            eyes.flags.writeable = False
+            object.__setattr__(self, "eyes", eyes)
+
+    @staticmethod
+    def default() -> BodyModel:
+        """The built-in person, dressed, without the head; one shared instance."""
+        from fba.body.builtin import default
+
+        return default()
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> BodyModel:
+        """A body from a glTF 2.0 file with a skin: as `save` writes it, or by others.
+
+        Raises FormatError where the file cannot be opened, ModelError, which names the place in it, where
+        it is damaged, contradicts itself, or has no skinned mesh.
+        """
+        from fba.body.storage import load
+
+        return load(path)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the body as a skinned glTF 2.0 mesh (.glb): whole or not at all.
+
+        Raises ModelError where glTF cannot hold it, FormatError where the file cannot be written.
+        """
+        from fba.body.storage import save
+
+        save(self, path)
+
+    def skin(
+        self,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """The body in a pose: float32 (V, 3) for joint matrices (J, 4, 4), (T, V, 3) for (T, J, 4, 4).
+
+        matrices: as `BapSolver(model.skeleton).pose` gives them: rotations and places. out: written to and
+        returned. normals: filled with the unit normals. Both float32, C-contiguous, of the result's shape.
+        method: "dual" blends dual quaternions, which keep a twisted limb's girth; "linear" blends
+        matrices, as most viewers do.
+
+        Raises ValueError for other shapes, numbers that are not finite, or another method.
+        """
+        return self.skinner.skin(matrices, out, normals, method)
+
+    @cached_property
+    def skinner(self) -> Skinner:
+        """What `skin` uses; made on first use."""
+        from fba.body.skinning import Skinner
+
+        return Skinner(
+            self.vertices, self.normals, self.joints, self.weights, self.bind, self.skeleton.parents
+        )
+
+    @cached_property
+    def vertices(self) -> Float32:
+        """float32 (V, 3): the body as modelled, all parts in order, metres; read-only."""
+        return joined([part.vertices for part in self.parts])
+
+    @cached_property
+    def normals(self) -> Float32:
+        """float32 (V, 3): unit normals of the body as modelled; read-only."""
+        return joined([part.normals for part in self.parts if part.normals is not None])
+
+    @cached_property
+    def joints(self) -> Int32:
+        """int32 (V, 4): the joints that carry each vertex; read-only."""
+        joints: Int32 = np.concatenate([part.joints for part in self.parts])
+        joints.flags.writeable = False
+        return joints
+
+    @cached_property
+    def weights(self) -> Float32:
+        """float32 (V, 4): how far they carry it; read-only."""
+        return joined([part.weights for part in self.parts])
+
+    @cached_property
+    def triangles(self) -> Int32:
+        """int32 (F, 3): indices into `vertices`; read-only."""
+        triangles: Int32 = np.concatenate(
+            [part.triangles + np.int32(self.starts[part.name]) for part in self.parts]
+        )
+        triangles.flags.writeable = False
+        return triangles
+
+    @cached_property
+    def starts(self) -> dict[str, int]:
+        """Index of each part's first vertex in `vertices`."""
+        counts = np.cumsum([0, *(len(part.vertices) for part in self.parts)])
+        return {part.name: int(start) for part, start in zip(self.parts, counts[:-1], strict=True)}
+
+    def part(self, name: str) -> BodyPart:
+        """A part by name; ModelError where there is none."""
+        for part in self.parts:
+            if part.name == name:
+                return part
+        raise ModelError(f"no part {name!r}; there are {', '.join(part.name for part in self.parts)}")
+
+
+def checked_weights(
+    where: str, joints: npt.ArrayLike, weights: npt.ArrayLike, count: int
+) -> tuple[Int32, Float32]:
+    """Read-only copies of joints and weights, (count, 4), their sums made 1. ModelError as `BodyPart`."""
+    which = np.array(joints)
+    if which.shape != (count, INFLUENCES) or which.dtype.kind not in "iu":
+        raise ModelError(f"{where}: joints must be whole numbers, ({count}, {INFLUENCES}), not {which.shape}")
+    share = np.array(weights, dtype=np.float32)
+    if share.shape != which.shape:
+        raise ModelError(f"{where}: weights must have shape {which.shape}, not {share.shape}")
+    if which.size and int(which.min()) < 0:
+        raise ModelError(f"{where}: a joint has a negative number")
+    total = share.sum(axis=1, dtype=np.float64)
+    # written so that NaN fails too
+    wrong = ~((share >= 0).all(axis=1) & (np.abs(total - 1) <= WEIGHT_TOLERANCE))
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        raise ModelError(
+            f"{where}: the weights of vertex {row}, {share[row].tolist()}, are not 0 or more with a sum of 1"
+        )
+    share = (share / total[:, None]).astype(np.float32)
+    which = which.astype(np.int32)
+    which[share == 0] = 0  # what does not carry may not matter
+    which.flags.writeable = share.flags.writeable = False
+    return which, share
+
+
+def is_rigid(matrix: Float64) -> bool:
+    """Whether a matrix (4, 4) is a finite place and a rotation."""
+    if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], (0, 0, 0, 1)):
+        return False
+    turn = matrix[:3, :3]
+    return bool(np.abs(turn @ turn.T - np.eye(3)).max() < RIGID_TOLERANCE and np.linalg.det(turn) > 0)

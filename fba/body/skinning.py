@@ -1,0 +1,110 @@
+"""Vertices carried along with the joints of a skeleton."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+METHODS = ("dual", "linear")
+"""Ways to blend the motion of several joints."""
+BLOCK = 64
+"""Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
+
+
+class Skinner:
+    """Carries vertices with joints.
+
+    vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
+    sum to 1. bind: float64 (J, 4, 4), the joints as modelled. parents: (J,).
+
+    Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
+    several threads, one after the other.
+    """
+
+    def __init__(
+        self,
+        vertices: Float32,
+        normals: Float32,
+        joints: Int32,
+        weights: Float32,
+        bind: Float64,
+        parents: npt.NDArray[np.integer[Any]],
+    ) -> None:
+        # numba is imported here, with the first body that moves
+        from fba.body import skinning_loops
+
+        self._loops = skinning_loops
+        order = np.argsort(-weights, axis=1, kind="stable")
+        self._joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
+        self._weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
+        self._counts = (self._weights > 0).sum(axis=1).astype(np.int32)
+        self._vertices = np.ascontiguousarray(vertices, dtype=np.float32)
+        self._normals = np.ascontiguousarray(normals, dtype=np.float32)
+        self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
+        self._parents = np.ascontiguousarray(parents, dtype=np.int64)
+        self._scratch = np.empty((len(bind), 12), dtype=np.float32)
+        self._lock = threading.Lock()
+
+    def skin(
+        self,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """Vertices for joint matrices: see `BodyModel.skin`."""
+        if method not in METHODS:
+            raise ValueError(f"no skinning method {method!r}; there are {', '.join(METHODS)}")
+        frames, single = self._frames(matrices)
+        shape = (*(() if single else (len(frames),)), len(self._vertices), 3)
+        if out is None:
+            out = np.empty(shape, dtype=np.float32)
+        else:
+            _check_target(out, shape, "out")
+        if normals is not None:
+            _check_target(normals, shape, "normals")
+            if np.may_share_memory(out, normals):
+                raise ValueError("out and normals share memory; give each an array of its own")
+        placed = out[None] if single else out
+        upright = placed[:0] if normals is None else normals[None] if single else normals
+        mesh = (self._vertices, self._normals, self._joints, self._weights, self._counts, self._scratch)
+        with self._lock, np.errstate(all="ignore"):
+            for start in range(0, len(frames), BLOCK):
+                part = slice(start, start + BLOCK)
+                if method == "dual":
+                    self._loops.dual_frames(
+                        frames[part], self._inverse, self._parents, *mesh, placed[part], upright[part]
+                    )
+                else:
+                    self._loops.linear_frames(frames[part], self._inverse, *mesh, placed[part], upright[part])
+        return out
+
+    def _frames(self, matrices: npt.ArrayLike) -> tuple[Float64, bool]:
+        array = np.asarray(matrices)
+        count = len(self._inverse)
+        if array.ndim not in (3, 4) or array.shape[-3:] != (count, 4, 4):
+            raise ValueError(
+                f"joint matrices must have shape ({count}, 4, 4) or (T, {count}, 4, 4), not {array.shape}"
+            )
+        if array.dtype.kind not in "iuf":
+            raise ValueError(f"joint matrices must be real numbers, not {array.dtype}")
+        frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, count, 4, 4)
+        if not np.isfinite(frames).all():
+            frame, joint = (int(place) for place in np.argwhere(~np.isfinite(frames))[0, :2])
+            raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")
+        return frames, array.ndim == 3
+
+
+def _check_target(target: Any, shape: tuple[int, ...], name: str) -> None:
+    if not isinstance(target, np.ndarray) or target.dtype != np.float32 or target.shape != shape:
+        found = f"{target.dtype} {target.shape}" if isinstance(target, np.ndarray) else type(target).__name__
+        raise ValueError(f"{name} must be a float32 array of shape {shape}, not {found}")
+    if not (target.flags.c_contiguous and target.flags.writeable):
+        raise ValueError(f"{name} must be C-contiguous and writable")

@@ -1,0 +1,199 @@
+"""The loops that carry vertices along with joints. Compiled; plain functions over NumPy arrays.
+
+Everything is in 32 bits, relative to the root joint, so that a body far from the origin loses nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled, inlined
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+Int64 = npt.NDArray[np.int64]
+
+ONE, TWO, HALF = np.float32(1.0), np.float32(2.0), np.float32(0.5)
+TINY = np.float32(1e-30)
+
+
+@compiled
+def dual_frames(
+    matrices: Float64, inverse: Float64, parents: Int64, vertices: Float32, upright: Float32,
+    joints: Int32, weights: Float32, counts: Int32, scratch: Float32, out: Float32, normals: Float32,
+) -> None:  # fmt: skip
+    """Dual-quaternion skinning of T frames (Kavan and others, "Skinning with dual quaternions", 2007).
+
+    matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, upright (V, 3): as modelled.
+    joints, weights (V, 4): those that carry, first; counts (V,): how many. scratch (J, 12). out (T, V, 3).
+    normals: the same, or (0, V, 3) for none.
+    """
+    for frame in range(matrices.shape[0]):
+        root = matrices[frame, 0]
+        _duals(matrices[frame], inverse, parents, scratch)
+        x0, y0, z0 = np.float32(root[0, 3]), np.float32(root[1, 3]), np.float32(root[2, 3])
+        if normals.shape[0]:
+            _dual_places(
+                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright, normals[frame]
+            )
+        else:
+            _dual_places(
+                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright[:0], out[frame]
+            )
+
+
+@compiled
+def linear_frames(
+    matrices: Float64, inverse: Float64, vertices: Float32, upright: Float32,
+    joints: Int32, weights: Float32, counts: Int32, scratch: Float32, out: Float32, normals: Float32,
+) -> None:  # fmt: skip
+    """Linear-blend skinning of T frames; arguments as `dual_frames`."""
+    for frame in range(matrices.shape[0]):
+        root = matrices[frame, 0]
+        for joint in range(matrices.shape[1]):
+            for row in range(3):
+                for column in range(4):
+                    total = 0.0
+                    for k in range(4):
+                        total += matrices[frame, joint, row, k] * inverse[joint, k, column]
+                    if column == 3:
+                        total -= root[row, 3]
+                    scratch[joint, 4 * row + column] = total
+        x0, y0, z0 = np.float32(root[0, 3]), np.float32(root[1, 3]), np.float32(root[2, 3])
+        if normals.shape[0]:
+            _linear_places(
+                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright, normals[frame]
+            )
+        else:
+            _linear_places(
+                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright[:0], out[frame]
+            )
+
+
+@compiled
+def _duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Float32) -> None:
+    """Joint matrices (J, 4, 4) as unit dual quaternions (J, 8), w x y z: rotation, then half the shift
+    (from the root) times it.
+
+    Of both quaternions of a rotation, each joint takes that nearer to its parent's: blends go the short way.
+    """
+    s = np.empty((3, 4))
+    root = matrices[0]
+    for joint in range(matrices.shape[0]):
+        for row in range(3):
+            for column in range(4):
+                total = 0.0
+                for k in range(4):
+                    total += matrices[joint, row, k] * inverse[joint, k, column]
+                s[row, column] = total
+        w, x, y, z = _quaternion(s)
+        parent = int(parents[joint])
+        if parent >= 0:
+            nearer = w * duals[parent, 0] + x * duals[parent, 1] + y * duals[parent, 2] + z * duals[parent, 3]
+            if nearer < 0.0:
+                w, x, y, z = -w, -x, -y, -z
+        tx, ty, tz = s[0, 3] - root[0, 3], s[1, 3] - root[1, 3], s[2, 3] - root[2, 3]
+        duals[joint, 0] = w
+        duals[joint, 1] = x
+        duals[joint, 2] = y
+        duals[joint, 3] = z
+        duals[joint, 4] = -0.5 * (tx * x + ty * y + tz * z)
+        duals[joint, 5] = 0.5 * (tx * w + ty * z - tz * y)
+        duals[joint, 6] = 0.5 * (ty * w + tz * x - tx * z)
+        duals[joint, 7] = 0.5 * (tz * w + tx * y - ty * x)
+
+
+@inlined
+def _quaternion(s: Float64) -> tuple[float, float, float, float]:
+    """Unit quaternion w, x, y, z of the rotation in the left of a matrix (3, 4), by its largest part."""
+    trace = s[0, 0] + s[1, 1] + s[2, 2]
+    if trace > 0.0:
+        r = np.sqrt(1.0 + trace)
+        h = 0.5 / r
+        w, x, y, z = 0.5 * r, (s[2, 1] - s[1, 2]) * h, (s[0, 2] - s[2, 0]) * h, (s[1, 0] - s[0, 1]) * h
+    elif s[0, 0] >= s[1, 1] and s[0, 0] >= s[2, 2]:
+        r = np.sqrt(1.0 + s[0, 0] - s[1, 1] - s[2, 2])
+        h = 0.5 / r
+        w, x, y, z = (s[2, 1] - s[1, 2]) * h, 0.5 * r, (s[0, 1] + s[1, 0]) * h, (s[0, 2] + s[2, 0]) * h
+    elif s[1, 1] >= s[2, 2]:
+        r = np.sqrt(1.0 + s[1, 1] - s[0, 0] - s[2, 2])
+        h = 0.5 / r
+        w, x, y, z = (s[0, 2] - s[2, 0]) * h, (s[0, 1] + s[1, 0]) * h, 0.5 * r, (s[1, 2] + s[2, 1]) * h
+    else:
+        r = np.sqrt(1.0 + s[2, 2] - s[0, 0] - s[1, 1])
+        h = 0.5 / r
+        w, x, y, z = (s[1, 0] - s[0, 1]) * h, (s[0, 2] + s[2, 0]) * h, (s[1, 2] + s[2, 1]) * h, 0.5 * r
+    length = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    return w * length, x * length, y * length, z * length
+
+
+@compiled
+def _dual_places(
+    vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
+    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32, upright: Float32, normals: Float32,
+) -> None:  # fmt: skip
+    with_normals = upright.shape[0] > 0
+    for i in range(vertices.shape[0]):
+        j, share = joints[i, 0], weights[i, 0]
+        w, x, y, z = share * duals[j, 0], share * duals[j, 1], share * duals[j, 2], share * duals[j, 3]
+        a, b, c, d = share * duals[j, 4], share * duals[j, 5], share * duals[j, 6], share * duals[j, 7]
+        for k in range(1, counts[i]):
+            j, share = joints[i, k], weights[i, k]
+            w += share * duals[j, 0]
+            x += share * duals[j, 1]
+            y += share * duals[j, 2]
+            z += share * duals[j, 3]
+            a += share * duals[j, 4]
+            b += share * duals[j, 5]
+            c += share * duals[j, 6]
+            d += share * duals[j, 7]
+        # Twice the inverse of the square of its length makes it unit, and a rotation.
+        per = TWO / max(w * w + x * x + y * y + z * z, TINY)
+        px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        # v + 2 q x (q x v + w v)
+        ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
+        tx, ty, tz = (
+            w * b - x * a + y * d - z * c,
+            w * c - y * a + z * b - x * d,
+            w * d - z * a + x * c - y * b,
+        )
+        out[i, 0] = px + per * (y * uz - z * uy + tx) + x0
+        out[i, 1] = py + per * (z * ux - x * uz + ty) + y0
+        out[i, 2] = pz + per * (x * uy - y * ux + tz) + z0
+        if with_normals:
+            px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
+            ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
+            normals[i, 0] = px + per * (y * uz - z * uy)
+            normals[i, 1] = py + per * (z * ux - x * uz)
+            normals[i, 2] = pz + per * (x * uy - y * ux)
+
+
+@compiled
+def _linear_places(
+    vertices: Float32, joints: Int32, weights: Float32, counts: Int32, tops: Float32,
+    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32, upright: Float32, normals: Float32,
+) -> None:  # fmt: skip
+    with_normals = upright.shape[0] > 0
+    m = np.empty(12, dtype=np.float32)
+    for i in range(vertices.shape[0]):
+        m[:] = 0
+        for k in range(counts[i]):
+            j, share = joints[i, k], weights[i, k]
+            for e in range(12):
+                m[e] += share * tops[j, e]
+        px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        out[i, 0] = m[0] * px + m[1] * py + m[2] * pz + m[3] + x0
+        out[i, 1] = m[4] * px + m[5] * py + m[6] * pz + m[7] + y0
+        out[i, 2] = m[8] * px + m[9] * py + m[10] * pz + m[11] + z0
+        if with_normals:
+            px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
+            nx = m[0] * px + m[1] * py + m[2] * pz
+            ny = m[4] * px + m[5] * py + m[6] * pz
+            nz = m[8] * px + m[9] * py + m[10] * pz
+            length = nx * nx + ny * ny + nz * nz
+            per = ONE / np.sqrt(length) if length > TINY else ONE
+            normals[i, 0] = nx * per
+            normals[i, 1] = ny * per
+            normals[i, 2] = nz * per

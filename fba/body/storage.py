@@ -1,0 +1,249 @@
+"""Body models in files: skinned glTF 2.0 with the extension FBA_body, described in docs/body-models.md.
+
+The tree of joint nodes is the skeleton: a node's translation is its joint's offset in the default posture,
+its rotation how the mesh was modelled relative to that. With all rotations left out, the file shows the
+default posture.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.model import BODY_PART_KINDS, INFLUENCES, BodyModel, BodyPart, Float32, Int32
+from fba.body.skeleton import MAX_JOINTS, Skeleton
+from fba.errors import ModelError
+from fba.gltf.document import Document
+from fba.gltf.looks import Looks, material_of
+from fba.gltf.nodes import rotation_matrix
+from fba.gltf.scene import Gltf, Primitive
+from fba.gltf.values import Value, located, optional
+from fba.gltf.writer import Builder
+from fba.source import Path
+
+NAME = "FBA_body"
+VERSION = 1
+MAX_PARTS = 1000
+MAX_NOTES = 1000
+LARGEST = 1e6
+"""Metres: no number of a body is larger."""
+BIND_TOLERANCE = 1e-3
+"""Metres and sines by which a file's inverse bind matrices may contradict its nodes."""
+
+
+def save(model: BodyModel, path: Path) -> None:
+    """Write a body as .glb, whole or not at all; loading it gives an equal model again."""
+    if os.fspath(path).lower().endswith(".gltf"):
+        raise ModelError(f"{os.fspath(path)}: body models are written in one file; name it .glb")
+    build(model).save(path)
+
+
+def build(model: BodyModel) -> Builder:
+    """The whole document of a model, its joints first among the nodes."""
+    builder = Builder()
+    skeleton = model.skeleton
+    builder.root["extensionsUsed"] = [NAME]
+    builder.root["scene"] = 0
+    children: list[list[int]] = [[] for _ in skeleton.names]
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0:
+            children[parent].append(joint)
+    turns = _quaternions(local_turns(model))
+    for joint, name in enumerate(skeleton.names):
+        node: dict[str, Any] = {"name": name, "translation": skeleton.offsets[joint].tolist()}
+        if not np.array_equal(turns[joint], (0, 0, 0, 1)):
+            node["rotation"] = turns[joint].tolist()
+        if children[joint]:
+            node["children"] = children[joint]
+        builder.add("nodes", node)
+    inverse = np.linalg.inv(model.bind)
+    inverse[:, 3] = (0, 0, 0, 1)
+    columns = inverse.transpose(0, 2, 1).reshape(-1, 16)
+    skin = {"joints": list(range(len(skeleton))), "skeleton": 0, "inverseBindMatrices": builder.data(columns)}
+    builder.add("skins", skin)
+    looks = Looks(builder)
+    parts = []
+    for part in model.parts:
+        primitive = looks.primitive(part)
+        small = np.uint8 if len(skeleton) <= 256 else np.uint16
+        primitive["attributes"]["JOINTS_0"] = builder.attribute(part.joints.astype(small))
+        primitive["attributes"]["WEIGHTS_0"] = builder.attribute(part.weights)
+        mesh = builder.add("meshes", {"name": part.name, "primitives": [primitive]})
+        entry: dict[str, Any] = {
+            "node": builder.add("nodes", {"name": part.name, "mesh": mesh, "skin": 0}),
+            "kind": part.kind,
+        }
+        if part.colours is not None:
+            entry["colour"] = [float(value) for value in part.material.colour]
+        parts.append(entry)
+    builder.add("scenes", {"nodes": [0, *(entry["node"] for entry in parts)]})
+    content: dict[str, Any] = {
+        "version": VERSION,
+        "name": model.name,
+        "notes": dict(model.notes),
+        "skin": 0,
+        "parts": parts,
+    }
+    if model.eyes is not None:
+        content["eyes"] = model.eyes.tolist()
+    builder.root["extensions"] = {NAME: content}
+    return builder
+
+
+def local_turns(model: BodyModel) -> npt.NDArray[np.float64]:
+    """(J, 3, 3) how each joint is turned in its parent's frame, as modelled."""
+    turns = model.bind[:, :3, :3].copy()
+    parents = model.skeleton.parents
+    turns[1:] = np.swapaxes(model.bind[parents[1:], :3, :3], 1, 2) @ turns[1:]
+    return turns
+
+
+def _quaternions(turns: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """(N, 4) x, y, z, w of rotation matrices (N, 3, 3), w not negative; exactly 0 0 0 1 for none."""
+    from scipy.spatial.transform import Rotation
+
+    found: npt.NDArray[np.float64] = Rotation.from_matrix(turns).as_quat(canonical=True)
+    found[(turns == np.eye(3)).all(axis=(1, 2))] = (0, 0, 0, 1)
+    return found
+
+
+def load(path: Path) -> BodyModel:
+    """Read a body model from a .glb (or .gltf) file, as `save` writes it.
+
+    Raises FormatError where the file cannot be opened, ModelError, which names the place in it, where it
+    is damaged, contradicts itself, or brings no extension FBA_body. Nothing of a bad file is used.
+    """
+    from fba.gltf.document import open_document
+
+    return read_body(open_document(path))
+
+
+def read_body(document: Document) -> BodyModel:
+    """The body in an opened document."""
+    from fba.gltf.reader import read_document
+
+    content = optional(document.root.get("extensions"), NAME)
+    if content is None:
+        raise document.root.error(f"brings no extension {NAME}, so it is no body model of this project")
+    version = content.member("version").integer(0, 1 << 30)
+    if version != VERSION:
+        raise content.error(f"is version {version}; version {VERSION} is read here")
+    gltf = read_document(document)
+    where = content.member("skin")
+    skin = gltf.skins[where.index(len(gltf.skins), "skin")]
+    if len(skin.joints) > MAX_JOINTS:
+        raise where.error(f"{len(skin.joints)} joints, more than the {MAX_JOINTS} that are read")
+    with located(where), np.errstate(all="ignore"):
+        skeleton, bind, order = _skeleton(gltf, skin.joints)
+        _check_bind(skin.inverse_bind[order], bind, skeleton.names)
+    row = np.empty(len(order), dtype=np.int32)
+    row[order] = np.arange(len(order), dtype=np.int32)
+    listed = content.member("parts")
+    parts = tuple(_part(entry, gltf, where, row, document) for entry in listed.elements(MAX_PARTS))
+    eyes = content.get("eyes")
+    places = None if eyes is None else [each.numbers(3, -LARGEST, LARGEST) for each in eyes.elements(2)]
+    name = content.get("name")
+    with located(content), np.errstate(all="ignore"):
+        return BodyModel(
+            parts=parts,
+            skeleton=skeleton,
+            bind=bind,
+            eyes=None if places is None else np.array(places).reshape(-1, 3),
+            name="" if name is None else name.text(),
+            notes=_notes(content),
+        )
+
+
+def _notes(content: Value) -> dict[str, str]:
+    held = content.get("notes")
+    if held is None:
+        return {}
+    notes: dict[str, str] = {}
+    for key, value in held.members():
+        if len(notes) == MAX_NOTES:
+            raise held.error(f"more than the {MAX_NOTES} entries that are read")
+        notes[Value(key, held.file, held.path).text()] = value.text()
+    return notes
+
+
+def _skeleton(
+    gltf: Gltf, joints: tuple[int, ...]
+) -> tuple[Skeleton, npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """The skeleton, the bind matrices, and which of the skin's joints each of its joints is."""
+    place = {node: number for number, node in enumerate(joints)}
+    wanted = [node for node in gltf.order if node in place]  # parents first
+    row = {node: number for number, node in enumerate(wanted)}
+    parents, centres, bind = [], np.zeros((len(wanted), 3)), np.tile(np.eye(4), (len(wanted), 1, 1))
+    for number, node in enumerate(wanted):
+        shown = gltf.nodes[node]
+        unscaled = shown.scale is not None and bool((shown.scale == 1).all())
+        if shown.translation is None or shown.rotation is None or not unscaled:
+            raise ModelError(
+                f"joint {shown.name!r} (node {node}) has a matrix or a scale; it must only move and turn"
+            )
+        if shown.parent is not None and shown.parent not in row:
+            raise ModelError(
+                f"joint {shown.name!r} (node {node}) hangs on node {shown.parent}, which is no joint"
+            )
+        parent = -1 if shown.parent is None else row[shown.parent]
+        parents.append(parent)
+        centres[number] = shown.translation + (centres[parent] if parent >= 0 else 0.0)
+        bind[number, :3, :3] = rotation_matrix(shown.rotation)
+        bind[number, :3, 3] = shown.translation
+        if parent >= 0:
+            bind[number] = bind[parent] @ bind[number]
+    if not (np.abs(centres) < LARGEST).all():
+        raise ModelError(f"a joint is more than {LARGEST:g} m away")
+    names = tuple(gltf.nodes[node].name for node in wanted)
+    skeleton = Skeleton(names, np.array(parents, dtype=np.int64), centres)
+    return skeleton, bind, np.array([place[node] for node in wanted], dtype=np.int64)
+
+
+def _check_bind(
+    inverse: npt.NDArray[np.float64], bind: npt.NDArray[np.float64], names: tuple[str, ...]
+) -> None:
+    """That the mesh was modelled where the nodes stand."""
+    off = np.abs(inverse @ bind - np.eye(4)).max(axis=(1, 2))
+    if not (off < BIND_TOLERANCE).all():
+        worst = int(np.argmax(~(off < BIND_TOLERANCE)))
+        raise ModelError(
+            f"the inverse bind matrix of joint {names[worst]!r} contradicts where its node stands"
+        )
+
+
+def _part(entry: Value, gltf: Gltf, skin: Value, row: Int32, document: Document) -> BodyPart:
+    where = entry.member("node")
+    node = gltf.nodes[where.index(len(gltf.nodes), "node")]
+    if node.mesh is None or len(gltf.meshes[node.mesh].primitives) != 1:
+        raise where.error("must have a mesh of one primitive")
+    if node.skin != skin.data:
+        raise where.error(f"must be carried by skin {skin.data}")
+    primitive = gltf.meshes[node.mesh].primitives[0]
+    document.budget.charge(len(primitive.positions) * 200 + len(primitive.triangles) * 36, entry)
+    with located(entry):
+        joints, weights = _carried(primitive, row)
+        return BodyPart(
+            name=node.name,
+            kind=entry.member("kind").choice(*BODY_PART_KINDS),
+            vertices=primitive.positions,
+            triangles=primitive.triangles,
+            joints=joints,
+            weights=weights,
+            normals=primitive.normals,
+            texcoords=primitive.texcoords[0] if primitive.texcoords else None,
+            colours=primitive.colours,
+            material=material_of(entry, gltf, primitive.material),
+        )
+
+
+def _carried(primitive: Primitive, row: Int32) -> tuple[Int32, Float32]:
+    if primitive.joints is None or primitive.weights is None:
+        raise ModelError("its vertices have no joints")
+    if primitive.joints.shape[1] != INFLUENCES:
+        raise ModelError(f"{primitive.joints.shape[1]} joints a vertex, but {INFLUENCES} are read")
+    if (np.abs(primitive.positions) > LARGEST).any():
+        raise ModelError(f"a vertex is more than {LARGEST:g} m away")
+    return row[primitive.joints], primitive.weights
