@@ -26,6 +26,9 @@ Bool = npt.NDArray[np.bool_]
 
 NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
 """Shapes without which the points of the FAPU are not found."""
+ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
+LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12")
+"""Points that are not used to bend the others."""
 FREE = ("7.1", "11.5")
 """Points that stand on no surface."""
 OUTSIDE = 0.2
@@ -136,20 +139,34 @@ def _lids(shapes: _Shapes, eye: tuple[Float64, float, Float64], side: str) -> di
     centre, radius, _ = eye
     blink = shapes["eyeBlinkLeft" if side == "left" else "eyeBlinkRight"]
     vertices = shapes.vertices
-    near = np.linalg.norm(vertices - centre, axis=1) < 1.6 * radius
-    column = near & (np.abs(vertices[:, 0] - centre[0]) < 0.35 * radius) & (vertices[:, 2] > centre[2])
+    distance = np.linalg.norm(vertices - centre, axis=1)
+    near = distance < 1.3 * radius
+    column = (
+        (distance < 1.6 * radius)
+        & (np.abs(vertices[:, 0] - centre[0]) < 0.35 * radius)
+        & (vertices[:, 2] > centre[2])
+    )
     upper_side = column & (vertices[:, 1] > centre[1] - 0.2 * radius)
     fall = np.where(upper_side, -blink[:, 1], -np.inf)
-    # several rows of a margin fall as far; the lowest of those is the edge
+    # several rows of a margin fall as far; its edge is the lowest and foremost of those
     far = fall > 0.9 * fall.max()
     off = np.abs(vertices[:, 0] - centre[0])
-    upper = int(np.where(far, vertices[:, 1] + 0.5 * off, np.inf).argmin())
+    edge = vertices[:, 1] - 0.5 * vertices[:, 2]
+    upper = int(np.where(far, edge + 0.5 * off, np.inf).argmin())
     closed = vertices[upper] + blink[upper]
     rest = column & (vertices[:, 1] < vertices[upper, 1]) & (-blink[:, 1] < 0.4 * fall.max())
     meets = np.where(rest, np.linalg.norm(vertices + blink - closed, axis=1), np.inf)
-    lower = int(meets.argmin())
+    close = meets < meets.min() + 0.1 * radius
+    edge = vertices[:, 1] + 0.5 * vertices[:, 2]
+    lower = int(np.where(close, edge - 0.5 * off, -np.inf).argmax())
     names_ = ("3.1", "3.3") if side == "left" else ("3.2", "3.4")
     found = {names_[0]: vertices[upper], names_[1]: vertices[lower]}
+    # the corners are as far aside as a blink takes the lid along
+    size = np.linalg.norm(blink, axis=1)
+    taken = near & (vertices[:, 2] > centre[2]) & (size > 0.1 * size[upper])
+    corners = ("3.7", "3.11") if side == "left" else ("3.8", "3.12")
+    for corner, way in zip(corners, (1.0, -1.0), strict=True):
+        found[corner] = vertices[int(np.where(taken, way * vertices[:, 0], -np.inf).argmax())]
     opening = vertices[upper, 1] - vertices[lower, 1]
     if not opening > 0:
         raise ModelError(f"the lids of the {side} eye were not found: the shape of its blink opens it")
@@ -242,7 +259,7 @@ def _warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
             have, lack = (left, right) if left in known else (right, left)
             known[lack] = known[have] * (-1, 1, 1) + (2 * middle, 0, 0)
     # pupils lie behind the lids or before them, as the iris is made; they say nothing of the skin
-    held = [name for name in known if name not in ("3.5", "3.6")]
+    held = [name for name in known if name not in LOCAL]
     scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
     source = np.array([adult[row[name]] for name in held])
     target = np.array([known[name] for name in held]) / scale
@@ -256,11 +273,12 @@ def _warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
         if name in FREE:
             continue
         # what was found is a vertex, or lies on the profile between some
-        pool = (kinds_of(name), name in known)
+        pool = (*kinds_of(name), ROWS.get(name, ""), str(name in known))
         if pool not in trees:
-            fit = [piece for piece in pieces if piece.part.kind in pool[0]]
+            fit = [piece for piece in pieces if piece.part.kind in kinds_of(name)]
+            fit = [piece for piece in fit if piece.part.name == ROWS.get(name, piece.part.name)]
             chosen = [
-                piece.part.vertices.astype(np.float64) if pool[1] else _outside(piece, centre)
+                piece.part.vertices.astype(np.float64) if name in known else _outside(piece, centre)
                 for piece in fit
             ]
             trees[pool] = cKDTree(np.concatenate(chosen)) if chosen else None
