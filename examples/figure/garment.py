@@ -15,6 +15,10 @@ COLOUR = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 AXIS = -0.088
 THICK = 0.0038
+AROUND = 84
+BAND = ((0.004, -0.003), (0.0, 0.0012), (-0.0012, 0.0036), (0.0008, 0.0064), (0.006, 0.0078),
+        (0.0115, 0.0076), (0.0130, 0.0040))  # fmt: skip
+"""The collar's profile: below the neckline, out of the skin; metres."""
 LOWEST = -0.36
 WIDEST = 0.225
 
@@ -22,7 +26,11 @@ WIDEST = 0.225
 def neckline(places: Float64) -> Float64:
     """(N,) height of the neckline in the direction of places (N, 3), metres, head frame."""
     turn = np.arctan2(np.abs(places[:, 0]), places[:, 2] - AXIS)
-    return np.interp(np.degrees(turn), [0, 40, 75, 110, 180], [-0.181, -0.174, -0.150, -0.136, -0.131])
+    from scipy.interpolate import PchipInterpolator
+
+    degrees = np.array([-75, -40, 0, 40, 75, 110, 180, 250])
+    heights = np.array([-0.150, -0.172, -0.183, -0.172, -0.150, -0.136, -0.131, -0.136])
+    return PchipInterpolator(degrees, heights)(np.degrees(turn))
 
 
 def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
@@ -48,7 +56,8 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     rim = _rim(torso)
     top = rim[torso.vertices[rim, 1] > -0.21]
     vertices = torso.vertices.copy()
-    vertices[top] = _on_neckline(_in_order(torso, top), whole_skin)
+    rim_places = _in_order(torso, top)
+    vertices[top] = _on_skin(rim_places, neckline(rim_places) - 0.006, whole_skin)
     turn = np.arctan2(vertices[top, 0], vertices[top, 2] - AXIS)
     outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
     for _ in range(4):  # the rows below follow
@@ -62,13 +71,32 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     for _ in range(5):
         smoothed = _averaged(fallen, torso.edges)
         fallen = np.where(hang > 0, fallen * (1 - 0.7 * hang) + smoothed * 0.7 * hang, fallen)
-    # The collar turns in at its edge.
-    edges = [tuple(edge) for edge in _open_edges(torso) if edge[0] in set(top) and edge[1] in set(top)]
-    inner = {vertex: len(fallen) + k for k, vertex in enumerate(top.tolist())}
-    band = fallen[top] - outward[top] * (THICK + 0.003) + (0.0, -0.002, 0.0)
-    strip = [[a, b, inner[b]] for a, b in edges] + [[a, inner[b], inner[a]] for a, b in edges]
-    colours = np.tile([*COLOUR, 0.06], (len(fallen) + len(band), 1))
-    return np.concatenate([fallen, band]), np.concatenate([triangles, np.array(strip)[:, ::-1]]), colours
+    collar, band = _collar(whole_skin, len(fallen))
+    colours = np.tile([*COLOUR, 0.06], (len(fallen) + len(collar), 1))
+    colours[len(fallen) :, :3] *= 0.82
+    return np.concatenate([fallen, collar]), np.concatenate([triangles, band]), colours
+
+
+def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
+    """A ribbed band along the neckline, over the edge of the cloth; start: number of its first vertex."""
+    from scipy.ndimage import gaussian_filter1d
+
+    turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+    ring = np.stack([np.sin(turn), np.zeros(AROUND), np.cos(turn)], axis=1)
+    rows = []
+    for down, out in BAND:
+        at = ring + np.array([0.0, 0.0, AXIS])
+        place = _on_skin(at, neckline(at) - down, skin)
+        away = np.hypot(place[:, 0], place[:, 2] - AXIS)
+        tight = np.maximum(gaussian_filter1d(away, 4.0, mode="wrap"), away - 0.0015)  # no lumps
+        tight = gaussian_filter1d(tight, 1.5, mode="wrap") + out
+        rows.append(
+            np.stack([ring[:, 0] * tight, place[:, 1] + out * 0.25, AXIS + ring[:, 2] * tight], axis=1)
+        )
+    grid = start + np.arange(len(BAND) * AROUND).reshape(len(BAND), AROUND)
+    after = np.roll(grid, -1, axis=1)
+    quads = np.stack([grid[:-1], grid[1:], after[1:], grid[:-1], after[1:], after[:-1]], axis=-1)
+    return np.concatenate(rows), quads.reshape(-1, 3)
 
 
 def _in_order(torso: figure.Surface, top: Int64) -> Float64:
@@ -94,8 +122,8 @@ def _in_order(torso: figure.Surface, top: Int64) -> Float64:
     return moved[[row[int(vertex)] for vertex in top]]
 
 
-def _on_neckline(places: Float64, skin: Float64) -> Float64:
-    """Places moved up or down the skin onto the neckline."""
+def _on_skin(places: Float64, height: Float64, skin: Float64) -> Float64:
+    """The skin of the neck in the direction of places (N, 3) from its axis, at heights (N,)."""
     from scipy.interpolate import LinearNDInterpolator
 
     def around(points: Float64) -> Float64:
@@ -105,7 +133,7 @@ def _on_neckline(places: Float64, skin: Float64) -> Float64:
     chart = np.stack([around(neck), neck[:, 1]], axis=1)
     chart = np.concatenate([chart + np.array([turn, 0]) for turn in (-2 * np.pi, 0, 2 * np.pi)])
     away = np.tile(np.hypot(neck[:, 0], neck[:, 2] - AXIS), 3)
-    turn, height = around(places), neckline(places)
+    turn = around(places)
     radius = LinearNDInterpolator(chart, away)(turn, height)
     radius = np.where(np.isfinite(radius), radius, np.hypot(places[:, 0], places[:, 2] - AXIS))
     return np.stack([radius * np.sin(turn), height, AXIS + radius * np.cos(turn)], axis=1)

@@ -36,7 +36,7 @@ def scalp(places: Float64, soft: float = 0.004) -> Float64:
     slope = height.derivative()(around) * 180 / np.pi / 0.08
     above = (places[:, 1] - height(around)) / np.sqrt(1 + slope**2)
     ear = (np.abs(places[:, 0]) > 0.0765) & (places[:, 1] < 0.006)
-    ear &= (places[:, 2] > -0.122) & (places[:, 2] < -0.072)
+    ear &= (places[:, 2] > -0.122) & (places[:, 2] < -0.100)
     return np.where(ear, 0.0, smooth(above / soft + 0.5))
 
 

@@ -176,6 +176,7 @@ def _finish(surface: Refined, where: sculpt.Marks) -> Float64:
     oily = 1 - sculpt.smooth(np.abs(surface.vertices[:, 0]) / 0.03)
     oily = oily * sculpt.smooth((z + 0.01) / 0.02) * sculpt.smooth((y + 0.05) / 0.03)
     gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
+    gloss -= 0.2 * sculpt.smooth((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.16 * cropped
     colours[:, :3] *= (1.0 / (1 + 0.35 * depth))[:, None]
     colours[(ring < -8) & near, :3] *= 0.5
