@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fba.face import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face import EXPRESSION_NAMES, VISEME_NAMES, Definitions, FaceModel
 from fba.parameters import fap_numbers, faps
 
 VISEMES = dict(enumerate(VISEME_NAMES))
@@ -248,3 +248,7 @@ def test_an_expression_is_symmetric(select: int) -> None:
         if fap.left_right_mate is not None:
             sign = 1 if fap.name[:3] != "yaw" else -1
             assert row[fap.number - 1] == sign * row[fap.left_right_mate - 1]
+
+
+def test_the_built_in_head_has_them() -> None:
+    assert FaceModel.default().definitions is Definitions.default()

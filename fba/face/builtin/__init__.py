@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 @cache
 def default() -> FaceModel:
     """The built-in head; read on first use."""
+    from dataclasses import replace
+
+    from fba.face.expressions import Definitions
     from fba.face.storage import load
 
     with as_file(files(__package__) / "head.glb") as path:
-        return load(path)
+        # What a viseme looks like may be tuned without making the head anew.
+        return replace(load(path), definitions=Definitions.default())
