@@ -1,0 +1,10 @@
+"""Walking: made of four characteristic poses, and found again in captured motion.
+
+Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `characters` names who can walk,
+`detect` finds cycles and poses in any body animation, `reduce` keeps only these poses.
+"""
+
+from fba.body.gait.characters import POSES, Character, Pose, characters
+from fba.body.gait.synthesis import walk
+
+__all__ = ["POSES", "Character", "Pose", "characters", "walk"]

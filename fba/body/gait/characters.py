@@ -1,0 +1,193 @@
+"""Who walks: the four characteristic poses and the posture of a character, from poses.csv and characters.json.
+
+Digest faces-and-emotions.md, 2.3 and 2.6. A pose is half a cycle's: `stance` is the leg that carries, `swing`
+the other (in the extended pose the rear one, which swings next); the other half of the cycle has the sides
+exchanged. A cell that a character leaves empty is that of `normal`.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from fba.errors import ModelError
+
+POSES = ("extended", "recoil", "passing", "anticipation")
+LEGS = ("stance", "swing")
+CYCLE = 32
+"""Frames of the cycle in which the digest counts; the poses are 4 apart."""
+PHASES = tuple(4 * number / CYCLE for number in range(len(POSES)))
+"""When the poses come, as fractions of the cycle: 0, 12, 25 and 37 % in the digest's rounding."""
+_FIELDS = ("thigh", "knee", "foot", "out", "down", "forward")
+_MAX_DEGREES = 170.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """One leg in one pose, and the palm on its side. Degrees.
+
+    thigh: forward, against the vertical; only where the leg swings freely, elsewhere the stride says it.
+    knee: bent. foot: toes above (+) or below (-) the level, so that the ankle has what hip and knee leave:
+    0 is the digest's hip + knee = ankle. out, down, forward: where the palm is to be, from the shoulder, in
+    lengths of the arm.
+    """
+
+    thigh: float
+    knee: float
+    foot: float
+    out: float
+    down: float
+    forward: float
+
+
+@dataclass(frozen=True)
+class Pelvis:
+    """turn: degrees about y that the side of the front leg is ahead, in the extended pose (the digest's Z).
+    list: degrees about z by which the swinging side hangs, in the passing pose (the digest's Y).
+    tilt: degrees by which the whole body leans forward from the hips.
+    sway: metres to the carrying side. surge: share by which the speed rises and falls twice a cycle."""
+
+    turn: float
+    list: float
+    tilt: float
+    sway: float
+    surge: float
+
+
+@dataclass(frozen=True)
+class Spine:
+    """lumbar, thorax, neck, head: degrees bent forward. turn: degrees of the shoulders against the pelvis's
+    turn, at most; the head keeps looking ahead. lean: degrees of the chest to the carrying side. nod: degrees
+    of the head, twice a cycle."""
+
+    lumbar: float
+    thorax: float
+    neck: float
+    head: float
+    turn: float
+    lean: float
+    nod: float
+
+
+@dataclass(frozen=True)
+class Arms:
+    """up, forward: degrees of the shoulder girdle. twist: degrees of the upper arm, elbows outward.
+    wrist: degrees. curl: degrees of each finger joint."""
+
+    up: float
+    forward: float
+    twist: float
+    wrist: float
+    curl: float
+
+
+@dataclass(frozen=True)
+class Character:
+    """A way to walk.
+
+    seconds: of a cycle. stride: metres from one contact of a foot to its next. width: metres between the
+    lines of the two feet. Both for the default body, whose hips are 0.936 m high. toes_out: degrees.
+    poses: by (pose, leg), all eight.
+
+    Raises ModelError where something is missing, not finite, or no angle a person has.
+    """
+
+    name: str
+    about: str
+    seconds: float
+    stride: float
+    width: float
+    toes_out: float
+    pelvis: Pelvis
+    spine: Spine
+    arms: Arms
+    poses: Mapping[tuple[str, str], Pose]
+
+    def __post_init__(self) -> None:
+        missing = [f"{pose} {leg}" for pose in POSES for leg in LEGS if (pose, leg) not in self.poses]
+        if missing:
+            raise ModelError(f"gait character {self.name!r}: no {', '.join(missing)} in its poses")
+        for what, value, low, high in (
+            ("seconds", self.seconds, 0.2, 20.0),
+            ("stride", self.stride, 0.0, 10.0),
+            ("width", self.width, -1.0, 2.0),
+        ):
+            if not low < value < high:
+                raise ModelError(
+                    f"gait character {self.name!r}: {what} must lie within {low:g}..{high:g}, not {value!r}"
+                )
+        for place, part in (
+            ("pelvis", self.pelvis), ("spine", self.spine), ("arms", self.arms),
+            *((" ".join(key), pose) for key, pose in self.poses.items()),
+        ):  # fmt: skip
+            for field, value in vars(part).items():
+                if not (np.isfinite(value) and abs(value) <= _MAX_DEGREES):
+                    raise ModelError(
+                        f"gait character {self.name!r}: {place}, {field} must be a number of at most "
+                        f"{_MAX_DEGREES:g}, not {value!r}"
+                    )
+
+    @staticmethod
+    def named(name: str) -> Character:
+        """A character of the table; ModelError with the names that there are."""
+        known = _characters()
+        if name not in known:
+            close = difflib.get_close_matches(str(name), known, 1)
+            hint = f"did you mean {close[0]!r}? " if close else ""
+            raise ModelError(f"no gait character {name!r}; {hint}there are {', '.join(known)}")
+        return known[name]
+
+    def edited(self, pose: str, leg: str, **changes: float) -> Character:
+        """The same character with other extrema in one pose: `edited("passing", "swing", knee=80)`."""
+        if (pose, leg) not in self.poses:
+            raise ModelError(
+                f"no pose {pose!r} of a {leg!r} leg; poses are {', '.join(POSES)}, legs {', '.join(LEGS)}"
+            )
+        unknown = set(changes) - set(_FIELDS)
+        if unknown:
+            raise ModelError(f"a pose has no {sorted(unknown)[0]!r}; it has {', '.join(_FIELDS)}")
+        poses = dict(self.poses)
+        poses[pose, leg] = replace(poses[pose, leg], **changes)
+        return replace(self, poses=poses)
+
+    def curve(self, field: str) -> list[float]:
+        """A field of the poses through one cycle of a leg: eight values, from the contact of its foot on."""
+        return [getattr(self.poses[pose, leg], field) for leg in LEGS for pose in POSES]
+
+
+def characters() -> tuple[str, ...]:
+    """Names of the characters that there are, `normal` first."""
+    return tuple(_characters())
+
+
+@cache
+def _characters() -> dict[str, Character]:
+    place = files(__package__)
+    table: dict[str, Any] = json.loads((place / "characters.json").read_text(encoding="utf-8"))
+    poses: dict[tuple[str, str, str], Pose] = {}
+    for row in csv.DictReader((place / "poses.csv").read_text(encoding="utf-8").splitlines()):
+        base = poses.get(("normal", row["pose"], row["leg"]))
+        cells = {f: float(row[f]) if row[f] else getattr(base, f, 0.0) for f in _FIELDS}
+        poses[row["character"], row["pose"], row["leg"]] = Pose(**cells)
+    result = {}
+    normal = table["normal"]
+    for name, own in table.items():
+        parts = {key: {**normal[key], **own.get(key, {})} for key in ("pelvis", "spine", "arms")}
+        both = {**normal, **own}
+        result[name] = Character(
+            name,
+            *(both[key] for key in ("about", "seconds", "stride", "width", "toes_out")),
+            Pelvis(**parts["pelvis"]),
+            Spine(**parts["spine"]),
+            Arms(**parts["arms"]),
+            {(p, g): poses.get((name, p, g), poses["normal", p, g]) for p in POSES for g in LEGS},
+        )
+    return result

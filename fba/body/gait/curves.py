@@ -1,0 +1,59 @@
+"""Curves through a few values of a cycle. Phases are fractions of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+
+
+def smoothstep(value: npt.ArrayLike) -> Float:
+    """From 0 to 1 over 0..1, level at both ends."""
+    x = np.clip(np.asarray(value, dtype=np.float64), 0.0, 1.0)
+    result: Float = x * x * (3.0 - 2.0 * x)
+    return result
+
+
+def periodic(knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike) -> Float:
+    """A periodic curve that rises and falls only where its values do: flat where two neighbours are equal.
+
+    knots: increasing phases in 0..1, values: one each. Cubic pieces, tangents by Fritsch and Butland (1984).
+    """
+    x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    u = np.asarray(phase, dtype=np.float64)
+    step = np.diff(np.append(x, x[0] + 1.0))
+    slope = np.diff(np.append(y, y[0])) / step
+    before, step_before = np.roll(slope, 1), np.roll(step, 1)
+    one, two = step_before + 2.0 * step, 2.0 * step_before + step
+    turns = before * slope <= 0.0
+    safe = [np.where(turns, 1.0, s) for s in (before, slope)]
+    tangent = np.where(turns, 0.0, (one + two) / (two / safe[0] + one / safe[1]))
+    u = np.mod(u - x[0], 1.0) + x[0]
+    at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)
+    after = (at + 1) % len(x)
+    return _hermite((u - x[at]) / step[at], step[at], y[at], y[after], tangent[at], tangent[after])
+
+
+def spline(knots: npt.ArrayLike, values: Float, first: Float, last: Float, phase: npt.ArrayLike) -> Float:
+    """The cubic spline through values (K, ...) at knots (K,) that leaves and arrives with given slopes."""
+    x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    count, h = len(x), np.diff(x)
+    slope = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))
+    matrix, right = np.zeros((count, count)), np.zeros_like(y)
+    matrix[0, 0] = matrix[-1, -1] = 1.0
+    right[0], right[-1] = first, last
+    for i in range(1, count - 1):
+        matrix[i, i - 1 : i + 2] = h[i], 2.0 * (h[i - 1] + h[i]), h[i - 1]
+        right[i] = 3.0 * (h[i] * slope[i - 1] + h[i - 1] * slope[i])
+    tangent = np.linalg.solve(matrix, right.reshape(count, -1)).reshape(y.shape)
+    u = np.asarray(phase, dtype=np.float64)
+    at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, count - 2)
+    tail = (...,) + (None,) * (y.ndim - 1)
+    return _hermite(((u - x[at]) / h[at])[tail], h[at][tail], y[at], y[at + 1], tangent[at], tangent[at + 1])
+
+
+def _hermite(s: Float, step: Float, y0: Float, y1: Float, d0: Float, d1: Float) -> Float:
+    t = 1.0 - s
+    result: Float = t * t * ((1 + 2 * s) * y0 + s * step * d0) + s * s * ((1 + 2 * t) * y1 - t * step * d1)
+    return result
