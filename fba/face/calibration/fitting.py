@@ -49,7 +49,8 @@ def fit(
     middle between the pupils stays where the model has it.
 
     tables: how the model's FaceDefTables follow: "carry" bends them with the surface, "author" makes new
-    ones, "auto" carries them and makes new ones where the carried break more of the standard's rules.
+    ones, "auto" carries them, and where they break more of the standard's rules than the model did, makes new
+    ones and takes for each FAP what serves it better.
     name: of the fitted model, by default the model's own.
 
     FbaWarning for what was odd: left and right swapped, a point out of place and left out, an open mouth.
@@ -222,16 +223,25 @@ def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) ->
 
     if not model.tables:
         return fitted
+    if how == "author":
+        return _authored(model, fitted)
     carried = replace(fitted, tables=carried_tables(model, fitted.parts, fitted.points, fitted.fapu, shape))
-    if how == "carry":
+    if how == "carry" or _errors(carried) <= _errors(model):
         return carried
-    if how == "auto":
-        limit = _errors(model)
-        found = _errors(carried)
-        if found <= limit:
-            return carried
     anew = _authored(model, fitted)
-    return anew if how == "author" or _errors(anew) < found else carried
+    candidates = (anew, _best_of(anew, carried), carried)
+    return min(candidates, key=_errors)
+
+
+def _best_of(first: FaceModel, second: FaceModel) -> FaceModel:
+    """The first model's tables, but the second's for every FAP that they serve better."""
+    chosen = {table.fap: table for table in first.tables}
+    for table in second.tables:
+        number = table.fap
+        if number not in chosen or _errors(second, number) < _errors(first, number):
+            chosen[number] = table
+    lost = {number: why for number, why in first.lost.items() if number not in chosen}
+    return first.with_tables(tuple(chosen.values()), lost)
 
 
 def _authored(model: FaceModel, fitted: FaceModel) -> FaceModel:
@@ -250,10 +260,11 @@ def _authored(model: FaceModel, fitted: FaceModel) -> FaceModel:
     return made.with_tables(served, {**made.lost, **model.lost})
 
 
-def _errors(model: FaceModel) -> int:
+def _errors(model: FaceModel, fap: int | None = None) -> int:
     from fba.face.checks import check_faps
 
-    return sum(finding.severity == "error" for finding in check_faps(model))
+    findings = check_faps(model, None if fap is None else [fap])
+    return sum(finding.severity == "error" for finding in findings)
 
 
 def _told(aligned: Alignment, known: Bool, added: tuple[str, ...]) -> str:
