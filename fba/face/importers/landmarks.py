@@ -151,7 +151,7 @@ def _lids(shapes: _Shapes, eye: tuple[Float64, float, Float64], side: str) -> di
     # several rows of a margin fall as far; its edge is the lowest and foremost of those
     far = fall > 0.9 * fall.max()
     off = np.abs(vertices[:, 0] - centre[0])
-    edge = vertices[:, 1] - 0.5 * vertices[:, 2]
+    edge = vertices[:, 1] - 0.2 * vertices[:, 2]
     upper = int(np.where(far, edge + 0.5 * off, np.inf).argmin())
     closed = vertices[upper] + blink[upper]
     rest = column & (vertices[:, 1] < vertices[upper, 1]) & (-blink[:, 1] < 0.4 * fall.max())

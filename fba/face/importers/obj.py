@@ -36,6 +36,7 @@ class _Reader:
         self.group = array("i")
         self.groups: dict[tuple[str, str], int] = {}
         self.names = ["", ""]
+        self.line = 0
 
     def read(self) -> Polygons:
         handlers = {"v": self._vertex, "vt": self._texcoord, "f": self._face}
@@ -52,7 +53,8 @@ class _Reader:
                 continue
             key = tokens[0]
             if key in handlers:
-                handlers[key](tokens[1:], f"{self.path}:{line}")
+                self.line = line
+                handlers[key](tokens)
             elif key in ("g", "o"):
                 self.names[0] = " ".join(tokens[1:])
             elif key == "usemtl":
@@ -79,45 +81,62 @@ class _Reader:
             else None,
         )
 
-    def _vertex(self, tokens: list[str], where: str) -> None:
-        if len(self.positions) // 3 >= MAX_VERTICES:
-            raise ModelError(f"{where}: more than {MAX_VERTICES} vertices; reduce the mesh to its head")
-        if len(tokens) < 3:
-            raise ModelError(f"{where}: a vertex needs three numbers, not {len(tokens)}")
-        self.positions.extend(number(token, where, "a coordinate") for token in tokens[:3])
-        if len(tokens) >= 6:
-            self.colours.extend(min(max(number(t, where, "a colour"), 0.0), 1.0) for t in tokens[3:6])
+    @property
+    def where(self) -> str:
+        """The place that is being read, for errors."""
+        return f"{self.path}:{self.line}"
 
-    def _texcoord(self, tokens: list[str], where: str) -> None:
-        if len(self.texcoords) // 2 >= 4 * MAX_VERTICES:
-            raise ModelError(f"{where}: more than {4 * MAX_VERTICES} texture coordinates")
-        if len(tokens) < 2:
-            raise ModelError(f"{where}: a texture coordinate needs two numbers, not {len(tokens)}")
-        self.texcoords.extend(number(token, where, "a texture coordinate") for token in tokens[:2])
+    def _numbers(self, tokens: list[str], what: str) -> list[float]:
+        try:
+            found = [float(token) for token in tokens]
+            if sum(map(abs, found)) < 1e30:
+                return found
+        except ValueError:
+            pass
+        return [number(token, self.where, what) for token in tokens]
 
-    def _face(self, tokens: list[str], where: str) -> None:
+    def _vertex(self, tokens: list[str]) -> None:
+        if len(self.positions) >= 3 * MAX_VERTICES:
+            raise ModelError(f"{self.where}: more than {MAX_VERTICES} vertices; reduce the mesh to its head")
+        if len(tokens) < 4:
+            raise ModelError(f"{self.where}: a vertex needs three numbers, not {len(tokens) - 1}")
+        self.positions.extend(self._numbers(tokens[1:4], "a coordinate"))
+        if len(tokens) >= 7:
+            self.colours.extend(min(max(c, 0.0), 1.0) for c in self._numbers(tokens[4:7], "a colour"))
+
+    def _texcoord(self, tokens: list[str]) -> None:
+        if len(self.texcoords) >= 8 * MAX_VERTICES:
+            raise ModelError(f"{self.where}: more than {4 * MAX_VERTICES} texture coordinates")
         if len(tokens) < 3:
-            raise ModelError(f"{where}: a face needs at least three corners, not {len(tokens)}")
+            raise ModelError(f"{self.where}: a texture coordinate needs two numbers, not {len(tokens) - 1}")
+        self.texcoords.extend(self._numbers(tokens[1:3], "a texture coordinate"))
+
+    def _face(self, tokens: list[str]) -> None:
+        if len(tokens) < 4:
+            raise ModelError(f"{self.where}: a face needs at least three corners, not {len(tokens) - 1}")
         if len(self.group) >= MAX_FACES or len(self.corners) + len(tokens) > MAX_CORNERS:
-            raise ModelError(f"{where}: more than {MAX_FACES} faces or {MAX_CORNERS} corners")
+            raise ModelError(f"{self.where}: more than {MAX_FACES} faces or {MAX_CORNERS} corners")
         vertices, coords = len(self.positions) // 3, len(self.texcoords) // 2
-        for token in tokens:
+        for token in tokens[1:]:
             vertex, _, rest = token.partition("/")
-            self.corners.append(self._index(vertex, vertices, where, "vertex"))
+            self.corners.append(self._index(vertex, vertices, "vertex"))
             coord = rest.partition("/")[0]
-            self.coords.append(self._index(coord, coords, where, "texture coordinate") if coord else -1)
+            self.coords.append(self._index(coord, coords, "texture coordinate") if coord else -1)
         self.starts.append(len(self.corners))
         self.group.append(self.groups.setdefault((self.names[0], self.names[1]), len(self.groups)))
 
-    def _index(self, token: str, count: int, where: str, what: str) -> int:
-        index = whole_number(token, where, f"the number of a {what}")
+    def _index(self, token: str, count: int, what: str) -> int:
+        index = int(token) if token.isdecimal() and len(token) < 9 else self._signed(token, what)
         place = index - 1 if index > 0 else count + index
         if index == 0 or not 0 <= place < count:
             raise ModelError(
-                f"{where}: {what} {index} does not exist; {count} were defined before this line, "
+                f"{self.where}: {what} {index} does not exist; {count} were defined before this line, "
                 "counted from 1, or from -1 backwards"
             )
         return place
+
+    def _signed(self, token: str, what: str) -> int:
+        return whole_number(token, self.where, f"the number of a {what}")
 
 
 def _linear(colour: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
