@@ -16,9 +16,9 @@ import numpy.typing as npt
 from fba.errors import ModelError
 from fba.face.authoring.shape_names import canonical, fap_of
 from fba.face.eyeball import sphere
-from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
 from fba.face.importers.pieces import Piece
 from fba.face.importers.profile import profile_points
+from fba.face.importers.warping import warped
 from fba.parameters import faps
 
 Float64 = npt.NDArray[np.float64]
@@ -26,19 +26,12 @@ Bool = npt.NDArray[np.bool_]
 
 NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
 """Shapes without which the points of the FAPU are not found."""
-ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
-LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12")
-"""Points that are not used to bend the others."""
-FREE = ("7.1", "11.5")
-"""Points that stand on no surface."""
 OUTSIDE = 0.2
 """Skin of the face whose normal goes less than this forward is the inside of the mouth, or an ear."""
 MOST_IN_COLUMN = 3000
 """So many vertices of one column of the face are compared with each other."""
 PARTED = 0.25
 """Lips go apart by more than this share of the jaw's way."""
-SMOOTHING = 0.1
-"""How little the bending minds single points: some lie at one place on the adult head, apart on another."""
 FEWEST_FAPS = 20
 """From so many shapes named after FAPs on, the points are where these move most."""
 
@@ -57,7 +50,26 @@ def find_points(pieces: Sequence[Piece], path: str) -> Float64:
     for name, side in (("3.5", "left"), ("3.6", "right")):
         found[name] = eyes[side][2]
     found |= profile_points(skin[0].part, found)
-    return _warped(pieces, found)
+    return warped(pieces, found | _tongue(pieces, found))
+
+
+def _tongue(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> dict[str, Float64]:
+    """Tip, middle and borders of a tongue: its foremost place, and what is behind it."""
+    tongues = [piece.part.vertices for piece in pieces if piece.part.kind == "tongue"]
+    if not tongues:
+        return {}
+    vertices = np.concatenate(tongues).astype(np.float64)
+    apart = float(found["3.5"][0] - found["3.6"][0])
+    aside = vertices[:, 0] - float(found["3.5"][0] + found["3.6"][0]) / 2
+    middle = np.abs(aside) < max(0.03 * apart, float(np.abs(aside).min()) * 1.001)
+    tip = vertices[int(np.where(middle, vertices[:, 2], -np.inf).argmax())]
+    body = np.abs(vertices[:, 2] - tip[2] + apart / 3) < 0.12 * apart
+    if not (body & middle).any():
+        return {"6.1": tip}
+    points = {"6.1": tip, "6.2": vertices[int(np.where(body & middle, vertices[:, 1], -np.inf).argmax())]}
+    points["6.3"] = vertices[int(np.where(body, aside, -np.inf).argmax())]
+    points["6.4"] = vertices[int(np.where(body, -aside, -np.inf).argmax())]
+    return points
 
 
 class _Shapes:
@@ -242,55 +254,3 @@ def _lip_pair(
     upper = np.where(around & (falls < half), places[:, 1], np.inf)
     lower = np.where(around & (falls >= half), places[:, 1], -np.inf)
     return int(column[int(upper.argmin())]), int(column[int(lower.argmax())])
-
-
-def _warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
-    """All points: the adult head's, bent to those found, each then on the nearest surface of its kind."""
-    from scipy.interpolate import RBFInterpolator
-    from scipy.spatial import cKDTree
-
-    from fba.face.authoring.binding import kinds_of
-
-    row, adult = row_of(), neutral_points()
-    known = dict(found)
-    middle = (known["3.5"] + known["3.6"])[0] / 2
-    for left, right in MIRRORED.items():
-        if (left in known) != (right in known):
-            have, lack = (left, right) if left in known else (right, left)
-            known[lack] = known[have] * (-1, 1, 1) + (2 * middle, 0, 0)
-    # pupils lie behind the lids or before them, as the iris is made; they say nothing of the skin
-    held = [name for name in known if name not in LOCAL]
-    scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
-    source = np.array([adult[row[name]] for name in held])
-    target = np.array([known[name] for name in held]) / scale
-    warp = RBFInterpolator(source, target, kernel="linear", degree=1, smoothing=SMOOTHING)
-    points: Float64 = warp(adult) * scale
-    centre = points[[row["3.5"], row["3.6"], row["7.1"]]].mean(axis=0)
-    trees = {}
-    for name in names():
-        if name in known:
-            points[row[name]] = known[name]
-        if name in FREE:
-            continue
-        # what was found is a vertex, or lies on the profile between some
-        pool = (*kinds_of(name), ROWS.get(name, ""), str(name in known))
-        if pool not in trees:
-            fit = [piece for piece in pieces if piece.part.kind in kinds_of(name)]
-            fit = [piece for piece in fit if piece.part.name == ROWS.get(name, piece.part.name)]
-            chosen = [
-                piece.part.vertices.astype(np.float64) if name in known else _outside(piece, centre)
-                for piece in fit
-            ]
-            trees[pool] = cKDTree(np.concatenate(chosen)) if chosen else None
-        tree = trees[pool]
-        points[row[name]] = np.nan if tree is None else tree.data[tree.query(points[row[name]])[1]]
-    return points
-
-
-def _outside(piece: Piece, centre: Float64) -> Float64:
-    """Vertices of a part that look away from the middle of the head: not those of sockets and throat."""
-    vertices = piece.part.vertices.astype(np.float64)
-    if piece.part.kind != "skin" or piece.part.normals is None:
-        return vertices
-    looks = np.einsum("ij,ij->i", vertices - centre, piece.part.normals)
-    return vertices[looks > 0] if (looks > 0).any() else vertices
