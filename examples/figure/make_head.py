@@ -8,7 +8,6 @@ refined about eyes, mouth and skull (`subdivide.py`); eyeballs, teeth, tongue ad
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import eyeballs
@@ -27,14 +26,12 @@ from subdivide import Refined, refine
 
 from fba.face.authoring import author
 from fba.face.compact import compact
-from fba.face.feature_points import row_of
 from fba.face.model import FaceModel, Material, Part
 from fba.face.normals import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
-NEUTRAL = TARGET.parents[1] / "neutral.csv"
 TEETH = np.array([0.0, -0.0713, 0.0823])
 """Where the edges of the middle incisors meet."""
 TONGUE = TEETH + np.array([0.0, 0.0002, -0.0022])
@@ -220,21 +217,9 @@ def head() -> FaceModel:
     return compact(author(parts, points, bound=bound, name="built-in head", notes=notes))
 
 
-def write_neutral(model: FaceModel) -> None:
-    """The feature points of the head as the neutral face of `fba.face`: left half and midline, mm."""
-    with (HERE / "points.csv").open(encoding="utf-8") as file:
-        notes = {row["point"]: row["note"] for row in csv.DictReader(file)}
-    lines = ["point,x,y,z,note"]
-    for name, note in notes.items():
-        x, y, z = np.round(model.points[row_of()[name]] * 1000, 2) + 0.0
-        lines.append(f"{name},{x:g},{y:g},{z:g},{note}")
-    NEUTRAL.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
 if __name__ == "__main__":
     made = head()
     made.save(TARGET)
-    write_neutral(made)
     print(
         f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs"
     )
