@@ -5,6 +5,7 @@ Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `character
 """
 
 from fba.body.gait.characters import POSES, Character, Pose, characters
+from fba.body.gait.measure import Soles, soles
 from fba.body.gait.synthesis import walk
 
-__all__ = ["POSES", "Character", "Pose", "characters", "walk"]
+__all__ = ["POSES", "Character", "Pose", "Soles", "characters", "soles", "walk"]

@@ -12,11 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.body.gait.anatomy import Side
+from fba.body.gait.curves import smoothstep
 from fba.body.gait.rotations import Float, about, foot_angles, limb_angles, turned, turned_back
 
 TOE_OFF = 0.6
 """Fraction of the cycle at which a foot leaves the ground."""
 _ROUNDS = 4
+_RISEN = np.sin(np.radians(12.0))
+"""Sine of the pitch of a foot whose heel is well off the ground."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +72,24 @@ def ankle_place(side: Side, footing: Footing, roll: Float | float = 0.0) -> Floa
     return footing.subtalar - turned(turn, side.subtalar)
 
 
-def reach(side: Side, hip: Float, footing: Footing, knee_yaw: float) -> Leg:
-    """The leg from a hip (T, 3) to a foot. knee_yaw: where the knee points, about +y, radians."""
+def reach(side: Side, hip: Float, footing: Footing, knee_yaw: float, level_roll: float = 0.0) -> Leg:
+    """The leg from a hip (T, 3) to a foot. knee_yaw: where the knee points, about +y, radians.
+
+    The heel hangs on the ankle, which rolls with the shin where the foot does not. So that neither heel nor
+    ball leaves its place, a flat foot turns a little about the metatarsal joint, by nothing where that roll is
+    level_roll, and less as the heel rises.
+    """
     roll: Float | float = 0.0
-    for _ in range(_ROUNDS):  # the subtalar joint's roll moves the ankle, by less each time
-        thigh, bend = side.leg.solve(ankle_place(side, footing, roll) - hip, knee_yaw)
-        leg = Leg(thigh, bend, footing.turn)
+    held = footing
+    down = smoothstep(1.0 + footing.turn[..., 1, 2] / _RISEN)
+    joint = footing.subtalar + turned(footing.turn, side.toe)
+    for _ in range(_ROUNDS):  # the subtalar joint's roll moves ankle and heel, by less each time
+        thigh, bend = side.leg.solve(ankle_place(side, held, roll) - hip, knee_yaw)
+        leg = Leg(thigh, bend, held.turn)
         _, _, roll = leg.ankle()
+        aside = side.heel[1] / (side.toe[2] - side.heel[2]) * (np.sin(roll) - np.sin(level_roll))
+        turn = about(1, down * aside) @ footing.turn
+        held = Footing(turn, joint - turned(turn, side.toe))
     return leg
 
 

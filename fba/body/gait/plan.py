@@ -26,6 +26,12 @@ _DOUBLE = TOE_OFF - 0.5
 """Fraction of the cycle over which the height goes over from the leg behind to the one in front."""
 _STRAIGHT = 0.9985
 """Share of its length that a leg keeps to: a knee is never locked."""
+_RISES = 0.33
+"""Fraction of the cycle at which a heel begins to rise."""
+_STRAIN = 0.03
+"""Share of the length of a leg by which legs that are too short may hold the body down."""
+_FREED = 4.0
+"""Metres of height a cycle at which a leg that has left the ground stops holding the body down."""
 _CLEAR = 0.012
 """Metres that a swinging foot keeps off the ground."""
 _TINY = 1e-4
@@ -53,6 +59,8 @@ class Plan:
         self._knee = np.radians(knee)
         self._yaw = np.radians(character.toes_out)
         self._ahead = self._split()
+        if self._held_down() > _STRAIN * anatomy.sides["r"].leg.reach:
+            raise self._too_long()
 
     def pitch(self, phase: Float) -> Float:
         """Of a foot at a phase of its own leg."""
@@ -152,34 +160,50 @@ class Plan:
         return ModelError(
             f"gait: a stride of {self.stride:g} m is too long for {self.character.name!r} on legs of "
             f"{self.anatomy.sides['r'].leg.reach:.2f} m; a stride is two steps, from the contact of a foot to "
-            "its next"
+            f"its next, and {self.character.stride * self.anatomy.scale:.2f} m of this character's own"
         )
 
     def root(self, phase: Float) -> Float:
         """(T, 3), place of the root: as high as the standing leg is long, over the standing foot."""
-        root = self._along(phase) - (0.0, 0.0, self._ahead)
-        half = np.mod(phase, 0.5)
-        share = smoothstep(half / _DOUBLE)
-        right_leads = np.mod(phase, 1.0) < 0.5
-        estimates = {}
-        for letter, side in self.anatomy.sides.items():
-            limit = self._root_height(side, root, phase, side.leg.bend(_STRAIGHT * side.leg.reach))
-            wanted = np.minimum(self._root_height(side, root, phase), limit)
-            estimates[letter] = (wanted, limit)
-        front = np.where(right_leads, estimates["r"][0], estimates["l"][0])
-        rear = np.where(right_leads, estimates["l"][0], estimates["r"][0])
-        rear = np.where(half < TOE_OFF - 0.5, rear, front)
-        root[..., 1] = share * front + (1.0 - share) * rear
-        for letter, (_, limit) in estimates.items():
-            stands = np.mod(self.side_phase(self.anatomy.sides[letter], phase), 1.0) <= TOE_OFF
-            root[..., 1] = np.where(stands, np.minimum(root[..., 1], limit), root[..., 1])
+        root, wanted, limit = self._heights(phase)
+        root[..., 1] = np.minimum(wanted, limit)
         return root
+
+    def _heights(self, phase: Float) -> tuple[Float, Float, Float]:
+        """The root over the ground (T, 3), the height that its poses give it, and the most its legs allow."""
+        root = self._along(phase) - (0.0, 0.0, self._ahead)
+        share = smoothstep(np.mod(phase, 0.5) / _DOUBLE)
+        right_leads = np.mod(phase, 1.0) < 0.5
+        heights, limits = {}, []
+        for letter, side in self.anatomy.sides.items():
+            heights[letter] = self._root_height(side, root, phase)
+            limit = self._root_height(side, root, phase, side.leg.bend(_STRAIGHT * side.leg.reach))
+            own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0)
+            freed = np.maximum(own - TOE_OFF, 0.0) * _FREED * self.anatomy.scale
+            limits.append(np.where(own < KNOTS[6], limit + freed, np.inf))
+        front = np.where(right_leads, heights["r"], heights["l"])
+        rear = np.where(right_leads, heights["l"], heights["r"])
+        return root, share * front + (1.0 - share) * rear, np.minimum(*limits)
+
+    def _held_down(self) -> float:
+        """Metres that the legs hold the body down at most, because they are too short for the stride."""
+        _, wanted, limit = self._heights(np.arange(2 * CYCLE) / (2 * CYCLE))
+        return float((wanted - limit).max())
 
     def standing_leg(self, side: Side, phase: Float, root: Float | None = None) -> Leg:
         """The leg while its foot is on the ground."""
         root = self.root(phase) if root is None else root
         footing = self.footing(side, phase)
-        return ground.reach(side, self.hip(side, root, phase), footing, side.way * self._yaw)
+        yaw, roll = side.way * self._yaw, side.way * self._level_roll
+        return ground.reach(side, self.hip(side, root, phase), footing, yaw, roll)
+
+    @cached_property
+    def _level_roll(self) -> float:
+        """Of the left subtalar joint as the heel is about to rise."""
+        side, at = self.anatomy.sides["l"], np.array([0.5 + _RISES])
+        hip = self.hip(side, self.root(at), at)
+        leg = ground.reach(side, hip, self.footing(side, at), self._yaw)
+        return float(leg.ankle()[2][0])
 
     @cached_property
     def _swings(self) -> dict[str, tuple[Float, Float, Float, Float]]:
@@ -223,7 +247,7 @@ class Plan:
         thigh = about(0, x) @ about(2, z) @ about(1, np.full(x.shape, yaw))
         hip = self.hip(side, root, phase)
         swinging = ground.hanging(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
-        rise = np.minimum((own - TOE_OFF) / 0.08, (1.0 - own) / 0.06)
+        rise = np.minimum((own - TOE_OFF) / 0.03, (1.0 - own) / 0.06)
         room = _CLEAR * self.anatomy.scale * np.clip(rise, 0.0, 1.0)
         lift = np.maximum(room - ground.lowest(side, swinging, self.toes(own)), 0.0)
         swinging.subtalar[..., 1] += lift
@@ -232,7 +256,7 @@ class Plan:
             np.where(stands[..., None, None], standing.turn, swinging.turn),
             np.where(stands[..., None], standing.subtalar, swinging.subtalar),
         )
-        return ground.reach(side, hip, footing, yaw)
+        return ground.reach(side, hip, footing, yaw, side.way * self._level_roll)
 
 
 __all__ = ["CYCLE", "KNOTS", "SHORTEST", "Plan"]

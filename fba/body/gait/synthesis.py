@@ -85,13 +85,15 @@ def cycle(anatomy: Anatomy, character: Character, stride: float, period: int) ->
     arms.swing(writer, anatomy, character, phase, plan.size)
     rest = anatomy.skeleton.centres[0]
     root = plan.root(phase) - rest
+    start = root[0, 2]
+    root[:, 2] -= start  # the walk begins where the body stands by default
     writer.move(root)
     # BAPs are whole millimetres: the legs start from where the root will be, so feet do not slip. Not in
     # height: half a millimetre there would bend a nearly straight knee by degrees, up and down.
     root[:, [0, 2]] = np.rint(root[:, [0, 2]] * 1e3) / 1e3
     pelvis = plan.lean(phase) @ plan.pelvis(phase)
     for side in anatomy.sides.values():
-        leg = plan.leg(side, phase, root + rest)
+        leg = plan.leg(side, phase, root + rest + (0.0, 0.0, start))
         _write_leg(writer, side.letter, pelvis, leg)
         own = plan.side_phase(side, phase)
         writer.turn(f"{side.letter}_metatarsal", 0, -plan.toes(own))
