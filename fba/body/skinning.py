@@ -60,10 +60,41 @@ class Skinner:
         method: str = "dual",
     ) -> Float32:
         """Vertices for joint matrices: see `BodyModel.skin`."""
+        return self._run(self._vertices, self._normals, matrices, out, normals, method)
+
+    def carry(
+        self,
+        vertices: Float32,
+        upright: Float32 | None,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """The same for other places (V, 3) of the vertices, and their normals (V, 3) where wanted."""
+        shape = self._vertices.shape
+        _check_target(vertices, shape, "vertices")
+        if normals is not None:
+            if upright is None:
+                raise ValueError("normals are wanted, but not given as modelled")
+            _check_target(upright, shape, "upright")
+        return self._run(
+            vertices, self._normals if upright is None else upright, matrices, out, normals, method
+        )
+
+    def _run(
+        self,
+        vertices: Float32,
+        modelled: Float32,
+        matrices: npt.ArrayLike,
+        out: Float32 | None,
+        normals: Float32 | None,
+        method: str,
+    ) -> Float32:
         if method not in METHODS:
             raise ValueError(f"no skinning method {method!r}; there are {', '.join(METHODS)}")
         frames, single = self._frames(matrices)
-        shape = (*(() if single else (len(frames),)), len(self._vertices), 3)
+        shape = (*(() if single else (len(frames),)), len(vertices), 3)
         if out is None:
             out = np.empty(shape, dtype=np.float32)
         else:
@@ -74,7 +105,7 @@ class Skinner:
                 raise ValueError("out and normals share memory; give each an array of its own")
         placed = out[None] if single else out
         upright = placed[:0] if normals is None else normals[None] if single else normals
-        mesh = (self._vertices, self._normals, self._joints, self._weights, self._counts, self._scratch)
+        mesh = (vertices, modelled, self._joints, self._weights, self._counts, self._scratch)
         with self._lock, np.errstate(all="ignore"):
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)

@@ -1,0 +1,134 @@
+"""Triangles with numbers at their corners, cut exactly along the line where a function of them is 0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+Bool = npt.NDArray[np.bool_]
+
+SNAP = 0.28
+"""A corner nearer to the line than this share of an edge is moved onto it: no slivers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cloth:
+    """vertices, normals: (V, 3). weights: (V, J). values: (V, K), what else a vertex has. triangles: (F, 3)."""
+
+    vertices: Float64
+    normals: Float64
+    weights: Float64
+    values: Float64
+    triangles: Int64
+
+    @property
+    def edges(self) -> Int64:
+        """(E, 2) each edge once."""
+        return np.unique(np.sort(_sides(self.triangles), axis=1), axis=0)
+
+    @property
+    def border(self) -> Int64:
+        """(E, 2) open edges, in the direction of their triangles."""
+        sides = _sides(self.triangles)
+        _, inverse, counts = np.unique(
+            np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
+        )
+        return sides[counts[inverse.ravel()] == 1]
+
+    def kept(self, faces: Bool) -> Cloth:
+        """Only some triangles, and the vertices that they use."""
+        used, triangles = np.unique(self.triangles[faces], return_inverse=True)
+        return replace(self._rows(used), triangles=triangles.reshape(-1, 3))
+
+    def _rows(self, rows: Int64) -> Cloth:
+        return replace(
+            self,
+            vertices=self.vertices[rows],
+            normals=self.normals[rows],
+            weights=self.weights[rows],
+            values=self.values[rows],
+        )
+
+    def blended(self, first: Int64, second: Int64, share: Float64) -> tuple[Float64, ...]:
+        """Rows between two vertices each."""
+        part = share[:, None]
+        return tuple(
+            array[first] * (1 - part) + array[second] * part
+            for array in (self.vertices, self.normals, self.weights, self.values)
+        )
+
+    def split(self, height: Float64) -> tuple[Cloth, Float64]:
+        """With vertices along the line where height (V,) is 0; and the heights, exactly 0 there."""
+        height = height.copy()
+        arrays = [self.vertices.copy(), self.normals.copy(), self.weights.copy(), self.values.copy()]
+        edges = self.edges
+        a, b = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0].T
+        share = height[a] / (height[a] - height[b])
+        # Each corner near the line goes to its nearest crossing.
+        best = np.full(len(height), SNAP)
+        for corner, at in ((a, share), (b, 1 - share)):
+            np.minimum.at(best, corner, at)
+        moved = self.blended(a, b, share)
+        for corner, at in ((a, share), (b, 1 - share)):
+            chosen = at == best[corner]
+            for array, rows in zip(arrays, moved, strict=True):
+                array[corner[chosen]] = rows[chosen]
+            height[corner[chosen]] = 0.0
+        on_line = Cloth(arrays[0], arrays[1], arrays[2], arrays[3], self.triangles)
+        a, b = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0].T
+        fresh = on_line.blended(a, b, height[a] / (height[a] - height[b]))
+        number = {pair: len(height) + k for k, pair in enumerate(zip(a.tolist(), b.tolist(), strict=True))}
+        triangles: list[list[int]] = []
+        for corners in self.triangles.tolist():
+            triangles += _cut(corners, height, number)
+        whole = [np.concatenate([old, new]) for old, new in zip(arrays, fresh, strict=True)]
+        cloth = Cloth(whole[0], whole[1], whole[2], whole[3], np.array(triangles))
+        return cloth, np.concatenate([height, np.zeros(len(a))])
+
+    def above(self, height: Float64) -> Cloth:
+        """What lies where height (V,) is positive, cut along the line where it is 0."""
+        cloth, level = self.split(height)
+        corners = level[cloth.triangles]
+        return cloth.kept((corners >= 0).all(axis=1) & (corners > 0).any(axis=1))
+
+    def smoothed(self, array: Float64, free: Float64, rounds: int) -> Float64:
+        """Rows (V, N) drawn to the mean of their neighbours, each by its share free (V,)."""
+        edges = self.edges
+        for _ in range(rounds):
+            total, count = array.copy(), np.ones((len(array), 1))
+            for a, b in (edges.T, edges[:, ::-1].T):
+                np.add.at(total, a, array[b])
+                np.add.at(count, a, 1)
+            array = array + (total / count - array) * free[:, None]
+        return array
+
+
+def _cut(corners: list[int], height: Float64, number: dict[tuple[int, int], int]) -> list[list[int]]:
+    """One triangle, cut where the line crosses it."""
+    for turn in range(3):
+        a, b, c = corners[turn:] + corners[:turn]
+        one, other = (number.get((min(pair), max(pair))) for pair in ((a, b), (c, a)))
+        if one is not None and other is not None:
+            return [[a, one, other], [one, b, c], [one, c, other]]
+    for turn in range(3):
+        a, b, c = corners[turn:] + corners[:turn]
+        middle = number.get((min(b, c), max(b, c)))
+        if middle is not None:
+            return [[a, b, middle], [a, middle, c]]
+    return [corners]
+
+
+def _sides(triangles: Int64) -> Int64:
+    return np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+
+
+def triangulated(vertices: Float64, quads: Int64) -> Int64:
+    """Two triangles of each quad, along its shorter diagonal: the same on both sides of a figure."""
+    first = np.linalg.norm(vertices[quads[:, 0]] - vertices[quads[:, 2]], axis=1)
+    second = np.linalg.norm(vertices[quads[:, 1]] - vertices[quads[:, 3]], axis=1)
+    turned = np.where((first > second + 1e-9)[:, None], np.roll(quads, -1, axis=1), quads)
+    return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])

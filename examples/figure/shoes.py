@@ -1,0 +1,204 @@
+"""Low shoes: from the outline of the sole, drawn over the foot to a ring about the ankle."""
+
+from __future__ import annotations
+
+import figure
+import numpy as np
+import numpy.typing as npt
+from clothes import Garment
+
+from fba.mesh import vertex_normals
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+LEATHER = np.array([0.030, 0.026, 0.024])
+SOLE = np.array([0.42, 0.41, 0.39])
+AROUND = 44
+ROOM = 0.007
+"""Metres between foot and outline."""
+THICK = 0.019
+"""Height of the sole."""
+SPRING = 0.007
+"""How far the tip of the sole is off the ground."""
+TOP = 0.115
+COVERED = 0.105
+"""The foot is wholly inside the shoe, or the trousers, below this."""
+UPPER = (0.0, 0.10, 0.22, 0.36, 0.50, 0.64, 0.76, 0.86, 0.94, 1.0)
+"""Where along its way from the sole to the ankle the upper has its rings."""
+
+
+def shoes(surface: figure.Surface, weights: Float64) -> Garment:
+    """Both shoes, for the figure as modelled. weights (V, J)."""
+    left = surface.vertices[:, 0] > 0
+    foot = np.flatnonzero(left & (surface.vertices[:, 1] < TOP + 0.01))
+    vertices, triangles, colours = _shoe(surface.vertices[foot])
+    carried = _carried(vertices, surface.vertices[foot], weights[foot])
+    mirror = _mirrored_joints(surface, weights)
+    other = vertices * (-1.0, 1.0, 1.0)
+    return Garment(
+        np.concatenate([vertices, other]),
+        np.concatenate([triangles, triangles[:, ::-1] + len(vertices)]),
+        np.concatenate([colours, colours]),
+        np.concatenate([carried, carried[:, mirror]]),
+        np.where(surface.vertices[:, 1] < TOP + 0.01, COVERED - surface.vertices[:, 1], -1.0),
+    )
+
+
+def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
+    """Vertices, triangles and colours of the left shoe about the vertices of a foot."""
+    low = foot[foot[:, 1] < 0.05]
+    ahead, origin = _direction(low)
+    aside = np.array([ahead[2], 0.0, -ahead[0]])
+    flat = np.stack([(low - origin) @ aside, (low - origin) @ ahead], axis=1)
+    outline = _outline(flat)
+    ring = foot[np.abs(foot[:, 1] - 0.10) < 0.012]
+    ankle = np.stack([(ring - origin) @ aside, (ring - origin) @ ahead], axis=1)
+    middle, half = (ankle.max(axis=0) + ankle.min(axis=0)) / 2, np.ptp(ankle, axis=0) / 2 + 0.005
+    around = np.arctan2(outline[:, 0] - middle[0], outline[:, 1] - middle[1])
+    top = middle + half * np.stack([np.sin(around), np.cos(around)], axis=1)
+    forward = (outline[:, 1] - outline[:, 1].min()) / np.ptp(outline[:, 1])
+    lift = SPRING * _smooth((forward - 0.70) / 0.30) ** 1.5
+    rings = [_level(outline * 1.0, lift, -0.004), _level(outline, lift, 0.0), _level(outline, lift, THICK)]
+    rings[0][:, :2] = outline - 0.004 * _outward(outline)
+    rings[0][:, 2] = lift
+    rings[1][:, 2] = lift + 0.004
+    colours = [SOLE, SOLE, SOLE]
+    welt = outline - 0.0035 * _outward(outline)
+    rings.append(_level(welt, lift, THICK))
+    colours.append(LEATHER)
+    reach = np.linalg.norm(top - welt, axis=1)
+    front = _smooth((forward - 0.55) / 0.40)
+    # Up from the welt, and in from the side of the ankle: two handles of a cubic curve.
+    rise = 0.034 + 0.006 * front
+    slope = np.minimum(0.55 * reach, 0.085)
+    for t in UPPER:
+        a, b, c, d = (1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3
+        inward = (welt - top) / np.maximum(reach, 1e-9)[:, None]
+        place = (a + b) * welt + c * (top + inward * slope[:, None]) + d * top
+        base = THICK + lift
+        handle = TOP - 0.040 + 0.004 * front
+        height = a * base + b * (base + rise) + c * handle + d * TOP
+        rings.append(np.stack([place[:, 0], place[:, 1], height], axis=1))
+        colours.append(LEATHER)
+    rings.append(np.stack([*(middle + (top - middle) * 0.6).T, np.full(AROUND, TOP - 0.004)], axis=1))
+    colours.append(LEATHER)
+    stacked = np.concatenate(rings)
+    vertices = origin + stacked[:, :1] * aside + stacked[:, 1:2] * ahead + stacked[:, 2:] * (0.0, 1.0, 0.0)
+    shown = np.repeat(np.array(colours), AROUND, axis=0)
+    triangles = _tube(len(rings))
+    # The bottom: a fan about the middle of the lowest ring.
+    bottom = len(vertices)
+    centre = vertices[:AROUND].mean(axis=0) * (1, 0, 1)
+    vertices = np.concatenate([vertices, centre[None]])
+    shown = np.concatenate([shown, SOLE[None] * 0.5])
+    k = np.arange(AROUND)
+    fan = np.stack([np.full(AROUND, bottom), (k + 1) % AROUND, k], axis=1)
+    triangles = np.concatenate([triangles, fan])
+    inside = (vertices_out(vertices, triangles) < 0).mean() > 0.5
+    triangles = triangles[:, ::-1] if inside else triangles
+    gloss = np.where(shown[:, :1] < 0.1, 0.34, 0.10)
+    return vertices, triangles, np.concatenate([shown, gloss], axis=1)
+
+
+def vertices_out(vertices: Float64, triangles: Int64) -> Float64:
+    """(V,) how far normals point away from the middle of a mesh."""
+    normals = vertex_normals(vertices, triangles)
+    return (normals * (vertices - vertices.mean(axis=0))).sum(axis=1)
+
+
+def _direction(low: Float64) -> tuple[Float64, Float64]:
+    """Unit vector ahead along the foot, level, and the middle of the foot on the ground."""
+    flat = low[:, [0, 2]] - low[:, [0, 2]].mean(axis=0)
+    _, _, axes = np.linalg.svd(flat, full_matrices=False)
+    ahead = np.array([axes[0, 0], 0.0, axes[0, 1]])
+    ahead *= np.sign(ahead[2])
+    middle = low.mean(axis=0) * (1, 0, 1)
+    return ahead, middle
+
+
+def _outline(flat: Float64) -> Float64:
+    """(AROUND, 2) the sole's outline about places (N, 2), evenly along, counter-clockwise from above."""
+    from scipy.spatial import ConvexHull
+
+    hull = flat[ConvexHull(flat).vertices]
+    closed = np.concatenate([hull, hull[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    fine = np.linspace(0, along[-1], 400, endpoint=False)
+    places = np.stack([np.interp(fine, along, closed[:, k]) for k in (0, 1)], axis=1)
+    # A shoe is drawn in at its waist, and rounder than toes.
+    forward = (places[:, 1] - places[:, 1].min()) / np.ptp(places[:, 1])
+    middle = np.interp(places[:, 1], *_spine(places))
+    waist = 1 - 0.10 * np.exp(-(((forward - 0.42) / 0.16) ** 2))
+    places[:, 0] = middle + (places[:, 0] - middle) * waist
+    places = places + ROOM * _outward(places)
+    for _ in range(60):
+        places = 0.5 * places + 0.25 * (np.roll(places, 1, axis=0) + np.roll(places, -1, axis=0))
+    steps = np.linalg.norm(np.diff(places, axis=0, append=places[:1]), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    closed = np.concatenate([places, places[:1]])
+    even = np.linspace(0, along[-1], AROUND, endpoint=False)
+    return np.stack([np.interp(even, along, closed[:, k]) for k in (0, 1)], axis=1)
+
+
+def _spine(places: Float64) -> tuple[Float64, Float64]:
+    """Levels along the foot, and the middle between both sides there."""
+    levels = np.linspace(places[:, 1].min(), places[:, 1].max(), 12)
+    middles = []
+    for level in levels:
+        near = places[np.abs(places[:, 1] - level) < 0.02, 0]
+        middles.append((near.min() + near.max()) / 2)
+    return levels, np.array(middles)
+
+
+def _outward(outline: Float64) -> Float64:
+    """(N, 2) unit normals of a closed outline, away from its middle."""
+    tangent = np.roll(outline, -1, axis=0) - np.roll(outline, 1, axis=0)
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    sign = np.sign((normal * (outline - outline.mean(axis=0))).sum())
+    return normal * sign
+
+
+def _level(outline: Float64, lift: Float64, height: float) -> Float64:
+    return np.stack([outline[:, 0], outline[:, 1], lift + height], axis=1)
+
+
+def _tube(rings: int) -> Int64:
+    """Triangles between rings."""
+    k = np.arange(AROUND)
+    after = (k + 1) % AROUND
+    found = []
+    for ring in range(rings - 1):
+        a, b = ring * AROUND, (ring + 1) * AROUND
+        found += [
+            np.stack([a + k, a + after, b + after], axis=1),
+            np.stack([a + k, b + after, b + k], axis=1),
+        ]
+    return np.concatenate(found)
+
+
+def _carried(places: Float64, foot: Float64, weights: Float64) -> Float64:
+    """(N, J) weights of the nearest places of the foot, evened."""
+    from scipy.spatial import cKDTree
+
+    away, rows = cKDTree(foot).query(places, k=12)
+    share = 1 / (away + 0.01) ** 2
+    share /= share.sum(axis=1, keepdims=True)
+    return np.einsum("nk,nkj->nj", share, weights[rows])
+
+
+def _mirrored_joints(surface: figure.Surface, weights: Float64) -> Int64:
+    from fba.body import Skeleton
+
+    names = list(Skeleton.default().names)
+    return np.array([names.index(_other(name)) for name in names])
+
+
+def _other(name: str) -> str:
+    return {"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]
+
+
+def _smooth(value: Float64) -> Float64:
+    t = np.clip(value, 0.0, 1.0)
+    return t * t * (3 - 2 * t)

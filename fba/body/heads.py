@@ -1,0 +1,248 @@
+"""A face on a body: its vertices carried by neck and skull, so that both are one skin."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.model import INFLUENCES, BodyModel, BodyPart, checked_weights
+from fba.body.skinning import Skinner
+from fba.errors import ModelError
+from fba.mesh import float_rows
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+Int64 = npt.NDArray[np.int64]
+
+SKULL = "skullbase"
+"""The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
+SAME_SIZE = 0.005
+"""Sizes that differ by less than this share are taken as the same."""
+NEAR, FAR = 0.012, 0.045
+"""Metres from the body's neck: up to the first a vertex moves as the neck there, beyond the second with the
+skull alone."""
+NEIGHBOURS = 4
+SEAM = 0.002
+"""A face whose vertices come this close (m) to those of the body's neck brings its own neck."""
+
+
+class HeadOnBody:
+    """Carries a face with a body's joints.
+
+    body: a model with a place for pupils. vertices: (V, 3), the neutral face, in its own frame and unit.
+    eyes: (2, 3), its pupils, feature points 3.5 and 3.6. skull: (V,), vertices that go with the skull alone
+    wherever they are (eyes, teeth, tongue), none by default.
+
+    The face is set between the pupils of the body, sized by their distance. Its vertices near the body's
+    neck (its part of kind "neck", as modelled) take that neck's weights, others move with the skull.
+
+    Raises ModelError for a body without pupils or a face whose eyes are no two places.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        vertices: npt.ArrayLike,
+        eyes: npt.ArrayLike,
+        skull: npt.NDArray[np.bool_] | None = None,
+    ) -> None:
+        places = float_rows(vertices, (-1, 3), "a face on a body: vertices")
+        self._skull = skull_of(body)
+        self.place = placement(body, eyes)
+        """float64 (4, 4): the face's frame into the body's, as modelled."""
+        self._size = float(self.place[0, 0])
+        self._shift = self.place[:3, 3].astype(np.float32)
+        placed = places.astype(np.float64) * self._size + self.place[:3, 3]
+        neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
+        joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
+        weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
+        joints[:, 0], weights[:, 0] = self._skull, 1.0
+        self.hidden: npt.NDArray[np.bool_] = np.zeros(len(places), dtype=bool)
+        """(V,): vertices beyond the lower edge of the body's neck, which its clothes hide."""
+        self.brings_neck = not neck
+        """Whether the face has a neck that meets the body, whose own then is not to be shown."""
+        if neck:
+            from scipy.spatial import cKDTree
+
+            anchors = np.concatenate([part.vertices for part in neck])
+            dense = _dense(neck, len(body.skeleton))
+            free = np.ones(len(places), dtype=bool) if skull is None else ~np.asarray(skull)
+            joints[free], weights[free] = _nearest(
+                cKDTree(anchors), dense, placed[free], self._skull, len(body.skeleton)
+            )
+            edge, outward = _lower_edge(anchors, neck)
+            if len(edge) and len(placed):
+                low = np.setdiff1d(np.flatnonzero(anchors[:, 1] < anchors[:, 1].mean()), edge)
+                away = cKDTree(placed).query(anchors[low])[0] if len(low) else np.full(1, np.inf)
+                self.brings_neck = bool(np.median(away) < SEAM)
+                self.hidden = _beyond(cKDTree(anchors), edge, outward, anchors, placed)
+        self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(places))
+        self._below = _descendants(body, self._skull)
+        self._bind = body.bind
+        self._inverse = np.linalg.inv(body.bind)
+        self._skinner = Skinner(
+            placed.astype(np.float32),
+            np.tile(np.float32([0, 0, 1]), (len(places), 1)),
+            self.joints,
+            self.weights,
+            body.bind,
+            body.skeleton.parents,
+        )
+        self._placed = np.empty((len(places), 3), dtype=np.float32)
+
+    def matrices(self, matrices: npt.ArrayLike, turn: npt.ArrayLike) -> Float64:
+        """Joint matrices (J, 4, 4) of the body with the head turned on its skull base.
+
+        turn: (4, 4), as `fba.face.Deformer.head_matrices` gives it, in the face's frame. FAPs turn the head
+        relative to what BAPs do to the skull base.
+        """
+        turned: Float64 = np.array(matrices, dtype=np.float64)
+        within = self.place @ np.asarray(turn, dtype=np.float64) @ np.linalg.inv(self.place)
+        if np.array_equal(within, np.eye(4)):
+            return turned
+        skull = turned[self._skull]
+        motion = skull @ self._inverse[self._skull] @ within @ self._bind[self._skull] @ np.linalg.inv(skull)
+        turned[self._below] = motion @ turned[self._below]
+        return turned
+
+    def frame(self, matrices: npt.ArrayLike) -> Float64:
+        """(4, 4): the face's frame into the world, for what moves with the skull alone."""
+        skull = np.asarray(matrices, dtype=np.float64)[self._skull]
+        frame: Float64 = skull @ self._inverse[self._skull] @ self.place
+        return frame
+
+    def skin(
+        self,
+        local: Float32,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        *,
+        upright: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """The face on the body: float32 (V, 3), metres.
+
+        local: float32 (V, 3), the face moved by its FAPs in its own frame without the head's turn
+        (`Deformer.local`). matrices: (J, 4, 4), with the head's turn (`matrices`). out: written to and
+        returned. upright: float32 (V, 3), normals of the face in its own frame; normals: filled with those
+        on the body. method: as of `BodyModel.skin`.
+        """
+        np.multiply(local, np.float32(self._size), out=self._placed)
+        self._placed += self._shift
+        return self._skinner.carry(self._placed, upright, matrices, out, normals, method)
+
+
+def skull_of(body: BodyModel) -> int:
+    """Number of the joint that carries the head: the skull base, or the highest joint where there is none."""
+    if SKULL in body.skeleton:
+        return body.skeleton.number(SKULL)
+    return int(body.bind[:, 1, 3].argmax())
+
+
+def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
+    """float64 (4, 4): from a face's frame to the body's as modelled. eyes: (2, 3), the face's pupils."""
+    if body.eyes is None:
+        raise ModelError(f"the body {body.name!r} has no pupils, so there is no place for a face on it")
+    given = np.array(eyes, dtype=np.float64)
+    if given.shape != (2, 3) or not np.isfinite(given).all():
+        raise ModelError(f"a face on a body needs its two pupils (points 3.5 and 3.6), not {given.tolist()}")
+    apart = float(np.linalg.norm(given[1] - given[0]))
+    if not apart > 1e-9:
+        raise ModelError("both pupils of the face are in the same place")
+    size = float(np.linalg.norm(body.eyes[1] - body.eyes[0])) / apart
+    if abs(size - 1) < SAME_SIZE:
+        size = 1.0
+    place = np.diag([size, size, size, 1.0])
+    place[:3, 3] = body.eyes.mean(axis=0) - size * given.mean(axis=0)
+    return place
+
+
+def _dense(neck: list[BodyPart], joints: int) -> Float64:
+    """(A, J) weights of the necks' vertices."""
+    rows = sum(len(part.vertices) for part in neck)
+    dense = np.zeros((rows, joints))
+    which = np.concatenate([part.joints for part in neck])
+    share = np.concatenate([part.weights for part in neck])
+    for slot in range(INFLUENCES):
+        np.add.at(dense, (np.arange(rows), which[:, slot]), share[:, slot])
+    return dense
+
+
+def _nearest(tree: Any, dense: Float64, places: Float64, skull: int, joints: int) -> tuple[Int32, Float32]:
+    """Weights of the nearest anchors, handed over to the skull with distance."""
+    away, rows = tree.query(places, k=min(NEIGHBOURS, len(dense)))
+    away, rows = away.reshape(len(places), -1), rows.reshape(len(places), -1)
+    share = 1 / np.maximum(away, 1e-6) ** 2
+    share /= share.sum(axis=1, keepdims=True)
+    found = np.einsum("vk,vkj->vj", share, dense[rows])
+    t = np.clip((away[:, :1] - NEAR) / (FAR - NEAR), 0.0, 1.0)
+    alone = t * t * (3 - 2 * t)
+    found *= 1 - alone
+    found[:, skull] += alone[:, 0]
+    return strongest(found)
+
+
+def strongest(dense: Float64) -> tuple[Int32, Float32]:
+    """Joints and weights (V, 4) of dense weights (V, J).
+
+    Of more than four joints, what the fifth has is taken from all, so that weights fade in and out over the
+    surface without a step.
+    """
+    joints = dense.shape[1]
+    if joints < INFLUENCES:
+        dense = np.pad(dense, ((0, 0), (0, INFLUENCES - joints)))
+    order = np.argsort(-dense, axis=1, kind="stable")[:, : INFLUENCES + 1]
+    ranked = np.take_along_axis(dense, order, axis=1)
+    fifth = ranked[:, INFLUENCES:] if ranked.shape[1] > INFLUENCES else 0.0
+    share = np.clip(ranked[:, :INFLUENCES] - fifth, 0.0, None)
+    share[:, 0] = np.where(share.sum(axis=1) > 1e-9, share[:, 0], 1.0)
+    share /= share.sum(axis=1, keepdims=True)
+    share[share < 1e-4] = 0.0
+    share /= share.sum(axis=1, keepdims=True)
+    return order[:, :INFLUENCES].astype(np.int32), share.astype(np.float32)
+
+
+def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]:
+    """Vertices of the open edges in the lower half of necks, and the ways out over them (N, 3)."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in neck)])
+    triangles = np.concatenate([part.triangles + start for part, start in zip(neck, starts, strict=False)])
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    _, inverse, counts = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    edge = np.unique(sides[counts[inverse.ravel()] == 1])
+    middle = (anchors[:, 1].min() + anchors[:, 1].max()) / 2
+    edge = edge[anchors[edge, 1] < middle]
+    within = np.zeros((len(anchors), 3))
+    count = np.zeros((len(anchors), 1))
+    inner = np.ones(len(anchors), dtype=bool)
+    inner[edge] = False
+    for a, b in (sides.T, sides[:, ::-1].T):
+        use = inner[b]
+        np.add.at(within, a[use], anchors[b[use]].astype(np.float64))
+        np.add.at(count, a[use], 1)
+    outward = np.where(count[edge] > 0, anchors[edge] - within[edge] / np.maximum(count[edge], 1), 0.0)
+    return edge, outward
+
+
+def _beyond(
+    tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64
+) -> npt.NDArray[np.bool_]:
+    """(V,) places nearest to the edge and past it."""
+    away, rows = tree.query(places)
+    number = np.full(len(anchors), -1)
+    number[edge] = np.arange(len(edge))
+    at = number[rows]
+    past: npt.NDArray[np.bool_] = (at >= 0) & (away > SEAM)
+    past &= ((places - anchors[rows]) * outward[at]).sum(axis=1) > 0
+    return past
+
+
+def _descendants(body: BodyModel, joint: int) -> list[int]:
+    below = [joint]
+    for number, parent in enumerate(body.skeleton.parents.tolist()):
+        if parent in below:
+            below.append(number)
+    return below

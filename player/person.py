@@ -1,0 +1,105 @@
+"""A person: a body model with a face model on it, as one skin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.heads import HeadOnBody
+from fba.body.model import BodyModel, BodyPart
+from fba.face.model import Part, point_row
+from player.face import FaceFigure
+from player.face_parts import part_shape
+from player.shapes import Eye, FaceMesh, FaceShape
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+SCATTER = {"skin": 1.0, "neck": 1.0}
+CARRIED = ("skin", "mouth", "hair", "other")
+"""Kinds of parts of a face that the neck may bend; eyes, teeth and tongue go with the skull."""
+
+
+class Person:
+    """Body and face, moved by joint matrices and FAPs.
+
+    body: a model with a place for pupils. figure: the face to be put there. What of the face lies under the
+    clothes is left out, and so are parts of kind "other" that lie wholly below the chin: the body is dressed.
+    """
+
+    def __init__(self, body: BodyModel, figure: FaceFigure) -> None:
+        self.body = body
+        self.figure = figure
+        model = figure.model
+        skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
+        eyes = model.points[[point_row("3.5"), point_row("3.6")]]
+        self.head = HeadOnBody(body, model.vertices, eyes, skull)
+        self._face = self._face_shapes()
+        self._parts = [part for part in body.parts if part.kind != "neck" or not self.head.brings_neck]
+        self._rows = {
+            part.name: slice(start, start + len(part.vertices))
+            for part, start in zip(body.parts, body.starts.values(), strict=True)
+        }
+        self._shapes = {part.name: _shape(part) for part in self._parts}
+        free = np.array([1.0, 1.0, 0.0, 1.0], dtype=np.float32)
+        self._light = {name: np.tile(free, (len(shape.colours), 1)) for name, shape in self._shapes.items()}
+        self._places, self._normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
+        self._skin, self._upright = np.empty_like(model.vertices), np.empty_like(model.vertices)
+
+    def joints(self, faps: Float32, matrices: Float64) -> Float64:
+        """Joint matrices (J, 4, 4) with the head turned by FAPs (68,) on its skull base."""
+        return self.head.matrices(matrices, self.figure.pose(faps).turn)
+
+    def frame(self, joints: Float64) -> Float64:
+        """(4, 4): frame of the face model into the world."""
+        return self.head.frame(joints)
+
+    def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
+        """Everything but the eyeballs, for FAPs (68,) and joint matrices with the head's turn."""
+        self.body.skin(joints, self._places, self._normals)
+        found = [
+            _placed(
+                self._shapes[part.name],
+                self._places[self._rows[part.name]],
+                self._normals[self._rows[part.name]],
+                self._light[part.name],
+            )
+            for part in self._parts
+        ]
+        pose = self.figure.pose(faps)
+        self.head.skin(pose.positions, joints, self._skin, upright=pose.normals, normals=self._upright)
+        light = self.figure.light(faps, self.frame(joints))
+        for name, shape in self._face.items():
+            rows = self.figure.rows(name)
+            found.append(_placed(shape, self._skin[rows], self._upright[rows], light[rows]))
+        return found
+
+    def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
+        """The eyeballs, likewise."""
+        return self.figure.eyes(faps, self.frame(joints), turned=True)
+
+    def _face_shapes(self) -> dict[str, FaceShape]:
+        """The face's parts without what the clothes hide."""
+        model, found = self.figure.model, {}
+        chin = model.points[point_row("2.1")][1]
+        for name, shape in self.figure.shapes.items():
+            part = model.part(name)
+            if part.kind == "other" and part.vertices[:, 1].max() < chin:
+                continue
+            hidden = self.head.hidden[self.figure.rows(name)]
+            kept = ~hidden[shape.triangles].all(axis=1)
+            if kept.any():
+                found[name] = replace(shape, triangles=np.ascontiguousarray(shape.triangles[kept]))
+        return found
+
+
+def _shape(part: BodyPart) -> FaceShape:
+    shape = part_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
+    return replace(shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=part.kind not in SCATTER)
+
+
+def _placed(shape: FaceShape, places: Float32, normals: Float32, light: Float32) -> FaceMesh:
+    return FaceMesh(shape, places, normals, light, np.eye(4), np.zeros(3), np.zeros(3))
