@@ -81,7 +81,10 @@ def _box(low: npt.NDArray[np.floating], high: npt.NDArray[np.floating]) -> Float
 
 
 def _turned(places: Float64, turn: Float64, centre: Float64) -> Float64:
-    from scipy.spatial.transform import Rotation
-
-    turned: Float64 = Rotation.from_rotvec(turn).apply(places - centre) + centre
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-9:
+        return places
+    axis, arm = turn / angle, places - centre
+    across = np.cross(axis, arm) * np.sin(angle) + np.outer(arm @ axis, axis) * (1 - np.cos(angle))
+    turned: Float64 = arm * np.cos(angle) + across + centre
     return turned

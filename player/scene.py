@@ -10,19 +10,18 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from player.camera import Camera, Subject
-from player.shapes import View, translation
+from player.shapes import View
 from player.timeline import Timeline
 
 if TYPE_CHECKING:
+    from fba.body.model import BodyModel
     from fba.face.model import FaceModel
     from player.face import FaceFigure
-    from player.mannequin import Mannequin
+    from player.person import Person
     from player.point_view import PointView
 
 Float64 = npt.NDArray[np.float64]
 
-HEAD_ON_BODY = np.array([0.0, 1.628, 0.077])
-"""Where the point between the pupils lies in the default posture of the default skeleton."""
 BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
 SAMPLES = 48
 """Moments at which the extent of a moving body is looked up to fit the camera."""
@@ -38,8 +37,8 @@ LOOKS = ("figure", "points")
 class Scene:
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
-    animation: at least one frame, else ValueError. model: the face, by default the built-in head. axes:
-    name of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or
+    animation: at least one frame, else ValueError. model: the face, by default the built-in head. body:
+    what BAPs move, by default the built-in person; ModelError where no face fits on it. axes: name of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or
     "points", the face as its feature points with lines through them and the body as its bones; it may be
     set at any time, ValueError where it is something else. What is drawn is worked out on first use.
     """
@@ -49,6 +48,7 @@ class Scene:
         animation: Animation,
         model: FaceModel | None = None,
         *,
+        body: BodyModel | None = None,
         axes: str = "iso",
         view: str = "figure",
     ) -> None:
@@ -60,23 +60,19 @@ class Scene:
         self.view = view
         self._figure: FaceFigure | None = None
         self._point_view: PointView | None = None
-        self._mannequin: Mannequin | None = None
+        self._person: Person | None = None
         self._subject: Subject | None = None
         self._follow = False
         self._legs_move = False
         if animation.body is not None:
-            from fba.body import BapSolver, Skeleton
+            from fba.body import BapSolver
+            from fba.body.model import BodyModel
             from player.bones import Bones
-            from player.mannequin import Mannequin
-            from player.torso import Torso
 
-            self._skeleton = Skeleton.default()
+            self._body = body or BodyModel.default()
+            self._skeleton = self._body.skeleton
             self._solver = BapSolver(self._skeleton, axes)
-            self._mannequin = Mannequin(self._skeleton)
-            self._torso = Torso(self._skeleton)
             self._bones = Bones(self._skeleton)
-            self._skull = list(self._skeleton.names).index("skullbase")
-            self._skull_centre = np.asarray(self._skeleton.centres, dtype=np.float64)[self._skull]
 
     @property
     def view(self) -> str:
@@ -99,9 +95,18 @@ class Scene:
         return self._figure
 
     @property
+    def person(self) -> Person:
+        """The body that is shown, with the face on it; built on first use. Only where there is a body."""
+        if self._person is None:
+            from player.person import Person
+
+            self._person = Person(self._body, self.figure)
+        return self._person
+
+    @property
     def has_body(self) -> bool:
         """Whether a body is shown."""
-        return self._mannequin is not None
+        return self.animation.body is not None
 
     @property
     def rate(self) -> Fraction:
@@ -172,14 +177,13 @@ class Scene:
     def _shown(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
         if self._view == "points":
             return self._points(faps, joints)
-        figure, matrix = self.figure, self._face_matrix(joints)
-        if joints is None or self._mannequin is None:
-            return View(eyes=figure.eyes(faps, matrix), faces=figure.meshes(faps, matrix))
+        if joints is None:
+            world = np.eye(4)
+            return View(eyes=self.figure.eyes(faps, world), faces=self.figure.meshes(faps, world))
+        turned = self.person.joints(faps, joints)
         return View(
-            meshes=[self._torso.mesh(joints)],
-            capsules=self._mannequin.capsules(joints),
-            eyes=figure.eyes(faps, matrix),
-            faces=figure.meshes(faps, matrix, on_body=True),
+            eyes=self.person.eyes(faps, turned),
+            faces=self.person.meshes(faps, turned),
             blobs=_shadows(joints, self._skeleton.names),
             ground=True,
         )
@@ -221,11 +225,7 @@ class Scene:
 
     def _face_matrix(self, joints: Float64 | None) -> Float64:
         """Frame of the face model, without the head's own turn, into the world."""
-        if joints is None:
-            return np.eye(4)
-        offset = HEAD_ON_BODY - self._skull_centre - self.figure.between_eyes
-        placed: Float64 = joints[self._skull] @ translation(offset)
-        return placed
+        return np.eye(4) if joints is None else self.person.frame(joints)
 
     def _extent(self) -> Subject:
         frames = self.timeline.frames

@@ -169,9 +169,30 @@ def srgb(text: str) -> tuple[float, float, float]:
 
 def rotation_vector(matrix: Float64) -> Float64:
     """(3,) axis of a rotation (3, 3) times its angle, 0..pi."""
-    from scipy.spatial.transform import Rotation
-
-    vector: Float64 = Rotation.from_matrix(matrix).as_rotvec()
+    # The quaternion, by its largest component: exact near half a turn too.
+    trace = float(np.trace(matrix))
+    squares = np.array([trace, *np.diag(matrix)])
+    largest = int(squares.argmax())
+    if largest == 0:
+        q = np.array([
+            1 + trace,
+            matrix[2, 1] - matrix[1, 2],
+            matrix[0, 2] - matrix[2, 0],
+            matrix[1, 0] - matrix[0, 1],
+        ])  # fmt: skip
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = np.zeros(4)
+        q[0] = matrix[k, j] - matrix[j, k]
+        q[1 + i] = 1 + 2 * matrix[i, i] - trace
+        q[1 + j], q[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
+    q = q / np.linalg.norm(q)
+    sine = float(np.linalg.norm(q[1:]))
+    if sine < 1e-12:
+        return np.zeros(3)
+    angle = 2 * np.arctan2(sine, abs(q[0])) * (1 if q[0] >= 0 else -1)
+    vector: Float64 = q[1:] / sine * angle
     return vector
 
 

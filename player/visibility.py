@@ -27,6 +27,8 @@ SOFTNESS = (1.0, 0.92, 0.72, 0.46)
 SKIN_DEPTH = 0.0045
 """Metres after which light through skin has faded to 1/e."""
 HARMONICS = 16
+BAKING = "1"
+"""Counts up with every change of what `bake` gives: what was kept before is then made anew."""
 
 
 @dataclass(frozen=True, eq=False)

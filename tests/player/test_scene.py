@@ -14,7 +14,8 @@ from fba.body import Skeleton
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, point_row
 from player import Scene, default_camera
-from player.face import FaceFigure, sway
+from player.face import FaceFigure
+from player.face_parts import sway
 from player.mannequin import Mannequin
 
 STILL = np.zeros(68, dtype=np.float32)

@@ -1,0 +1,170 @@
+"""How much light reaches the vertices of a face, as it turns and opens its mouth."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import is_compiled
+from fba.face.deformer import Deformer
+from fba.face.model import FaceModel, point_row
+from player.kept import kept
+from player.visibility import BAKING, HARMONICS, Visibility, bake
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+Bool = npt.NDArray[np.bool_]
+
+KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
+"""As in shaders/lighting.glsl."""
+MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
+              51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
+"""FAPs of a mouth open so far that light falls in."""
+FREE = (0.9, 0.8, 0.0, 0.3)
+"""The light that reaches a tongue put out."""
+MOVES = 0.05
+"""What sways less than this is lit without care."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Baked:
+    """Visibility with the mouth shut and open, and how far its lips are apart in both, metres."""
+
+    shut: Visibility
+    wide: Visibility
+    gaps: tuple[float, float]
+
+
+class FaceLight:
+    """Light on a face model.
+
+    sway (V,): how far each vertex goes with the head. What hides what is worked out on first use, for the
+    mouth shut and open, in about a second, and kept on disk.
+    """
+
+    def __init__(self, model: FaceModel, deformer: Deformer, sway: Float32) -> None:
+        self._model = model
+        self._deformer = deformer
+        self._sway = sway
+        self._baked: _Baked | None = None
+        self._lit: tuple[tuple[float, ...], Float32] | None = None
+        lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
+        self._lips = lips if min(lips) >= 0 else None
+        starts = model.starts
+        self._tongues = [
+            slice(starts[part.name], starts[part.name] + len(part.vertices))
+            for part in model.of_kind("tongue")
+        ]
+
+    def reaching(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
+        """(V, 4), 0..1: what reaches each vertex of the key light, of the open sky, through the skin from
+        behind, and of the rim light.
+
+        positions: (V, 3) without the head's turn (3, 3); matrix: (3, 3) of the whole in the world. The
+        array is kept while nothing changes: do not write to it.
+        """
+        if self._baked is None:
+            self._baked = self._bake()
+        share = self._mouth_open(positions, self._baked.gaps)
+        out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
+        turned = (matrix @ turn).T
+        key = (
+            *np.round([*turned.ravel(), *matrix.ravel()], 3),
+            round(share, 2),
+            *(float(o.sum()) for o in out),
+        )
+        if self._lit is None or self._lit[0] != key:
+            light = self._blended(turned, share)
+            if not np.allclose(turn, np.eye(3), atol=1e-3):
+                still = self._blended(matrix.T, share)
+                light = still + (light - still) * self._sway[:, None]
+            for rows, outside in zip(self._tongues, out, strict=True):
+                light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
+            self._lit = (key, light)
+        return self._lit[1]
+
+    def _blended(self, into: Float64, share: float) -> Float32:
+        """(V, 4) for lights turned by `into` (3, 3), the mouth open by a share."""
+        assert self._baked is not None
+        light = _reaching(self._baked.shut, into)
+        if share > 0:
+            light += (_reaching(self._baked.wide, into) - light) * np.float32(share)
+        return light
+
+    def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
+        if self._lips is None:
+            return 0.0
+        share = np.clip((self._gap(positions) - gaps[0]) / max(gaps[1] - gaps[0], 1e-6), 0.0, 1.0)
+        return float(np.sqrt(share))  # the first millimetres let most of the light in
+
+    def _gap(self, positions: Float32) -> float:
+        upper, lower = positions[self._lips]
+        return float(np.linalg.norm(upper - lower))
+
+    def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
+        """(N,) how far vertices of a tongue at these depths are out between the lips, 0..1."""
+        if self._lips is None:
+            return np.zeros(len(depths), dtype=np.float32)
+        reach = 0.12 * self._model.fapu.ENS * 1024
+        share: Float32 = np.clip((depths - positions[self._lips, 2].min()) / reach, 0.0, 1.0)
+        return share.astype(np.float32)
+
+    def _bake(self) -> _Baked:
+        solid = [part for part in self._model.parts if part.kind not in ("brow", "lash")]
+        joined = [part.triangles + self._model.starts[part.name] for part in solid]
+        triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
+        faps = np.zeros(68, dtype=np.float32)
+        still, normals = self._posed(faps)
+        shut = _kept_visibility(still, normals, triangles, self._sway > MOVES)
+        if self._lips is None:
+            return _Baked(shut, shut, (0.0, 0.0))
+        for fap, value in MOUTH_OPEN.items():
+            faps[fap - 1] = value
+        moved, normals = self._posed(faps)
+        near = self._near_mouth(still)
+        wide = _kept_visibility(moved, normals, triangles, near)
+        arrays = [
+            np.where(near[:, None] if before.ndim == 2 else near, after, before)
+            for before, after in zip(shut.arrays, wide.arrays, strict=True)
+        ]
+        return _Baked(shut, Visibility(*arrays), (self._gap(still), self._gap(moved)))
+
+    def _posed(self, faps: Float32) -> tuple[Float32, Float32]:
+        positions = np.empty((len(self._sway), 3), dtype=np.float32)
+        normals = np.empty_like(positions)
+        return self._deformer.local(faps, out=positions, normals=normals), normals
+
+    def _near_mouth(self, positions: Float32) -> Bool:
+        """(V,) vertices about as near to the mouth as the eyes are to the nose."""
+        away = np.linalg.norm(positions - positions[self._lips].mean(axis=0), axis=1)
+        return np.asarray(away < 1.1 * self._model.fapu.ENS * 1024)
+
+
+def _kept_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
+    """Baked once, and kept: it is half a second of every start."""
+
+    def make() -> list[npt.NDArray[np.float16]]:
+        return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
+
+    digest = hashlib.sha256(BAKING.encode())
+    for array in (positions, normals, triangles, within):
+        digest.update(np.ascontiguousarray(array).data)
+    count = len(within)
+    shapes = ((count, HARMONICS), (count, HARMONICS), (count,))
+    arrays = kept(f"light-{digest.hexdigest()[:32]}", shapes, make) if is_compiled() else make()
+    return Visibility(*(array.astype(np.float32) for array in arrays))
+
+
+def _reaching(visibility: Visibility, into: Float64) -> Float32:
+    key = visibility.towards(_unit(into @ KEY_DIRECTION))[0]
+    rim, through = visibility.towards(_unit(into @ RIM_DIRECTION))
+    return np.stack([key, visibility.open, through, rim], axis=1)
+
+
+def _unit(vector: Float64) -> Float64:
+    unit: Float64 = vector / np.linalg.norm(vector)
+    return unit

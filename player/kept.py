@@ -1,0 +1,81 @@
+"""What takes long to work out and depends on its input alone, kept on disk for the next time."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Float16 = npt.NDArray[np.float16]
+
+MOST_FILES = 12
+"""So many are kept; the longest unused goes first."""
+
+
+def kept(key: str, shapes: tuple[tuple[int, ...], ...], make: Callable[[], list[Float16]]) -> list[Float16]:
+    """The arrays of `shapes`, float16, that `make` gave for this key, now or some time before.
+
+    key: names everything that they depend on; letters and digits. Where nothing can be kept (no home, no
+    room, a file that somebody damaged) they are made anew, silently.
+    """
+    folder = _folder()
+    path = None if folder is None else folder / f"{key}.npz"
+    if path is not None:
+        found = _read(path, shapes)
+        if found is not None:
+            return found
+    made = make()
+    if path is not None:
+        _write(path, made)
+    return made
+
+
+def _folder() -> Path | None:
+    """The user's folder for what may be thrown away."""
+    named = os.environ.get("FBA_CACHE") or os.environ.get("XDG_CACHE_HOME")
+    try:
+        if named:
+            base = Path(named)
+        elif sys.platform == "win32":
+            base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        elif sys.platform == "darwin":
+            base = Path.home() / "Library" / "Caches"
+        else:
+            base = Path.home() / ".cache"
+    except RuntimeError:
+        return None
+    return base / "fba"
+
+
+def _read(path: Path, shapes: tuple[tuple[int, ...], ...]) -> list[Float16] | None:
+    most = sum(2 * int(np.prod(shape)) + 1024 for shape in shapes) + 4096
+    try:
+        if path.stat().st_size > most:
+            return None
+        with np.load(path, allow_pickle=False) as file:
+            found = [np.asarray(file[f"arr_{number}"]) for number in range(len(shapes))]
+        os.utime(path)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    for array, shape in zip(found, shapes, strict=True):
+        if array.dtype != np.float16 or array.shape != shape or not np.isfinite(array).all():
+            return None
+    return found
+
+
+def _write(path: Path, arrays: list[Float16]) -> None:
+    from fba.atomic import atomic
+    from fba.errors import FormatError
+
+    with contextlib.suppress(OSError, ValueError, FormatError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic(path) as file:
+            np.savez(file, *arrays)
+        for old in sorted(path.parent.glob("*.npz"), key=lambda one: one.stat().st_mtime)[:-MOST_FILES]:
+            old.unlink(missing_ok=True)
