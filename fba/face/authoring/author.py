@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.face.authoring.binding import SURFACE_KINDS, Binding, bind_points, face_size, part_lips
+from fba.face.authoring.binding import SURFACE_KINDS, Binding, bind_points, face_size, lip_sides, part_lips
 from fba.face.authoring.carry import LARGEST, NEAR, Anchors
 from fba.face.authoring.ears import ear_motions
 from fba.face.authoring.extremes import Limiter
@@ -82,6 +82,9 @@ def author(
     surface = Surface(skins)
     pool = _numbers(parts, skins)
     binding = bind_points(parts, places, bound)
+    sides = lip_sides(surface, parts, binding.points, binding.bound)
+    if sides is not None:
+        surface = Surface(skins, sides)
     if bound is None:
         binding = part_lips(surface, parts, places, binding, face_size(places))
     marks = landmarks(surface, binding.points, binding.bound, pool)

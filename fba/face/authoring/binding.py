@@ -132,6 +132,40 @@ def part_lips(
     return Binding(placed, found, binding.far)
 
 
+def lip_sides(
+    surface: Surface, parts: Sequence[Part], points: Float64, bound: Int32
+) -> npt.NDArray[np.intp] | None:
+    """(V,) of the skin's vertices: 1 for those of the upper lip, 2 of the lower, 0 elsewhere.
+
+    None but where the mouth is a slit whose two edges lie on each other, so that they were taken for a
+    seam and joined.
+    """
+    row = row_of()
+    pool = _pool(parts, SURFACE_KINDS)
+    number = np.full(int(pool.max(initial=-1)) + 1, -1, dtype=np.intp)
+    number[pool] = surface.number
+    line = [int(bound[row[name]]) for name in ("2.4", "2.2", "2.5")]
+    if min(line) < 0:
+        return None
+    left, middle, right = (int(number[vertex]) for vertex in line)
+    walk = np.concatenate([surface.path(left, middle), surface.path(middle, right)])
+    walk = np.setdiff1d(walk, [left, right])
+    skins = [part for part in parts if part.kind in SURFACE_KINDS]
+    starts = np.cumsum([0, *(len(part.vertices) for part in skins)])
+    heights, counts = np.zeros(starts[-1]), np.zeros(starts[-1])
+    for part, start in zip(skins, starts, strict=False):
+        middles = part.vertices[part.triangles, 1].astype(np.float64).mean(axis=1)
+        own = part.triangles.astype(np.intp) + start
+        heights += np.bincount(own.ravel(), np.repeat(middles, 3), len(heights))
+        counts += np.bincount(own.ravel(), minlength=len(counts))
+    above = heights / np.maximum(counts, 1) > surface.vertices[surface.number, 1]
+    on_line = np.isin(surface.number, walk) & (counts > 0)
+    both = np.intersect1d(surface.number[on_line & above], surface.number[on_line & ~above])
+    if len(both) < len(walk) / 2 or not len(both):
+        return None
+    return np.where(np.isin(surface.number, both), np.where(above, 1, 2), 0).astype(np.intp)
+
+
 def kinds_of(name: str) -> tuple[str, ...]:
     """Kinds of parts that a feature point can stand on."""
     if name in KINDS_OF_POINT:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import numpy.typing as npt
 
@@ -18,6 +20,7 @@ FOLDED = -0.3
 """A triangle whose normal has this cosine with that of its neighbours lies folded on them."""
 SPECK = 0.0015
 """Share of the moving surface that may lie folded where skin closes on itself."""
+FEW = 0.1
 DEGENERATE = 1e-5
 """Triangles of less than this share of the typical area have no front to turn."""
 
@@ -35,11 +38,25 @@ class Limiter:
     def __len__(self) -> int:
         return len(self._vertices)
 
+    @cached_property
+    def _fans(self) -> tuple[Int, Int]:
+        """(starts, triangles): for each vertex the triangles about it."""
+        order = np.argsort(self._triangles.ravel(), kind="stable")
+        count = np.bincount(self._triangles.ravel(), minlength=len(self._vertices))
+        return np.concatenate([[0], np.cumsum(count)]), order // 3
+
     def touched(self, vertices: Int) -> Int:
         """(M, 3) triangles with a vertex among those given."""
-        moving = np.zeros(len(self._vertices), dtype=bool)
-        moving[vertices] = True
-        touched: Int = self._triangles[moving[self._triangles].any(axis=1)]
+        starts, fans = self._fans
+        touched: Int
+        if len(vertices) > FEW * len(self._vertices):
+            moving = np.zeros(len(self._vertices), dtype=bool)
+            moving[vertices] = True
+            touched = self._triangles[moving[self._triangles].any(axis=1)]
+            return touched
+        count = starts[vertices + 1] - starts[vertices]
+        place = np.repeat(starts[vertices] - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
+        touched = self._triangles[np.unique(fans[place])]
         return touched
 
     def reach(self, field: Float64, triangles: Int) -> Float64:
@@ -79,14 +96,14 @@ class Limiter:
         turning: what moves may turn, as a lid does about the eyeball; then a triangle has folded where it
         faces away from its neighbours, not where it faces away from its neutral place.
         """
-        p = self._vertices
-        q = p + shifts
-        e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
-        f1, f2 = (q[triangles[:, k]] - q[triangles[:, 0]] for k in (1, 2))
+        p = self._vertices[triangles]
+        q = p + shifts[triangles]
+        e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+        f1, f2 = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
         before, after = np.cross(e1, e2), np.cross(f1, f2)
         if turning:
-            away = _facing(after, triangles, len(p)) < FOLDED
-            fine: npt.NDArray[np.bool_] = ~(away & (_facing(before, triangles, len(p)) > 0))
+            around = _Around(triangles)
+            fine: npt.NDArray[np.bool_] = (around.facing(after) >= FOLDED) | (around.facing(before) <= 0)
         else:
             fine = (before * after).sum(axis=1) >= 0.8 * LEAST_AREA * (before**2).sum(axis=1)
         lengths = np.linalg.norm(np.stack([e1, e2, e2 - e1]), axis=2)
@@ -96,16 +113,24 @@ class Limiter:
         return fine
 
 
-def _facing(normals: Float64, triangles: Int, count: int) -> Float64:
-    """(M,) cosine between the normal of each triangle (M, 3) and that of its neighbours without it."""
-    total = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(normals[:, axis], 3), count) for axis in range(3)], axis=1
-    )
-    around = total[triangles].sum(axis=1) - 3 * normals
-    product = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
-    result: Float64 = (around * normals).sum(axis=1) / np.maximum(product, 1e-30)
-    result[product < 1e-30] = 1.0
-    return result
+class _Around:
+    """Neighbours of triangles (M, 3): those that share a vertex."""
+
+    def __init__(self, triangles: Int) -> None:
+        from scipy.sparse import csr_array
+
+        vertices, local = np.unique(triangles, return_inverse=True)
+        shape = (len(vertices), len(triangles))
+        fans = (np.ones(triangles.size), (local.ravel(), np.repeat(np.arange(len(triangles)), 3)))
+        self._fans = csr_array(fans, shape=shape)
+
+    def facing(self, normals: Float64) -> Float64:
+        """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours without it."""
+        around = self._fans.T @ (self._fans @ normals) - 3 * normals
+        product = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
+        result: Float64 = (around * normals).sum(axis=1) / np.maximum(product, 1e-30)
+        result[product < 1e-30] = 1.0
+        return result
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:

@@ -29,14 +29,14 @@ class Surface:
     the vertex of the surface.
     """
 
-    def __init__(self, parts: Sequence[Part], apart: npt.ArrayLike = ()) -> None:
-        """apart: numbers of vertices (counted through the parts) that stay unjoined."""
+    def __init__(self, parts: Sequence[Part], sides: Int | None = None) -> None:
+        """sides: (V,) of the vertices counted through the parts: those of different sides stay unjoined."""
         vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
         starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
         triangles = np.concatenate(
             [part.triangles.astype(np.intp) + start for part, start in zip(parts, starts, strict=False)]
         )
-        joined = _welded(vertices, triangles, np.asarray(apart, dtype=np.intp))
+        joined = _welded(vertices, triangles, sides)
         first, number = np.unique(joined, return_inverse=True)
         self.vertices: Float64 = vertices[first]
         whole = number[triangles]
@@ -159,19 +159,21 @@ def _edges(triangles: Int) -> tuple[Int, Int]:
     return edges, count
 
 
-def _welded(vertices: Float64, triangles: Int, apart: Int) -> Int:
+def _welded(vertices: Float64, triangles: Int, sides: Int | None) -> Int:
     """(N,) for each vertex the first of those at the same place that it is joined with."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     edges, count = _edges(triangles)
-    rim = np.setdiff1d(np.unique(edges[count == 1]), apart)
+    rim = np.unique(edges[count == 1])
     first = np.arange(len(vertices))
     if not len(rim):
         return first
     extent = float(np.ptp(vertices, axis=0).max())
     pairs = cKDTree(vertices[rim]).query_pairs(WELD * extent, output_type="ndarray")
+    if sides is not None:
+        pairs = pairs[sides[rim[pairs[:, 0]]] == sides[rim[pairs[:, 1]]]]
     shape = (len(rim), len(rim))
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
     labels = connected_components(graph, directed=False)[1]
