@@ -38,9 +38,10 @@ class Scene:
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
     animation: at least one frame, else ValueError. model: the face, by default the built-in head. body:
-    what BAPs move, by default the built-in person; ModelError where no face fits on it. axes: name of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or
-    "points", the face as its feature points with lines through them and the body as its bones; it may be
-    set at any time, ValueError where it is something else. What is drawn is worked out on first use.
+    what BAPs move, by default the built-in person; ModelError where it has no place for a face. axes: name
+    of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or "points",
+    the face as its feature points with lines through them and the body as its bones; it may be set at any
+    time, ValueError where it is something else. What is drawn is worked out on first use.
     """
 
     def __init__(

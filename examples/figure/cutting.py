@@ -17,7 +17,7 @@ SNAP = 0.28
 
 @dataclass(frozen=True, eq=False)
 class Cloth:
-    """vertices, normals: (V, 3). weights: (V, J). values: (V, K), what else a vertex has. triangles: (F, 3)."""
+    """vertices, normals: (V, 3). weights: (V, J). values: (V, K), anything else. triangles: (F, 3)."""
 
     vertices: Float64
     normals: Float64
