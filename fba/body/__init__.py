@@ -37,6 +37,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "gait":
+        return import_module("fba.body.gait")
     if name not in _PLACES:
         raise AttributeError(f"module 'fba.body' has no attribute {name!r}")
     value = getattr(import_module(_PLACES[name]), name)

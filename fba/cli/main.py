@@ -22,6 +22,7 @@ _COMMANDS = {
     "stats": "Where the bits of FBA streams go.",
     "conformance": "Check this codec against test vectors.",
     "bench": "Measure the speed of this codec on a stream.",
+    "gait": "Make someone walk: stride, character; or find the steps in a walk.",
     "model": "Look at face models, check, import, fit them to a person.",
     "demo": "Encode sample motion capture, print what came out, and play it.",
 }

@@ -5,7 +5,21 @@ Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `character
 """
 
 from fba.body.gait.characters import POSES, Character, Pose, characters
-from fba.body.gait.measure import Soles, soles
+from fba.body.gait.detection import Cycle, Gait, Step, detect
+from fba.body.gait.measure import Soles, advance, soles
 from fba.body.gait.synthesis import walk
 
-__all__ = ["POSES", "Character", "Pose", "Soles", "characters", "soles", "walk"]
+__all__ = [
+    "POSES",
+    "Character",
+    "Cycle",
+    "Gait",
+    "Pose",
+    "Soles",
+    "Step",
+    "advance",
+    "characters",
+    "detect",
+    "soles",
+    "walk",
+]

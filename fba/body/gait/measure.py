@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.body.conventions import convention
 from fba.body.gait.anatomy import Anatomy
 from fba.body.gait.rotations import Float
 from fba.body.skeleton import Skeleton
@@ -80,3 +81,12 @@ def sole_points(anatomy: Anatomy, matrices: Float) -> Soles:
             frame = matrices[:, anatomy.skeleton.number(f"{letter}_{joint}")]
             points[number, place] = frame[:, :3, 3] + frame[:, :3, :3] @ offset
     return Soles(points)
+
+
+def advance(animation: Animation, axes: str = "iso") -> float:
+    """Millimetres over the ground from the first frame's root to the last's, as the crow flies."""
+    if animation.body is None:
+        raise ValueError("gait: the animation has no body track")
+    columns = convention(axes).translation
+    gap = animation.body.values[-1, columns].astype(float) - animation.body.values[0, columns]
+    return float(np.hypot(gap[0], gap[2]))

@@ -1,0 +1,148 @@
+"""`fba gait`: someone walks; or the steps of someone who walked."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fba.cli import options
+from fba.errors import FbaWarning
+
+DEFAULT_RATE = Fraction(30)
+
+
+@click.command(
+    epilog=options.examples(
+        "fba gait --stride 0.7 --character bored -o walk.fba",
+        "fba gait --character hurried --seconds 10 --fps 25 -o walk.bap",
+        "fba gait --list",
+        "fba gait --find walk.bap",
+    )
+)
+@click.option(
+    "--stride",
+    type=float,
+    metavar="METRES",
+    help="From one contact of a foot to its next, two steps; sets the speed. Default: the character's own.",
+)
+@click.option("--character", default="normal", show_default=True, metavar="NAME", help="One of --list.")
+@click.option("--cycles", type=float, metavar="N", help="How many strides; default: 4.")
+@click.option("--seconds", type=float, metavar="SECONDS", help="How long, in place of --cycles.")
+@options.fps_option("Frame rate; default: 30.")
+@click.option("--in-place", is_flag=True, help="Walk on the spot.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="File to write; its suffix says in which format.",
+)
+@options.bap_steps_option
+@click.option("--list", "listed", is_flag=True, help="Print the characters that there are.")
+@click.option(
+    "--find", type=options.EXISTING, metavar="FILE", help="Print the cycles and poses of a walk that is there."
+)
+@options.json_option
+def command(
+    stride: float | None,
+    character: str,
+    cycles: float | None,
+    seconds: float | None,
+    fps: Fraction | None,
+    in_place: bool,
+    output: Path | None,
+    bap_steps: str,
+    listed: bool,
+    find: Path | None,
+    as_json: bool,
+) -> None:
+    """Make someone walk: body animation from four characteristic poses and a character.
+
+    A foot on the ground does not move. For FBA streams, --bap-steps visage keeps it so: the standard's steps
+    move the body by 64 mm at a time. Play and render with the same option.
+    """
+    if sum((output is not None, listed, find is not None)) != 1:
+        raise click.UsageError("give one of -o OUT, --list and --find FILE")
+    if listed:
+        _list(as_json)
+    elif find is not None:
+        _find(find, bap_steps, as_json)
+    elif output is not None:
+        if as_json:
+            raise click.UsageError("--json goes with --list and --find")
+        made = {"stride": stride, "cycles": cycles, "seconds": seconds, "in_place": in_place}
+        _write(output, character, fps or DEFAULT_RATE, bap_steps, made)
+
+
+def _write(output: Path, character: str, rate: Fraction, bap_steps: str, made: dict[str, Any]) -> None:
+    from fba.body import gait
+    from fba.formats import write, writer_for
+
+    writing = writer_for(output)  # refuses what cannot be written before anything is made
+    with _usage():
+        animation = gait.walk(character=character, rate=rate, **made)
+    extra = {}
+    if writing.name == "fba":
+        extra = {"bap_steps": bap_steps, "clamp": True}
+        if bap_steps == "iso":
+            warnings.warn(
+                "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
+                "--bap-steps visage has 2 mm and 3.16 rad (decode, play and render need the same option)",
+                FbaWarning,
+                stacklevel=1,
+            )
+    write(output, animation, format=writing.name, **extra)
+    way = gait.advance(animation) / 1000.0
+    line = f"{output}: {character}, {len(animation)} frames, {options.seconds(animation.duration)}"
+    if not made["in_place"] and len(animation) > 1:
+        speed = way / float((len(animation) - 1) / animation.rate)
+        line += f", {way:.2f} m at {speed:.2f} m/s"
+    click.echo(line)
+
+
+def _list(as_json: bool) -> None:
+    from fba.body import gait
+
+    known = [gait.Character.named(name) for name in gait.characters()]
+    if as_json:
+        rows = [
+            {"name": c.name, "about": c.about, "stride": c.stride, "seconds": c.seconds} for c in known
+        ]
+        options.print_json(rows)
+        return
+    width = max(len(c.name) for c in known)
+    for c in known:
+        pace = f"{c.stride:.2f} m in {c.seconds:.2f} s"
+        click.echo(f"{c.name:{width}}  {pace}  {c.about}")
+
+
+def _find(file: Path, bap_steps: str, as_json: bool) -> None:
+    from fba.body import gait
+    from fba.errors import FormatError
+
+    animation = options.read_input(file, bap_steps=bap_steps)
+    if animation.body is None:
+        raise FormatError("has no body to walk with", path=file)
+    found = gait.detect(animation)
+    if as_json:
+        options.print_json(found.as_dict())
+        return
+    for line in found.lines():
+        click.echo(line)
+
+
+@contextmanager
+def _usage() -> Iterator[None]:
+    """Numbers that make no sense are a usage error."""
+    try:
+        yield
+    except ValueError as error:
+        if type(error) is not ValueError:
+            raise
+        raise click.UsageError(str(error).removeprefix("walk: ")) from error
