@@ -19,6 +19,8 @@ Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
+REACH = (1.0, 0.9, 0.0, 0.25)
+"""What light reaches a body: it shades itself most from behind."""
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of parts of a face that the neck may bend; eyes, teeth and tongue go with the skull."""
 
@@ -44,7 +46,7 @@ class Person:
             for part, start in zip(body.parts, body.starts.values(), strict=True)
         }
         self._shapes = {part.name: _shape(part) for part in self._parts}
-        free = np.array([1.0, 1.0, 0.0, 1.0], dtype=np.float32)
+        free = np.array(REACH, dtype=np.float32)
         self._light = {name: np.tile(free, (len(shape.colours), 1)) for name, shape in self._shapes.items()}
         self._places, self._normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
         self._skin, self._upright = np.empty_like(model.vertices), np.empty_like(model.vertices)

@@ -180,7 +180,13 @@ class BodyModel:
         from fba.body.skinning import Skinner
 
         return Skinner(
-            self.vertices, self.normals, self.joints, self.weights, self.bind, self.skeleton.parents
+            self.vertices,
+            self.normals,
+            self.joints,
+            self.weights,
+            self.bind,
+            self.skeleton.parents,
+            self.triangles,
         )
 
     @cached_property

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fba.body.rings import rings
+
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
@@ -22,7 +24,8 @@ class Skinner:
     """Carries vertices with joints.
 
     vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
-    sum to 1. bind: float64 (J, 4, 4), the joints as modelled. parents: (J,).
+    sum to 1. bind: float64 (J, 4, 4), the joints as modelled. parents: (J,). triangles: int32 (F, 3), by
+    which normals follow the surface (`fba.body.rings`); without them they turn as their vertices do.
 
     Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
     several threads, one after the other.
@@ -36,6 +39,7 @@ class Skinner:
         weights: Float32,
         bind: Float64,
         parents: npt.NDArray[np.integer[Any]],
+        triangles: Int32 | None = None,
     ) -> None:
         # numba is imported here, with the first body that moves
         from fba.body import skinning_loops
@@ -49,6 +53,8 @@ class Skinner:
         self._normals = np.ascontiguousarray(normals, dtype=np.float32)
         self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
         self._parents = np.ascontiguousarray(parents, dtype=np.int64)
+        faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
+        self._around, self._numbers = rings(self._vertices, self._normals, faces)
         self._scratch = np.empty((len(bind), 12), dtype=np.float32)
         self._lock = threading.Lock()
 
@@ -105,16 +111,24 @@ class Skinner:
                 raise ValueError("out and normals share memory; give each an array of its own")
         placed = out[None] if single else out
         upright = placed[:0] if normals is None else normals[None] if single else normals
-        mesh = (vertices, modelled, self._joints, self._weights, self._counts, self._scratch)
+        mesh = (vertices, modelled, self._joints, self._weights, self._counts, self._around, self._numbers)
         with self._lock, np.errstate(all="ignore"):
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)
                 if method == "dual":
                     self._loops.dual_frames(
-                        frames[part], self._inverse, self._parents, *mesh, placed[part], upright[part]
+                        frames[part],
+                        self._inverse,
+                        self._parents,
+                        *mesh,
+                        self._scratch,
+                        placed[part],
+                        upright[part],
                     )
                 else:
-                    self._loops.linear_frames(frames[part], self._inverse, *mesh, placed[part], upright[part])
+                    self._loops.linear_frames(
+                        frames[part], self._inverse, *mesh, self._scratch, placed[part], upright[part]
+                    )
         return out
 
     def _frames(self, matrices: npt.ArrayLike) -> tuple[Float64, bool]:

@@ -22,32 +22,33 @@ TINY = np.float32(1e-30)
 @compiled
 def dual_frames(
     matrices: Float64, inverse: Float64, parents: Int64, vertices: Float32, upright: Float32,
-    joints: Int32, weights: Float32, counts: Int32, scratch: Float32, out: Float32, normals: Float32,
+    joints: Int32, weights: Float32, counts: Int32, around: Int32, numbers: Float32, scratch: Float32,
+    out: Float32, normals: Float32,
 ) -> None:  # fmt: skip
     """Dual-quaternion skinning of T frames (Kavan and others, "Skinning with dual quaternions", 2007).
 
     matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, upright (V, 3): as modelled.
-    joints, weights (V, 4): those that carry, first; counts (V,): how many. scratch (J, 12). out (T, V, 3).
-    normals: the same, or (0, V, 3) for none.
+    joints, weights (V, 4): those that carry, first; counts (V,): how many. around, numbers: see `rings`.
+    scratch (J, 12). out (T, V, 3). normals: the same, or (0, V, 3) for none.
     """
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
         _duals(matrices[frame], inverse, parents, scratch)
         x0, y0, z0 = np.float32(root[0, 3]), np.float32(root[1, 3]), np.float32(root[2, 3])
+        upper = normals[frame] if normals.shape[0] else out[frame]
+        wanted = upright if normals.shape[0] else upright[:0]
+        _dual_places(
+            vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], wanted, around, upper
+        )
         if normals.shape[0]:
-            _dual_places(
-                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright, normals[frame]
-            )
-        else:
-            _dual_places(
-                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright[:0], out[frame]
-            )
+            _across(out[frame], around, numbers, upper)
 
 
 @compiled
 def linear_frames(
     matrices: Float64, inverse: Float64, vertices: Float32, upright: Float32,
-    joints: Int32, weights: Float32, counts: Int32, scratch: Float32, out: Float32, normals: Float32,
+    joints: Int32, weights: Float32, counts: Int32, around: Int32, numbers: Float32, scratch: Float32,
+    out: Float32, normals: Float32,
 ) -> None:  # fmt: skip
     """Linear-blend skinning of T frames; arguments as `dual_frames`."""
     for frame in range(matrices.shape[0]):
@@ -62,14 +63,13 @@ def linear_frames(
                         total -= root[row, 3]
                     scratch[joint, 4 * row + column] = total
         x0, y0, z0 = np.float32(root[0, 3]), np.float32(root[1, 3]), np.float32(root[2, 3])
+        upper = normals[frame] if normals.shape[0] else out[frame]
+        wanted = upright if normals.shape[0] else upright[:0]
+        _linear_places(
+            vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], wanted, around, upper
+        )
         if normals.shape[0]:
-            _linear_places(
-                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright, normals[frame]
-            )
-        else:
-            _linear_places(
-                vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], upright[:0], out[frame]
-            )
+            _across(out[frame], around, numbers, upper)
 
 
 @compiled
@@ -132,7 +132,8 @@ def _quaternion(s: Float64) -> tuple[float, float, float, float]:
 @compiled
 def _dual_places(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
-    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32, upright: Float32, normals: Float32,
+    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32,
+    upright: Float32, around: Int32, normals: Float32,
 ) -> None:  # fmt: skip
     with_normals = upright.shape[0] > 0
     for i in range(vertices.shape[0]):
@@ -162,7 +163,7 @@ def _dual_places(
         out[i, 0] = px + per * (y * uz - z * uy + tx) + x0
         out[i, 1] = py + per * (z * ux - x * uz + ty) + y0
         out[i, 2] = pz + per * (x * uy - y * ux + tz) + z0
-        if with_normals:
+        if with_normals and around[i, 0] < 0:
             px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
             ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
             normals[i, 0] = px + per * (y * uz - z * uy)
@@ -173,7 +174,8 @@ def _dual_places(
 @compiled
 def _linear_places(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, tops: Float32,
-    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32, upright: Float32, normals: Float32,
+    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32,
+    upright: Float32, around: Int32, normals: Float32,
 ) -> None:  # fmt: skip
     with_normals = upright.shape[0] > 0
     m = np.empty(12, dtype=np.float32)
@@ -187,7 +189,7 @@ def _linear_places(
         out[i, 0] = m[0] * px + m[1] * py + m[2] * pz + m[3] + x0
         out[i, 1] = m[4] * px + m[5] * py + m[6] * pz + m[7] + y0
         out[i, 2] = m[8] * px + m[9] * py + m[10] * pz + m[11] + z0
-        if with_normals:
+        if with_normals and around[i, 0] < 0:
             px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
             nx = m[0] * px + m[1] * py + m[2] * pz
             ny = m[4] * px + m[5] * py + m[6] * pz
@@ -197,3 +199,23 @@ def _linear_places(
             normals[i, 0] = nx * per
             normals[i, 1] = ny * per
             normals[i, 2] = nz * per
+
+
+@compiled
+def _across(places: Float32, around: Int32, numbers: Float32, normals: Float32) -> None:
+    """Normals from the places of neighbours: see `rings`."""
+    for i in range(places.shape[0]):
+        a, b, c, d = around[i, 0], around[i, 1], around[i, 2], around[i, 3]
+        if a < 0:
+            continue
+        tx, ty, tz = places[a, 0] - places[c, 0], places[a, 1] - places[c, 1], places[a, 2] - places[c, 2]
+        ux, uy, uz = places[b, 0] - places[d, 0], places[b, 1] - places[d, 1], places[b, 2] - places[d, 2]
+        x, y, z = numbers[i, 0], numbers[i, 1], numbers[i, 2]
+        nx = x * tx + y * ux + z * (ty * uz - tz * uy)
+        ny = x * ty + y * uy + z * (tz * ux - tx * uz)
+        nz = x * tz + y * uz + z * (tx * uy - ty * ux)
+        length = nx * nx + ny * ny + nz * nz
+        per = ONE / np.sqrt(length) if length > TINY else ONE
+        normals[i, 0] = nx * per
+        normals[i, 1] = ny * per
+        normals[i, 2] = nz * per
