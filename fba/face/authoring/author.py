@@ -264,7 +264,7 @@ class _Authoring:
             if pupils:
                 self.moves[PUPIL_FAPS[side]] = pupils
             else:
-                self.lost[PUPIL_FAPS[side]] = f"the {side} eyeball has no vertices within its iris"
+                self.lost[PUPIL_FAPS[side]] = f"the {side} eyeball has no vertices about its pupil"
 
     def _tongue(self) -> None:
         tongues = [part for part in self.parts if part.kind == "tongue" and len(part.vertices)]

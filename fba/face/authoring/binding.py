@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,7 @@ TOLERANCE = 0.15
 """A point may lie this far from its part, as a share of the face's size."""
 LIP_SLACK = 0.02
 """Between lips that touch the right one may be this much further away, as a share of the face's size."""
+JAW_OF_TEETH = {"9.8": 1, "9.10": 1, "9.9": -1, "9.11": -1}
 UPPER_LIP, LOWER_LIP = ("2.2", "2.6", "2.7"), ("2.3", "2.8", "2.9")
 
 
@@ -72,6 +74,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
     vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
     found = given.astype(np.int32)
     far: dict[str, float] = {}
+    pieces = cache(lambda: _pieces(parts, KINDS_OF_POINT["9.8"]))
     sought = [name for name in names() if found[row_of()[name]] < 0 and name not in FREE_POINTS]
     for name in sought:
         row = row_of()[name]
@@ -80,6 +83,8 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
             continue
         away = np.linalg.norm(vertices[pool] - points[row], axis=1)
         nearest = int(away.argmin())
+        if name in JAW_OF_TEETH:
+            nearest = _in_jaw(vertices[pool], pieces(), away, JAW_OF_TEETH[name], LIP_SLACK * size)
         if away[nearest] > TOLERANCE * size:
             far[name] = float(away[nearest])
         else:
@@ -130,6 +135,28 @@ def part_lips(
     held = found >= 0
     placed[held] = vertices[found[held]]
     return Binding(placed, found, binding.far)
+
+
+def _pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:
+    """Connected piece of each vertex of the parts of some kinds."""
+    found, count = [np.zeros(0, dtype=np.intp)], 0
+    for part in parts:
+        if part.kind in kinds:
+            own = Surface([part])
+            found.append(own.component[own.number] + count)
+            count += int(own.component.max(initial=-1)) + 1
+    return np.concatenate(found)
+
+
+def _in_jaw(vertices: Float64, piece: npt.NDArray[np.intp], away: Float64, jaw: int, slack: float) -> int:
+    """Of the vertices that are nearest within some slack, the nearest of the highest or lowest piece.
+
+    Teeth touch, so the nearest vertex may be in the wrong jaw. jaw: 1 upper, -1 lower.
+    """
+    close = np.flatnonzero(away <= away.min() + slack)
+    height = jaw * (np.bincount(piece, vertices[:, 1]) / np.maximum(np.bincount(piece), 1))[piece[close]]
+    right = close[height >= height.max() - slack]
+    return int(right[away[right].argmin()])
 
 
 def lip_sides(

@@ -21,6 +21,8 @@ Float64 = npt.NDArray[np.float64]
 
 PUPIL_OF_IRIS = 1 / 3
 """Of a neutral face."""
+PUPIL_REACH = 1.5
+"""An eyeball without vertices this close to its axis, in radii of the pupil, has no pupil to move."""
 SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
 """Share of the pupil's, and of the iris's radius, at which the pupil stops."""
 
@@ -106,7 +108,7 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
         across = points - eye.centre - along[:, None] * eye.gaze
         distance = np.linalg.norm(across, axis=1)
         moving = np.flatnonzero((distance < iris) & (along > 0) & (distance > 1e-9))
-        if not len(moving):
+        if not (distance[moving] < PUPIL_REACH * pupil).any():
             continue
         outward = across[moving] / distance[moving, None]
         now = np.array([np.interp(distance[moving], [0, pupil, iris], [0, radius, iris]) for radius in radii])

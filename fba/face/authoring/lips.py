@@ -104,6 +104,9 @@ def _why_not(marks: Landmarks, number: int) -> str:
     needed = [name for name in ("upper", "lower") if not len(marks.contour(f"{name} {side} lip"))]
     if needed:
         return f"there is no {needed[0]} {side} lip contour"
+    own = next(pair for pair in HANDLES.values() if point in pair)
+    if not inner and marks.vertex.get(own[0]) == marks.vertex[point]:
+        return f"feature point {point} stands on the same vertex as {own[0]}, which the inner lip's FAP moves"
     if inner and marks.vertex.get("2.2") == marks.vertex.get("2.3") and marks.has("2.2"):
         return "the mouth has no opening: upper and lower lip are one"
     return ""
@@ -137,6 +140,11 @@ def _fields(marks: Landmarks) -> _Lips:
                 values[walk[:, None], [names.index(name) for name in handles]] = shares(
                     marks.surface.vertices, walk, nodes
                 )
+    for name, pair in HANDLES.items():
+        for point in pair:
+            if marks.has(point) and not np.isnan(values[marks.vertex[point], 0]):
+                # where one contour runs through a point of the other, the point comes first
+                values[marks.vertex[point]] = np.array(names) == name
     fixed = np.flatnonzero(~np.isnan(values[:, 0]))
     es = marks.fapu.ES * 1024
     near = marks.surface.distances(fixed, limit=2 * REACH * es)
@@ -152,6 +160,10 @@ def _fields(marks: Landmarks) -> _Lips:
 def _inward(marks: Landmarks) -> Float64:
     inner = marks.on_inner_lips | marks.inside_mouth
     outer = marks.on("upper outer lip", "lower outer lip") & ~marks.on_inner_lips
+    for inner_point, outer_point in HANDLES.values():
+        if marks.has(outer_point) and marks.vertex[outer_point] != marks.vertex.get(inner_point):
+            inner[marks.vertex[outer_point]] = False
+            outer[marks.vertex[outer_point]] = True
     if not outer.any():
         return np.ones(len(marks.surface))
     if not inner.any():
