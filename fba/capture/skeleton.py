@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack
 from fba.body import BapSolver
-from fba.capture import matching
+from fba.capture import direct, matching
 from fba.capture import spine as spines
 from fba.capture.motion import SkeletonMotion
 from fba.capture.retarget import Retarget
@@ -59,7 +60,9 @@ def from_skeleton(
     Bones point where the source's bones point; the spine's parts turn the vertebrae that carry them;
     where the source turns about an axis that a joint lacks, the joint before or after it turns instead.
     BAPs 181..183 are millimetres from the default standing place. Angles are within +-pi; they are not
-    clamped to the standard's ranges.
+    clamped to the standard's ranges. A skeleton of the standard's own joints that rests in the default
+    posture (`fba.capture.direct`) is taken joint for joint, wherever its feet are: ground has no say, and
+    spine only where it is "simple", "full" or a number.
 
     Raises ModelError where no family of names fits, the skeleton has no size or there are more than 500,000
     frames, ValueError for a bad option or joint name. Warns (FbaWarning) of joints that a limb lacks: they
@@ -93,10 +96,16 @@ def from_skeleton(
             FbaWarning,
             stacklevel=2,
         )
+    if joints is None and spine in ("spread", "joints") and direct.is_direct(motion, solver.skeleton):
+        return _track(motion, direct.values(motion, solver, scale, origin), set(motion.names))
     retarget = Retarget(motion, mapped, solver, scale, groups, spine in ("spread", "joints"))
-    values = retarget.values(origin, ground)
-    moved = np.zeros(BAP_COUNT, dtype=bool)
     turned = {*retarget.wanted, solver.skeleton.names[0]}
+    return _track(motion, retarget.values(origin, ground), turned)
+
+
+def _track(motion: SkeletonMotion, values: npt.NDArray[np.int32], turned: set[str]) -> Animation:
+    """The animation; turned: the joints whose BAPs are sent."""
+    moved = np.zeros(BAP_COUNT, dtype=bool)
     moved[[b.number - 1 for b in baps() if b.joint in turned]] = True
     track = BodyTrack(values, np.broadcast_to(moved, values.shape))
     return Animation(motion.rate, np.arange(len(motion)), None, track, motion.name)

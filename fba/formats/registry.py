@@ -99,7 +99,8 @@ def formats() -> tuple[Format, ...]:
         ),
         Format(
             "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-            place("sniff", "bvh"), place("read", "bvh"), None, ("body",), captured=True,
+            place("sniff", "bvh"), place("read", "bvh"), place("write", "bvh_writing"), ("body",),
+            captured=True,
         ),
         Format(
             "gltf", (".glb", ".gltf"), "glTF 2.0: a skeleton and its animation, as exported from FBX",
