@@ -77,7 +77,7 @@ class FaceDefMesh:
 
     def shift(self, value: float) -> Float32:
         """How far each vertex is moved by a FAP value, in FAPU: float32 (N, 3)."""
-        return interval_lengths(self.borders, value) @ self.displacements  # type: ignore[no-any-return]
+        return interval_lengths(self.borders, value) @ self.displacements
 
 
 def interval_lengths(borders: Int32, value: float) -> Float32:
