@@ -71,15 +71,16 @@ def from_skeleton(
     solver = solver if solver is not None else BapSolver()
     _, mapped = matching.match(motion.names) if joints is None else ("", _given(motion, joints, solver))
     mapped = {joint: number for joint, number in mapped.items() if joint in solver.skeleton}
-    if rate is not None:
-        motion = motion.resample(rate)
+    rate = motion.rate if rate is None else Fraction(rate)
     if not len(motion):
         raise ModelError("the motion has no frames")
-    if len(motion) > MOST_FRAMES:
+    frames = int((len(motion) - 1) * max(rate, Fraction(0)) / motion.rate) + 1  # before any is made
+    if frames > MOST_FRAMES:
         raise ModelError(
-            f"the motion has {len(motion)} frames, more than {MOST_FRAMES}; "
+            f"the motion has {frames} frames at {float(rate):g} frames/s, more than {MOST_FRAMES}; "
             "cut it into pieces, or give a lower rate"
         )
+    motion = motion.resample(rate)
     if origin not in ORIGINS:
         raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
     if ground not in GROUNDS:

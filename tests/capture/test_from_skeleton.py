@@ -220,7 +220,7 @@ def test_resampling_turns_by_slerp() -> None:
     )
     with pytest.raises(ValueError, match="positive"):
         from_skeleton(captured, -1)
-    with pytest.raises(ValueError, match="too many"):
+    with pytest.raises(ModelError, match="500000"):
         from_skeleton(captured, 10**12)
 
 
