@@ -46,7 +46,10 @@ DEFAULT_RATE = Fraction(30)
 @options.bap_steps_option
 @click.option("--list", "listed", is_flag=True, help="Print the characters that there are.")
 @click.option(
-    "--find", type=options.EXISTING, metavar="FILE", help="Print the cycles and poses of a walk that is there."
+    "--find",
+    type=options.EXISTING,
+    metavar="FILE",
+    help="Print the cycles and poses in a walk.",
 )
 @options.json_option
 def command(
@@ -111,9 +114,7 @@ def _list(as_json: bool) -> None:
 
     known = [gait.Character.named(name) for name in gait.characters()]
     if as_json:
-        rows = [
-            {"name": c.name, "about": c.about, "stride": c.stride, "seconds": c.seconds} for c in known
-        ]
+        rows = [{"name": c.name, "about": c.about, "stride": c.stride, "seconds": c.seconds} for c in known]
         options.print_json(rows)
         return
     width = max(len(c.name) for c in known)

@@ -7,19 +7,24 @@ Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `character
 from fba.body.gait.characters import POSES, Character, Pose, characters
 from fba.body.gait.detection import Cycle, Gait, Step, detect
 from fba.body.gait.measure import Soles, advance, soles
+from fba.body.gait.reduction import Errors, Reduced, compare, reduce
 from fba.body.gait.synthesis import walk
 
 __all__ = [
     "POSES",
     "Character",
     "Cycle",
+    "Errors",
     "Gait",
     "Pose",
+    "Reduced",
     "Soles",
     "Step",
     "advance",
     "characters",
+    "compare",
     "detect",
+    "reduce",
     "soles",
     "walk",
 ]

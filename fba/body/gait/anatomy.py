@@ -44,8 +44,8 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Anatomy:
-    """skeleton, its sides by letter ("l", "r"), its size against the default body, the pelvis's centre from the
-    root."""
+    """A skeleton, its sides by letter ("l", "r"), scale: its size against the default body, and pelvis: the
+    centre of the sacroiliac joint from the root."""
 
     skeleton: Skeleton
     sides: dict[str, Side]

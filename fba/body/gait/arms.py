@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fba.body.gait.anatomy import Anatomy, Side, Writer
+from fba.body.gait.anatomy import Side, Writer
 from fba.body.gait.characters import Character
 from fba.body.gait.curves import periodic
-from fba.body.gait.plan import KNOTS
+from fba.body.gait.plan import KNOTS, Plan
 from fba.body.gait.rotations import Float, limb_angles
 from fba.body.solver import BapSolver
 
@@ -24,14 +24,16 @@ def goals(side: Side, character: Character, size: float) -> Float:
     forward = forward.mean() + swing * np.clip(size, 0.0, 1.4)
     goal = np.stack([side.way * out, -down, forward], axis=-1) * side.arm.reach
     length = np.linalg.norm(goal, axis=-1, keepdims=True)
-    return goal * np.minimum(1.0, _REACH * side.arm.reach / length)
+    result: Float = goal * np.minimum(1.0, _REACH * side.arm.reach / length)
+    return result
 
 
-def swing(writer: Writer, anatomy: Anatomy, character: Character, phase: Float, size: float) -> None:
+def swing(writer: Writer, plan: Plan, phase: Float) -> None:
     """Write the angles of shoulders and elbows; the spine stands in writer.values already.
 
     At the poses the palms are at their goals; in between, angles are interpolated.
     """
+    anatomy, character = plan.anatomy, plan.character
     solver = BapSolver(anatomy.skeleton)
     girdle = anatomy.skeleton.parents
     for letter, side in anatomy.sides.items():
@@ -41,12 +43,14 @@ def swing(writer: Writer, anatomy: Anatomy, character: Character, phase: Float, 
         shoulder = anatomy.skeleton.number(f"{letter}_shoulder")
         matrices = solver.pose(writer.values[nearest])[:, girdle[shoulder], :3, :3]
         # goals are meant in a frame that walks with the body, level and looking ahead
-        local = np.einsum("tji,tj->ti", matrices, goals(side, character, size))
+        local = np.einsum("tji,tj->ti", matrices, goals(side, character, plan.size))
         twist = -side.way * np.radians(character.arms.twist)
         upper, bend = side.arm.solve(local, np.full(len(KNOTS), twist))
         x, y, z = limb_angles(upper)
         for axis, angle in ((0, x), (1, y), (2, z)):
-            writer.turn(f"{letter}_shoulder", axis, periodic(KNOTS, angle, phase - start - _LATE))
-        writer.turn(f"{letter}_elbow", 0, -periodic(KNOTS, bend, phase - start - _LATE))
+            writer.turn(
+                f"{letter}_shoulder", axis, periodic(KNOTS, angle, phase - start - _LATE, plan.interpolation)
+            )
+        writer.turn(f"{letter}_elbow", 0, -periodic(KNOTS, bend, phase - start - _LATE, plan.interpolation))
         wrist = -side.way * np.radians(character.arms.wrist)
         writer.turn(f"{letter}_wrist", 2, np.full(phase.shape, wrist))

@@ -1,8 +1,8 @@
-"""Who walks: the four characteristic poses and the posture of a character, from poses.csv and characters.json.
+"""Who walks: the four characteristic poses and the posture of a character, poses.csv and characters.json.
 
-Digest faces-and-emotions.md, 2.3 and 2.6. A pose is half a cycle's: `stance` is the leg that carries, `swing`
-the other (in the extended pose the rear one, which swings next); the other half of the cycle has the sides
-exchanged. A cell that a character leaves empty is that of `normal`.
+Digest faces-and-emotions.md, 2.3 and 2.6. A pose is half a cycle's: `stance` is the leg that carries,
+`swing` the other (in the extended pose the rear one, which swings next); the other half of the cycle has the
+sides exchanged. A cell that a character leaves empty is that of `normal`.
 """
 
 from __future__ import annotations
@@ -184,7 +184,8 @@ def _characters() -> dict[str, Character]:
         both = {**normal, **own}
         result[name] = Character(
             name,
-            *(both[key] for key in ("about", "seconds", "stride", "width", "toes_out")),
+            both["about"],
+            *(float(both[key]) for key in ("seconds", "stride", "width", "toes_out")),
             Pelvis(**parts["pelvis"]),
             Spine(**parts["spine"]),
             Arms(**parts["arms"]),

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import numpy.typing as npt
 
 Float = npt.NDArray[np.float64]
+Interpolation = Literal["linear", "smooth"]
+""""linear" as in the digest, or cubic."""
 
 
 def smoothstep(value: npt.ArrayLike) -> Float:
@@ -15,20 +19,38 @@ def smoothstep(value: npt.ArrayLike) -> Float:
     return result
 
 
-def periodic(knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike) -> Float:
+def checked(interpolation: Interpolation) -> Interpolation:
+    """The same; ValueError on another word."""
+    if interpolation not in ("linear", "smooth"):
+        raise ValueError(f"interpolation must be linear or smooth, not {interpolation!r}")
+    return interpolation
+
+
+def cosine(knots: npt.ArrayLike, phase: Float, interpolation: Interpolation) -> Float:
+    """A wave that is 1 at phase 0."""
+    if interpolation == "smooth":
+        return np.cos(2.0 * np.pi * phase)
+    return periodic(knots, np.cos(2.0 * np.pi * np.asarray(knots)), phase, interpolation)
+
+
+def periodic(
+    knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike, interpolation: Interpolation = "smooth"
+) -> Float:
     """A periodic curve that rises and falls only where its values do: flat where two neighbours are equal.
 
     knots: increasing phases in 0..1, values: one each. Cubic pieces, tangents by Fritsch and Butland (1984).
     """
     x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
     u = np.asarray(phase, dtype=np.float64)
+    if interpolation == "linear":
+        return np.interp(u, x, y, period=1.0)
     step = np.diff(np.append(x, x[0] + 1.0))
     slope = np.diff(np.append(y, y[0])) / step
     before, step_before = np.roll(slope, 1), np.roll(step, 1)
     one, two = step_before + 2.0 * step, 2.0 * step_before + step
     turns = before * slope <= 0.0
     safe = [np.where(turns, 1.0, s) for s in (before, slope)]
-    tangent = np.where(turns, 0.0, (one + two) / (two / safe[0] + one / safe[1]))
+    tangent: Float = np.where(turns, 0.0, (one + two) / (two / safe[0] + one / safe[1]))
     u = np.mod(u - x[0], 1.0) + x[0]
     at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)
     after = (at + 1) % len(x)
@@ -46,7 +68,7 @@ def spline(knots: npt.ArrayLike, values: Float, first: Float, last: Float, phase
     for i in range(1, count - 1):
         matrix[i, i - 1 : i + 2] = h[i], 2.0 * (h[i - 1] + h[i]), h[i - 1]
         right[i] = 3.0 * (h[i] * slope[i - 1] + h[i - 1] * slope[i])
-    tangent = np.linalg.solve(matrix, right.reshape(count, -1)).reshape(y.shape)
+    tangent: Float = np.linalg.solve(matrix, right.reshape(count, -1)).reshape(y.shape)
     u = np.asarray(phase, dtype=np.float64)
     at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, count - 2)
     tail = (...,) + (None,) * (y.ndim - 1)

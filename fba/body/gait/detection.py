@@ -1,8 +1,8 @@
 """Walking found in captured motion: contacts, cycles, the four characteristic poses.
 
-Digest faces-and-emotions.md, 2.4. A foot touches the ground where its heel is furthest ahead of the pelvis, and
-leaves it where its toes are furthest behind (Zeni, Richards, Higginson 2008): that holds on any ground, on a
-treadmill, and on curves, with "ahead" as where the pelvis faces. Recoil, passing and anticipation are
+Digest faces-and-emotions.md, 2.4. A foot touches the ground where its heel is furthest ahead of the pelvis,
+and leaves it where its toes are furthest behind (Zeni, Richards, Higginson 2008): that holds on any ground,
+on a treadmill, and on curves, with "ahead" as where the pelvis faces. Recoil, passing and anticipation are
 extrema of the knees and of the swinging thigh.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,13 @@ UNEVEN = 2.2
 """How much longer one of the two steps of a cycle may take than the other."""
 SHORTEST_SWING = 0.12
 """Share of the leg's length by which a foot must come forward, against the pelvis, to have made a step."""
+SHORTEST_STEP = 0.08
+"""Share of the leg's length by which a foot must be ahead of the other as it comes to the ground."""
+SINKING, LEAVING = 0.06, 0.08
+"""Seconds after a foot's foremost place, and about its hindmost, in which its height says when it meets or
+leaves the ground."""
+TOUCH = 0.008
+"""Share of the leg's length that a foot on the ground may be above its lowest place."""
 SMOOTH = 0.02
 """Seconds over which curves are smoothed before their extrema are looked for."""
 FACING = 0.2
@@ -40,9 +48,9 @@ _NAMES = {"l": "left", "r": "right"}
 class Step:
     """Half a cycle: from the contact of one foot to that of the other.
 
-    side: "left" or "right", the foot that touches the ground first and carries. poses: frames of the four poses,
-    in order. end: frame of the other foot's contact. off: frame in which the other foot left the ground,
-    or None where that was not seen.
+    side: "left" or "right", the foot that touches the ground first and carries. poses: frames of the four
+    poses, in order. end: frame of the other foot's contact. off: frame in which the other foot left the
+    ground, or None where that was not seen.
     """
 
     side: str
@@ -59,9 +67,9 @@ class Step:
 class Cycle:
     """Two steps, from a contact of a foot to its next.
 
-    seconds: how long. stride: metres between the footprints. stance: share of the cycle for which the foot was
-    on the ground, NaN where its end was not seen. turn: degrees by which the body turned left. running: whether
-    both feet were off the ground at some time.
+    seconds: how long. stride: metres between the footprints. stance: share of the cycle for which the foot
+    was on the ground, NaN where its end was not seen. turn: degrees by which the body turned left.
+    running: whether both feet were off the ground at some time.
     """
 
     steps: tuple[Step, Step]
@@ -139,9 +147,7 @@ class Gait:
             f"walking in {int(self.walking.sum())} of {self.frames} frames",
             "side   " + "".join(f"{pose:>13}" for pose in POSES) + "          end",
         ]
-        result += [
-            f"{s.side:7}" + "".join(f"{frame:13}" for frame in (*s.poses, s.end)) for s in self.steps
-        ]
+        result += [f"{s.side:7}" + "".join(f"{frame:13}" for frame in (*s.poses, s.end)) for s in self.steps]
         for c in self.cycles:
             stance = "" if np.isnan(c.stance) else f", stance {100 * c.stance:.0f} %"
             kind = ", running" if c.running else ""
@@ -174,12 +180,12 @@ def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "
     order = sorted((frame, letter) for letter, frames in contacts.items() for frame in frames)
     steps = [
         step
-        for (start, side), (end, other) in zip(order[:-1], order[1:], strict=True)
+        for (start, side), (end, other) in pairwise(order)
         if side != other and (step := _step(curves, side, start, end, offs[other])) is not None
     ]
     cycles = [
         cycle
-        for one, two in zip(steps[:-1], steps[1:], strict=True)
+        for one, two in pairwise(steps)
         if one.end == two.start and (cycle := _cycle(curves, one, two)) is not None
     ]
     return Gait(animation.rate, count, tuple(steps), tuple(cycles))
@@ -188,7 +194,8 @@ def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "
 @dataclass(frozen=True, eq=False)
 class _Curves:
     """times: (T,). By side: heel and toes ahead of the pelvis (T,), metres; knee bent (T,), thigh raised
-    (T,), radians; heel in the world (T, 3). heading: (T,), radians about y. reach: metres, of a leg."""
+    (T,), radians; heel in the world (T, 3), height of the foot's lowest point (T,). heading: (T,), radians about y.
+    reach: metres, of a leg."""
 
     times: Float
     heel: dict[str, Float]
@@ -196,6 +203,7 @@ class _Curves:
     knee: dict[str, Float]
     thigh: dict[str, Float]
     place: dict[str, Float]
+    lowest: dict[str, Float]
     heading: Float
     reach: float
 
@@ -208,7 +216,7 @@ class _Curves:
         facing[:, 1] = 0.0
         facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
         points = sole_points(anatomy, matrices).points
-        heel, toes, knee, thigh, place = {}, {}, {}, {}, {}
+        heel, toes, knee, thigh, place, lowest = {}, {}, {}, {}, {}, {}
         for row, letter in enumerate("lr"):
             hip, knee_at, ankle = (
                 matrices[:, number(f"{letter}_{j}"), :3, 3] for j in ("hip", "knee", "ankle")
@@ -225,25 +233,45 @@ class _Curves:
             raised = np.arctan2(np.sum(upper * facing, axis=1), -upper[:, 1])
             thigh[letter] = _smoothed(raised, SMOOTH * rate)
             place[letter] = points[row, 0]
+            lowest[letter] = points[row, ..., 1].min(axis=0)
         heading = np.unwrap(np.arctan2(facing[:, 0], facing[:, 2]))
-        return cls(times, heel, toes, knee, thigh, place, heading, anatomy.sides["l"].leg.reach)
+        return cls(times, heel, toes, knee, thigh, place, lowest, heading, anatomy.sides["l"].leg.reach)
 
     def contacts(self, letter: str) -> list[int]:
-        return self._peaks(self.heel[letter])
+        """Frames in which the foot comes to the ground, ahead of the other."""
+        height, other = self.lowest[letter], self.heel["l" if letter == "r" else "r"]
+        found = []
+        for peak in self._peaks(self.heel[letter]):
+            if self.heel[letter][peak] - other[peak] < SHORTEST_STEP * self.reach:
+                continue
+            coming = height[peak : peak + self._frames(SINKING) + 1]
+            found.append(peak + int(np.argmax(coming <= coming.min() + TOUCH * self.reach)))
+        return found
 
     def offs(self, letter: str) -> list[int]:
-        return self._peaks(-self.toes[letter])
+        """Frames in which the foot is off the ground for the first time."""
+        height = self.lowest[letter]
+        found = []
+        for peak in self._peaks(-self.toes[letter]):
+            near = self._frames(LEAVING)
+            first = max(0, peak - near)
+            low = height[max(0, first - near) : peak + 1].min()
+            down = np.flatnonzero(height[first : peak + near // 2 + 1] <= low + TOUCH * self.reach)
+            found.append(first + int(down[-1]) + 1 if len(down) else peak)
+        return found
+
+    def _frames(self, seconds: float) -> int:
+        """At least one."""
+        return max(1, round(seconds / max(float(np.median(np.diff(self.times))), 1e-9)))
 
     def _peaks(self, curve: Float) -> list[int]:
         """Maxima that stand out; also of a curve that begins or ends at one, as loops do."""
         from scipy.signal import find_peaks
 
-        padded = np.concatenate([[curve[0] - 1e-9], curve, [curve[-1] - 1e-9]])
-        if len(curve) > 2:
-            padded[0], padded[-1] = curve.min() - 1.0, curve.min() - 1.0
-        spacing = STEP_SECONDS[0] / max(float(np.median(np.diff(self.times))), 1e-9)
+        edge = [float(curve.min()) - 1.0]
+        padded = np.concatenate([edge, curve, edge])
         found, _ = find_peaks(
-            padded, prominence=SHORTEST_SWING * self.reach, distance=max(1.0, spacing)
+            padded, prominence=SHORTEST_SWING * self.reach, distance=self._frames(STEP_SECONDS[0])
         )
         return [int(frame) - 1 for frame in found]
 
@@ -274,8 +302,11 @@ def _step(curves: _Curves, side: str, start: int, end: int, offs: list[int]) -> 
     recoil = start + 1 + int(np.argmax(early)) if len(early) else start + 1
     if not start + 1 < recoil < passing - 1:
         recoil = (start + passing) // 2
-    late = curves.thigh[other][passing + 1 : end]
+    # a thigh that still rises as the foot comes down has no extremum before: half way again
+    late = curves.thigh[other][passing + 1 : end - round(0.1 * length)]
     anticipation = passing + 1 + int(np.argmax(late)) if len(late) else passing
+    if not passing + 1 < anticipation < end - round(0.1 * length) - 1:
+        anticipation = (passing + end) // 2
     if not passing < anticipation < end or not start < recoil < passing:
         return None
     before = [frame for frame in offs if start - length <= frame < passing]

@@ -1,8 +1,8 @@
 """Where the feet are while they stand, and the legs that reach them.
 
-A foot lands on its heel, lies flat, and rises over the metatarsal joint while the toes stay flat: what touches
-does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3 and 4); so does the
-`plan`. What that leaves open, two feet on the ground at once, is closed here, by the legs.
+A foot lands on its heel, lies flat, and rises over the metatarsal joint while the toes stay flat: what
+touches does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3 and 4);
+so does the `plan`. What that leaves open, two feet on the ground at once, is closed here, by the legs.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from fba.body.gait.anatomy import Side
 from fba.body.gait.curves import smoothstep
-from fba.body.gait.rotations import Float, about, foot_angles, limb_angles, turned, turned_back
+from fba.body.gait.rotations import Float, about, foot_angles, limb_angles, turned
 
 TOE_OFF = 0.6
 """Fraction of the cycle at which a foot leaves the ground."""
@@ -76,8 +76,8 @@ def reach(side: Side, hip: Float, footing: Footing, knee_yaw: float, level_roll:
     """The leg from a hip (T, 3) to a foot. knee_yaw: where the knee points, about +y, radians.
 
     The heel hangs on the ankle, which rolls with the shin where the foot does not. So that neither heel nor
-    ball leaves its place, a flat foot turns a little about the metatarsal joint, by nothing where that roll is
-    level_roll, and less as the heel rises.
+    ball leaves its place, a flat foot turns a little about the metatarsal joint: by nothing where that roll
+    is level_roll, and less as the heel rises.
     """
     roll: Float | float = 0.0
     held = footing
@@ -131,9 +131,3 @@ def hip_height(side: Side, hip: Float, ankle: Float, bend: Float) -> Float:
     rest = np.square(side.leg.length(bend)) - np.square(gap[..., 0]) - np.square(gap[..., 2])
     result: Float = ankle[..., 1] + np.sqrt(np.maximum(rest, 1e-6))
     return result
-
-
-__all__ = [
-    "TOE_OFF", "Footing", "Leg", "ankle_place", "foot_turn", "hanging", "hip_angles", "hip_height", "hip_place",
-    "lowest", "reach", "standing", "turned_back",
-]  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 from fba.body.gait import ground
 from fba.body.gait.anatomy import Anatomy, Side
 from fba.body.gait.characters import CYCLE, PHASES, Character
-from fba.body.gait.curves import periodic, smoothstep, spline
+from fba.body.gait.curves import Interpolation, cosine, periodic, smoothstep, spline
 from fba.body.gait.ground import TOE_OFF, Footing, Leg
 from fba.body.gait.rotations import Float, about, limb_angles
 from fba.errors import ModelError
@@ -41,8 +41,15 @@ _TINY = 1e-4
 class Plan:
     """anatomy, character, and stride, metres; ModelError where the legs cannot take it."""
 
-    def __init__(self, anatomy: Anatomy, character: Character, stride: float) -> None:
+    def __init__(
+        self,
+        anatomy: Anatomy,
+        character: Character,
+        stride: float,
+        interpolation: Interpolation = "smooth",
+    ) -> None:
         self.anatomy, self.character, self.stride = anatomy, character, stride
+        self.interpolation: Interpolation = interpolation
         self.size = stride / (character.stride * anatomy.scale)
         """The stride against the character's own."""
         share = np.clip(self.size, 0.0, 1.3)
@@ -67,11 +74,13 @@ class Plan:
         phase = np.mod(phase, 1.0)
         flat = self._foot_values[1]
         landing = flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / FLAT, 0.0) ** 1.5
-        return np.where(phase < FLAT, landing, periodic(self._foot_knots, self._foot_values, phase))
+        return np.where(
+            phase < FLAT, landing, periodic(self._foot_knots, self._foot_values, phase, self.interpolation)
+        )
 
     def knee(self, phase: Float) -> Float:
         """Bend that the poses ask for, at a phase of the leg's own."""
-        return periodic(KNOTS, self._knee, phase)
+        return periodic(KNOTS, self._knee, phase, self.interpolation)
 
     def toes(self, phase: Float) -> Float:
         """Bend of the toes against the foot, up, radians: they lie flat until they leave the ground."""
@@ -85,9 +94,11 @@ class Plan:
 
     def pelvis_angles(self, phase: Float) -> tuple[Float, Float]:
         """Torsion about y and roll about z of the pelvis, against the root."""
-        pelvis, angle = self.character.pelvis, 2.0 * np.pi * phase
+        pelvis = self.character.pelvis
         turn = np.radians(pelvis.turn) * np.clip(self.size, 0.0, 1.5)
-        return turn * np.cos(angle), -np.radians(pelvis.list) * np.sin(angle)
+        ahead = cosine(KNOTS, phase, self.interpolation)
+        hangs = cosine(KNOTS, phase - 0.25, self.interpolation)
+        return turn * ahead, -np.radians(pelvis.list) * hangs
 
     def pelvis(self, phase: Float) -> Float:
         turn, roll = self.pelvis_angles(phase)
@@ -159,8 +170,8 @@ class Plan:
     def _too_long(self) -> ModelError:
         return ModelError(
             f"gait: a stride of {self.stride:g} m is too long for {self.character.name!r} on legs of "
-            f"{self.anatomy.sides['r'].leg.reach:.2f} m; a stride is two steps, from the contact of a foot to "
-            f"its next, and {self.character.stride * self.anatomy.scale:.2f} m of this character's own"
+            f"{self.anatomy.sides['r'].leg.reach:.2f} m; a stride is two steps, from the contact of a foot "
+            f"to its next, and {self.character.stride * self.anatomy.scale:.2f} m of this character's own"
         )
 
     def root(self, phase: Float) -> Float:
@@ -233,7 +244,9 @@ class Plan:
         return knots, np.stack(values), off, 0.5 * (natural + on)
 
     def _own_landing(self, side: Side) -> float:
-        plan = Plan(self.anatomy, self.character, self.character.stride * self.anatomy.scale)
+        plan = Plan(
+            self.anatomy, self.character, self.character.stride * self.anatomy.scale, self.interpolation
+        )
         start = np.array([0.0 if side.letter == "r" else 0.5])
         return float(-np.degrees(limb_angles(plan.standing_leg(side, start).thigh)[0][0]))
 
@@ -243,7 +256,11 @@ class Plan:
         stands = own <= TOE_OFF
         yaw = side.way * self._yaw
         knots, values, off, on = self._swings[side.letter]
-        x, z, bend = np.moveaxis(spline(knots, values, off, on, np.clip(own, TOE_OFF, 1.0)), -1, 0)
+        swing = np.clip(own, TOE_OFF, 1.0)
+        if self.interpolation == "linear":
+            x, z, bend = (np.interp(swing, knots, column) for column in values.T)
+        else:
+            x, z, bend = np.moveaxis(spline(knots, values, off, on, swing), -1, 0)
         thigh = about(0, x) @ about(2, z) @ about(1, np.full(x.shape, yaw))
         hip = self.hip(side, root, phase)
         swinging = ground.hanging(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fba.body.gait.anatomy import Writer
-from fba.body.gait.characters import Character
+from fba.body.gait.curves import cosine
+from fba.body.gait.plan import KNOTS, Plan
 from fba.body.gait.rotations import Float
 from fba.body.skeleton import Skeleton
 
@@ -25,18 +26,19 @@ def spread(writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: in
         writer.turn(joint, axis, angle / len(there))
 
 
-def hold(writer: Writer, skeleton: Skeleton, character: Character, phase: Float, size: float) -> None:
+def hold(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float) -> None:
     """Write the posture at phases of the cycle, from the contact of the right foot on.
 
-    size: the stride against the character's own: what swings with the legs swings as much as they.
     The shoulders turn against the pelvis; the neck turns back, so that the face looks ahead.
     """
-    spine, arms = character.spine, character.arms
-    angle = 2.0 * np.pi * phase
+    spine, arms = plan.character.spine, plan.character.arms
+    kind = plan.interpolation
     still = np.ones(phase.shape)
-    turn = -np.radians(spine.turn) * min(size, 1.5) * np.cos(angle)
-    lean = np.radians(spine.lean) * np.sin(angle)  # the right leg carries first: to the right
-    nod = np.radians(spine.nod) * np.cos(2.0 * angle)
+    turn = -np.radians(spine.turn) * min(plan.size, 1.5) * cosine(KNOTS, phase, kind)
+    lean = np.radians(spine.lean) * cosine(
+        KNOTS, phase - 0.25, kind
+    )  # the right leg carries first: to the right
+    nod = np.radians(spine.nod) * np.cos(4.0 * np.pi * phase)
     for joints, x, y, z in (
         (LUMBAR, spine.lumbar, 0.35 * turn, 0.6 * lean),
         (THORAX, spine.thorax, 0.65 * turn, 0.4 * lean),

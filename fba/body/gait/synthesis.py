@@ -10,6 +10,7 @@ from fba.animation import MAX_FRAMES, Animation, BodyTrack
 from fba.body.gait import arms, ground, posture
 from fba.body.gait.anatomy import Anatomy, Writer
 from fba.body.gait.characters import Character
+from fba.body.gait.curves import Interpolation, checked
 from fba.body.gait.plan import SHORTEST, Plan
 from fba.body.gait.rotations import Float
 from fba.body.skeleton import Skeleton
@@ -26,6 +27,7 @@ def walk(
     cycles: float | None = None,
     seconds: float | None = None,
     rate: Fraction | int | str = 30,
+    interpolation: Interpolation = "smooth",
     in_place: bool = False,
     skeleton: Skeleton | None = None,
 ) -> Animation:
@@ -37,6 +39,7 @@ def walk(
     cycles: how many (4 where neither is given); the last frame is the first pose again, one stride on.
         seconds: in place of cycles, how long, without that last frame.
     rate: frames a second; a cycle has a whole number of frames, 32 of the normal character at 30.
+    interpolation: between the poses "smooth", by cubic curves, or "linear", as in the digest.
     in_place: leave out the way forward: the ground moves back instead.
     skeleton: the default body where None.
 
@@ -57,7 +60,7 @@ def walk(
             f"{character.seconds:g} s; needs at least {FEWEST}, and a plausible rate"
         )
     count = _count(cycles, seconds, rate, period)
-    one = cycle(anatomy, character, stride, period)
+    one = cycle(Plan(anatomy, character, stride, checked(interpolation)), period)
     frames = np.arange(count)
     values = one.values[frames % period]
     forward = one.forward_column
@@ -72,17 +75,17 @@ def walk(
     return Animation(rate, frames, None, BodyTrack(integers, mask), name)
 
 
-def cycle(anatomy: Anatomy, character: Character, stride: float, period: int) -> Writer:
+def cycle(plan: Plan, period: int) -> Writer:
     """One cycle of `period` frames, as BAPs."""
+    anatomy, character = plan.anatomy, plan.character
     phase = np.arange(period) / period
-    plan = Plan(anatomy, character, stride)
     writer = Writer(period)
-    posture.hold(writer, anatomy.skeleton, character, phase, plan.size)
+    posture.hold(writer, anatomy.skeleton, plan, phase)
     writer.turn("HumanoidRoot", 0, np.full(period, np.radians(character.pelvis.tilt)))
     turn, roll = plan.pelvis_angles(phase)
     writer.turn("sacroiliac", 1, turn)
     writer.turn("sacroiliac", 2, roll)
-    arms.swing(writer, anatomy, character, phase, plan.size)
+    arms.swing(writer, plan, phase)
     rest = anatomy.skeleton.centres[0]
     root = plan.root(phase) - rest
     start = root[0, 2]
@@ -119,13 +122,13 @@ def _stride(stride: float | None, character: Character, anatomy: Anatomy) -> flo
         raise ValueError(f"walk: the stride must be a number of metres, not {stride!r}") from error
     if not (np.isfinite(metres) and metres >= SHORTEST * anatomy.scale):
         raise ModelError(
-            f"gait: the stride must be at least {SHORTEST * anatomy.scale:.2g} m, not {stride!r}; it is the way "
-            "from one contact of a foot to its next, two steps: 1.4 m in an even walk"
+            f"gait: the stride must be at least {SHORTEST * anatomy.scale:.2g} m, not {stride!r}; it is the "
+            "way from one contact of a foot to its next, two steps: 1.4 m in an even walk"
         )
     if metres > 4.0 * anatomy.sides["r"].leg.reach:
         raise ModelError(
-            f"gait: a stride of {metres:g} m is too long on legs of {anatomy.sides['r'].leg.reach:.2f} m; it is "
-            "given in metres, and 1.4 m in an even walk"
+            f"gait: a stride of {metres:g} m is too long on legs of {anatomy.sides['r'].leg.reach:.2f} m; it "
+            "is given in metres, and 1.4 m in an even walk"
         )
     return round(metres, 3)
 
