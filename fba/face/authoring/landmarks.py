@@ -29,6 +29,8 @@ CONTOURS = {
     "jaw line": ("2.13", "2.11", "2.1", "2.12", "2.14"),
 }
 """Lines on the face by the feature points that they run through."""
+OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
+"""Those about an opening, which in many meshes is a hole."""
 
 
 @dataclass(eq=False)
@@ -57,16 +59,16 @@ class Landmarks:
     def contour(self, name: str) -> Int:
         """Vertices along a contour, corner to corner; empty unless both ends and one point between exist."""
         if name not in self._contours:
-            self._contours[name] = self._walk(CONTOURS[name])
+            self._contours[name] = self._walk(CONTOURS[name], rim=name in OPENINGS)
         return self._contours[name]
 
-    def _walk(self, through: tuple[str, ...]) -> Int:
+    def _walk(self, through: tuple[str, ...], *, rim: bool) -> Int:
         known = [self.vertex[name] for name in through if name in self.vertex]
         if len(known) < 3 or not self.has(through[0], through[-1]):
             return np.zeros(0, dtype=np.intp)
         walk: list[int] = [known[0]]
         for start, end in pairwise(known):
-            step = self.surface.path(start, end)
+            step = self.surface.path(start, end, rim=rim)
             if not len(step):
                 return np.zeros(0, dtype=np.intp)
             walk += step[1:].tolist()

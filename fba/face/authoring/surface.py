@@ -18,6 +18,8 @@ Bool = npt.NDArray[np.bool_]
 
 WELD = 1e-6
 """Vertices on open edges this close together, as a share of the surface's extent, are one: a seam."""
+RIM = 0.4
+"""What a step along an open edge counts of its length."""
 SMALLEST_COTANGENT = 0.02
 """Obtuse triangles would give negative weights, and with them folds."""
 
@@ -67,6 +69,17 @@ class Surface:
         return csr_array((np.tile(length, 2), (np.r_[a, b], np.r_[b, a])), shape=shape)
 
     @cached_property
+    def rim_graph(self) -> Any:
+        """(N, N) the same with edges on the rim counted as shorter: walks keep to it."""
+        from scipy.sparse import csr_array
+
+        edges, count = _edges(self.triangles)
+        a, b = edges.T
+        length = np.maximum(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1), 1e-12)
+        length[count == 1] *= RIM
+        return csr_array((np.tile(length, 2), (np.r_[a, b], np.r_[b, a])), shape=(len(self), len(self)))
+
+    @cached_property
     def component(self) -> Int:
         """(N,) number of the connected piece that each vertex belongs to."""
         from scipy.sparse.csgraph import connected_components
@@ -97,14 +110,21 @@ class Surface:
         found: Float64 = dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True)
         return found
 
-    def path(self, start: int, end: int) -> Int:
-        """The vertices of the shortest walk along edges, both ends included; empty where there is none."""
+    def path(self, start: int, end: int, *, rim: bool = False) -> Int:
+        """The vertices of the shortest walk along edges, both ends included; empty where there is none.
+
+        rim: keep to open edges where there are such: of a mouth that is a slit, of eyes that are holes.
+        """
         from scipy.sparse.csgraph import dijkstra
 
         away = float(np.linalg.norm(self.vertices[start] - self.vertices[end]))
         for limit in (3 * away + 1e-9, np.inf):
             length, before = dijkstra(
-                self.graph, directed=False, indices=start, limit=limit, return_predecessors=True
+                self.rim_graph if rim else self.graph,
+                directed=False,
+                indices=start,
+                limit=limit,
+                return_predecessors=True,
             )
             if np.isfinite(length[end]):
                 break
