@@ -85,11 +85,11 @@ class HeadOnBody:
         self._inverse = np.linalg.inv(body.bind)
         self._skinner = Skinner(
             placed.astype(np.float32),
-            np.tile(np.float32([0, 0, 1]), (len(places), 1)),
+            np.tile(np.array([0, 0, 1], dtype=np.float32), (len(places), 1)),
             self.joints,
             self.weights,
             body.bind,
-            body.skeleton.parents,
+            body.skeleton,
         )
         self._placed = np.empty((len(places), 3), dtype=np.float32)
 

@@ -185,7 +185,7 @@ class BodyModel:
             self.joints,
             self.weights,
             self.bind,
-            self.skeleton.parents,
+            self.skeleton,
             self.triangles,
         )
 

@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body.rings import rings
+from fba.body.skeleton import Skeleton
+from fba.body.twisting import twists
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -24,8 +26,8 @@ class Skinner:
     """Carries vertices with joints.
 
     vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
-    sum to 1. bind: float64 (J, 4, 4), the joints as modelled. parents: (J,). triangles: int32 (F, 3), by
-    which normals follow the surface (`fba.body.rings`); without them they turn as their vertices do.
+    sum to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32
+    (F, 3), by which normals follow the surface (`fba.body.rings`); without them they turn as their vertices do.
 
     Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
     several threads, one after the other.
@@ -38,7 +40,7 @@ class Skinner:
         joints: Int32,
         weights: Float32,
         bind: Float64,
-        parents: npt.NDArray[np.integer[Any]],
+        skeleton: Skeleton,
         triangles: Int32 | None = None,
     ) -> None:
         # numba is imported here, with the first body that moves
@@ -52,7 +54,9 @@ class Skinner:
         self._vertices = np.ascontiguousarray(vertices, dtype=np.float32)
         self._normals = np.ascontiguousarray(normals, dtype=np.float32)
         self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
-        self._parents = np.ascontiguousarray(parents, dtype=np.int64)
+        self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
+        self._twists = twists(skeleton, bind, self._vertices, self._joints, self._weights)
+        self._wrung = self._vertices.copy()
         faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
         self._around, self._numbers = rings(self._vertices, self._normals, faces)
         self._scratch = np.empty((len(bind), 12), dtype=np.float32)
@@ -112,7 +116,10 @@ class Skinner:
         placed = out[None] if single else out
         upright = placed[:0] if normals is None else normals[None] if single else normals
         mesh = (vertices, modelled, self._joints, self._weights, self._counts, self._around, self._numbers)
+        wrung = self._wrung if len(self._twists.rows) else vertices
         with self._lock, np.errstate(all="ignore"):
+            if wrung is not vertices:
+                np.copyto(wrung, vertices)
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)
                 if method == "dual":
@@ -122,6 +129,8 @@ class Skinner:
                         self._parents,
                         *mesh,
                         self._scratch,
+                        self._twists,
+                        wrung,
                         placed[part],
                         upright[part],
                     )

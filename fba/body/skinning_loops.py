@@ -5,6 +5,8 @@ Everything is in 32 bits, relative to the root joint, so that a body far from th
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,6 +17,20 @@ Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
 Int64 = npt.NDArray[np.int64]
 
+
+class Twisting(NamedTuple):
+    """Which vertices are turned about which bones, of B: see `fba.body.twisting`."""
+
+    rows: Int64
+    shares: Float64
+    starts: Int64
+    joint: Int64
+    child: Int64
+    centre: Float64
+    axis: Float64
+    child_axis: Float64
+
+
 ONE, TWO, HALF = np.float32(1.0), np.float32(2.0), np.float32(0.5)
 TINY = np.float32(1e-30)
 
@@ -23,23 +39,23 @@ TINY = np.float32(1e-30)
 def dual_frames(
     matrices: Float64, inverse: Float64, parents: Int64, vertices: Float32, upright: Float32,
     joints: Int32, weights: Float32, counts: Int32, around: Int32, numbers: Float32, scratch: Float32,
-    out: Float32, normals: Float32,
+    twists: Twisting, wrung: Float32, out: Float32, normals: Float32,
 ) -> None:  # fmt: skip
     """Dual-quaternion skinning of T frames (Kavan and others, "Skinning with dual quaternions", 2007).
 
     matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, upright (V, 3): as modelled.
     joints, weights (V, 4): those that carry, first; counts (V,): how many. around, numbers: see `rings`.
-    scratch (J, 12). out (T, V, 3). normals: the same, or (0, V, 3) for none.
+    scratch (J, 12). twists: what turns some of the vertices beforehand. wrung (V, 3): scratch, the
+    vertices; the same array where nothing is turned. out (T, V, 3). normals: the same, or (0, V, 3) for none.
     """
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
         _duals(matrices[frame], inverse, parents, scratch)
+        _wring(vertices, parents, scratch, twists, wrung)
         x0, y0, z0 = np.float32(root[0, 3]), np.float32(root[1, 3]), np.float32(root[2, 3])
         upper = normals[frame] if normals.shape[0] else out[frame]
         wanted = upright if normals.shape[0] else upright[:0]
-        _dual_places(
-            vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], wanted, around, upper
-        )
+        _dual_places(wrung, joints, weights, counts, scratch, x0, y0, z0, out[frame], wanted, around, upper)
         if normals.shape[0]:
             _across(out[frame], around, numbers, upper)
 
@@ -103,6 +119,47 @@ def _duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Float32) 
         duals[joint, 5] = 0.5 * (tx * w + ty * z - tz * y)
         duals[joint, 6] = 0.5 * (ty * w + tz * x - tx * z)
         duals[joint, 7] = 0.5 * (tz * w + tx * y - ty * x)
+
+
+@compiled
+def _wring(vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, wrung: Float32) -> None:
+    """Vertices of limbs turned about their bones: see `fba.body.twisting`."""
+    for bone in range(len(twists.joint)):
+        own = _twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
+        child = _twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
+        axis, centre = twists.axis[bone], twists.centre[bone]
+        ax, ay, az = axis[0], axis[1], axis[2]
+        for k in range(twists.starts[bone], twists.starts[bone + 1]):
+            i = twists.rows[k]
+            angle = twists.shares[k, 0] * own + twists.shares[k, 1] * child
+            s, c = np.sin(angle), np.cos(angle)
+            px, py, pz = vertices[i, 0] - centre[0], vertices[i, 1] - centre[1], vertices[i, 2] - centre[2]
+            along = (ax * px + ay * py + az * pz) * (1.0 - c)
+            wrung[i, 0] = px * c + (ay * pz - az * py) * s + ax * along + centre[0]
+            wrung[i, 1] = py * c + (az * px - ax * pz) * s + ay * along + centre[1]
+            wrung[i, 2] = pz * c + (ax * py - ay * px) * s + az * along + centre[2]
+
+
+@inlined
+def _twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
+    """The angle by which a joint turns about an axis, seen from its parent.
+
+    It fades where the limb points the other way, as there no twist can be told from that.
+    """
+    parent = int(parents[joint])
+    if parent < 0:
+        return 0.0
+    w, x, y, z = duals[parent, 0], duals[parent, 1], duals[parent, 2], duals[parent, 3]
+    a, b, c, d = duals[joint, 0], duals[joint, 1], duals[joint, 2], duals[joint, 3]
+    scalar = w * a + x * b + y * c + z * d
+    about = (
+        axis[0] * (w * b - x * a - y * d + z * c)
+        + axis[1] * (w * c + x * d - y * a - z * b)
+        + axis[2] * (w * d - x * c + y * b - z * a)
+    )
+    fade = min(max((scalar * scalar + about * about - 0.03) / 0.12, 0.0), 1.0)
+    angle: float = 2.0 * np.arctan2(about, scalar) * fade * fade * (3.0 - 2.0 * fade)
+    return angle
 
 
 @inlined
