@@ -83,7 +83,7 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
     definitions = scene.model.definitions
     if kind == "visemes":
         rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)
-        return [Tile(name, f"viseme {n}", row) for n, (name, row) in enumerate(rows, start=1)]
+        return [Tile(name, f"viseme {n}", row, "cheeks") for n, (name, row) in enumerate(rows, start=1)]
     rows = zip(EXPRESSIONS[1:], definitions.expressions[1:], strict=True)
     return [Tile(name, f"expression {n}, {FULL}", row) for n, (name, row) in enumerate(rows, start=1)]
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fba.compiled import is_compiled
 from fba.face.deformer import Deformer
-from fba.face.model import FaceModel, point_row
+from fba.face.model import FaceModel, Part, point_row
 from player.kept import kept
 from player.visibility import BAKING, HARMONICS, Visibility, bake
 
@@ -26,6 +26,8 @@ MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
 """FAPs of a mouth open so far that light falls in."""
 FREE = (0.9, 0.8, 0.0, 0.3)
 """The light that reaches a tongue put out."""
+ON_TEETH = 0.3
+"""How much more light falls on teeth than finds its way between the lips."""
 MOVES = 0.05
 """What sways less than this is lit without care."""
 
@@ -54,11 +56,12 @@ class FaceLight:
         self._lit: tuple[tuple[float, ...], Float32] | None = None
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
-        starts = model.starts
-        self._tongues = [
-            slice(starts[part.name], starts[part.name] + len(part.vertices))
-            for part in model.of_kind("tongue")
-        ]
+        self._teeth = [self._rows(part) for part in model.of_kind("teeth")]
+        self._tongues = [self._rows(part) for part in model.of_kind("tongue")]
+
+    def _rows(self, part: Part) -> slice:
+        start = self._model.starts[part.name]
+        return slice(start, start + len(part.vertices))
 
     def reaching(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
         """(V, 4), 0..1: what reaches each vertex of the key light, of the open sky, through the skin from
@@ -82,6 +85,8 @@ class FaceLight:
             if not np.allclose(turn, np.eye(3), atol=1e-3):
                 still = self._blended(matrix.T, share)
                 light = still + (light - still) * self._sway[:, None]
+            for rows in self._teeth:  # as a photographer would have it
+                light[rows, :2] += (1 - light[rows, :2]) * np.float32(ON_TEETH * share)
             for rows, outside in zip(self._tongues, out, strict=True):
                 light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
             self._lit = (key, light)
@@ -99,7 +104,7 @@ class FaceLight:
         if self._lips is None:
             return 0.0
         share = np.clip((self._gap(positions) - gaps[0]) / max(gaps[1] - gaps[0], 1e-6), 0.0, 1.0)
-        return float(np.sqrt(share))  # the first millimetres let most of the light in
+        return float(share**0.4)  # the first millimetres let most of the light in
 
     def _gap(self, positions: Float32) -> float:
         upper, lower = positions[self._lips]

@@ -18,6 +18,9 @@ Float64 = npt.NDArray[np.float64]
 
 SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
 TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
+HAIRY = ("lash", "brow", "hair")
+THICKEST_HAIR = 0.0012
+"""A strip wider than this (m) is no single hair."""
 LARGEST_PICTURE = 4096
 """Textures of more pixels across are made smaller."""
 ROUGH = 0.36
@@ -66,7 +69,51 @@ def part_shape(part: Part, sways: Float32) -> FaceShape:
         SCATTER.get(part.kind, 0.0),
         _relief(part),
         part.kind in TWO_SIDED,
+        hairs(part) if part.kind in HAIRY and picture is None else None,
     )
+
+
+def hairs(part: Part) -> Float32 | None:
+    """(V, 8) as `FaceShape.across` has it, or None where a part is not of single hairs.
+
+    A hair is a strip of two rows of vertices that ends in a point: the vertex opposite to one is the
+    nearest that an edge joins it to.
+    """
+    if not len(part.triangles):
+        return None
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    vertices, count = part.vertices.astype(np.float64), len(part.vertices)
+    edges = part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.intp)
+    edges = np.concatenate([edges, edges[:, ::-1]])
+    apart = vertices[edges[:, 0]] - vertices[edges[:, 1]]
+    length = np.linalg.norm(apart, axis=1)
+    order = np.lexsort((length, edges[:, 0]))
+    rows, first = np.unique(edges[order, 0], return_index=True)
+    nearest = order[first]
+    opposite = np.arange(count)
+    opposite[rows] = edges[nearest, 1]
+    paired = (opposite[opposite] == np.arange(count)) & (opposite != np.arange(count))
+    half = np.zeros(count)
+    half[rows] = length[nearest] / 2
+    if not paired.any() or 2 * float(np.median(half[paired])) > THICKEST_HAIR:
+        return None
+    pieces, hair = connected_components(csr_matrix((np.ones(len(edges)), edges.T), (count, count)))
+    tip = np.full(pieces, -1)
+    tip[hair[~paired]] = np.flatnonzero(~paired)  # a point is not opposite to what is nearest to it
+    kept = paired & (tip[hair] >= 0)
+    found = np.zeros((count, 8), dtype=np.float32)
+    found[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
+    found[kept, :3] = _units(vertices[kept] - vertices[opposite[kept]])
+    found[kept, 3] = half[kept]
+    found[kept, 4:7] = _units(vertices[tip[hair[kept]]] - vertices[kept])
+    return found
+
+
+def _units(vectors: Float64) -> Float64:
+    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return unit
 
 
 def _relief(part: Part) -> tuple[float, float]:

@@ -97,16 +97,17 @@ class FaceRenderer:
             "still": gl.buffer(np.ascontiguousarray(still, dtype="f4").tobytes()),
             "triangles": gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()),
         }
-        parts["array"] = gl.vertex_array(
-            self._program,
-            [
-                (parts["positions"], "3f", "in_position"),
-                (parts["normals"], "3f", "in_normal"),
-                (parts["light"], "4f", "in_light"),
-                (parts["still"], "4f 2f 1f", "in_colour", "in_texture", "in_sway"),
-            ],
-            index_buffer=parts["triangles"],
-        )
+        attributes = [
+            (parts["positions"], "3f", "in_position"),
+            (parts["normals"], "3f", "in_normal"),
+            (parts["light"], "4f", "in_light"),
+            (parts["still"], "4f 2f 1f", "in_colour", "in_texture", "in_sway"),
+        ]
+        parts["across"] = None
+        if shape.across is not None:
+            parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
+            attributes.append((parts["across"], "4f 4f", "in_across", "in_along"))
+        parts["array"] = gl.vertex_array(self._program, attributes, index_buffer=parts["triangles"])
         parts["picture"] = self._texture(shape)
         parts["see_through"] = shape.see_through
         parts["lit"] = None
@@ -132,6 +133,6 @@ class FaceRenderer:
 
 
 def _release(parts: dict[str, Any]) -> None:
-    for name in ("array", "positions", "normals", "light", "still", "triangles", "picture"):
+    for name in ("array", "positions", "normals", "light", "still", "triangles", "picture", "across"):
         if parts[name] is not None:
             parts[name].release()

@@ -53,7 +53,9 @@ class FaceShape:
     do. texcoords: float32 (V, 2), origin at the picture's top left. picture: uint8 (H, W, 4), sRGB, by
     which the colours are multiplied. scatter: how far light wanders below the surface: 1 skin, 0 cloth.
     fine: strength of the skin's relief, and how often it repeats over the picture. two_sided: False where
-    the inside is to look dark.
+    the inside is to look dark. across: float32 (V, 8), of single hairs: from the vertex opposite to each,
+    half the hair's width there (m), direction to the tip, and 1 or -1 on its two sides; hairs are never
+    drawn thinner than a pixel, but fainter.
     """
 
     triangles: npt.NDArray[np.int32]
@@ -64,11 +66,13 @@ class FaceShape:
     scatter: float = 0.0
     fine: tuple[float, float] = (0.0, 1.0)
     two_sided: bool = False
+    across: Float32 | None = None
 
     @property
     def see_through(self) -> bool:
-        """Whether the picture has places where it is not there."""
-        return self.picture is not None and bool((self.picture[..., 3] < 255).any())
+        """Whether it is to be drawn over what is behind: its picture is not everywhere, or it is of hairs."""
+        clear = self.picture is not None and bool((self.picture[..., 3] < 255).any())
+        return clear or self.across is not None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ const vec3 KEY_DIRECTION = normalize(vec3(0.70, 0.68, 0.80));
 const vec3 FILL_DIRECTION = normalize(vec3(-0.9, 0.15, 0.6));
 const vec3 RIM_DIRECTION = normalize(vec3(-0.55, 0.50, -0.85));
 const vec3 KEY = vec3(1.78, 1.66, 1.53);
-const vec3 FILL = vec3(0.22, 0.25, 0.30);
-const vec3 RIM = vec3(0.80, 0.86, 0.95);
-const vec3 SKY = vec3(0.44, 0.46, 0.50);
-const vec3 FLOOR = vec3(0.17, 0.15, 0.14);
+const vec3 FILL = vec3(0.27, 0.275, 0.29);
+const vec3 RIM = vec3(0.76, 0.80, 0.86);
+const vec3 SKY = vec3(0.46, 0.47, 0.50);
+const vec3 FLOOR = vec3(0.20, 0.175, 0.16);
 
 // Linear light to sRGB: highlights roll off, then a curve within 1/170 of the standard's, by one root.
 vec3 encode(vec3 linear) {
@@ -66,10 +66,10 @@ float mirrored(float nv, float nl, float vl, float sharp, float soft) {
 // reach: what reaches it of the key light, the open sky, through it from behind, of the rim light.
 vec3 surface(vec3 view, vec3 n, vec3 fine, vec3 albedo, float gloss, vec4 reach, float scatter) {
     // Light that wanders below the surface softens the edge of the shade, the red most.
-    vec3 wander = vec3(0.30, 0.14, 0.09) * scatter;
+    vec3 wander = vec3(0.24, 0.12, 0.08) * scatter;
     vec3 key = clamp((dot(n, KEY_DIRECTION) + wander) / (1.0 + wander), 0.0, 1.0);
     key *= 1.0 - wander + wander * key;
-    key *= reach.x * (1.0 + (1.0 - reach.x) * vec3(0.55, 0.12, 0.0) * scatter);
+    key *= reach.x * (1.0 + (1.0 - reach.x) * vec3(0.34, 0.10, 0.0) * scatter);
     // Light bounces on in folds, and through flesh, which leaves the red of it.
     vec3 open = reach.y * (1.0 + (1.0 - reach.y) * 0.85 * albedo);
     open += (1.0 - reach.y) * vec3(0.24, 0.10, 0.085) * scatter;

@@ -40,14 +40,18 @@ def test_values_are_such_as_a_stream_can_carry(scene: Scene) -> None:
 @pytest.mark.usefixtures("opengl")
 def test_every_fap_can_be_seen(scene: Scene) -> None:
     """Each picture differs from the same one without its FAP."""
-    size, missed = (72, 72), {}
+    size = (72, 72)
+    missed = {}
     with Offscreen(scene, size) as view:
         for fap, tile in zip(faps()[2:], tiles("faps", scene), strict=True):
             view.camera = Camera(yaw=tile.yaw, pitch=tile.pitch).fit(close_up(tile.view, scene), 1.0)
             without = tile.faps.copy()
             without[fap.number - 1] = 0
             with_it, bare = (view.still(vector).astype(int) for vector in (tile.faps, without))
-            assert (np.abs(with_it - bare).max(axis=2) > 12).sum() > 12, fap.label
+            seen = int((np.abs(with_it - bare).max(axis=2) > 12).sum())
+            if seen <= 12:
+                missed[fap.label] = seen
+    assert missed == {}
 
 
 @pytest.mark.usefixtures("opengl")
