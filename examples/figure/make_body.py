@@ -26,11 +26,14 @@ from fba.body.heads import strongest
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.face.model import FaceModel, point_row
 from fba.mesh import vertex_normals
+from player.visibility import bake
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
 GLOSS = 0.38
+DARKEST = 0.55
+"""What is left of a colour where no light of the sky falls."""
 UNDER = 0.03
 """Skin stays this far (m) under the edges of clothes."""
 SKULL_WHOLE = 0.9
@@ -87,7 +90,36 @@ def pieces() -> tuple[dict[str, Piece], rig.Rig]:
             kind, garment.vertices, garment.triangles, garment.colours, garment.weights,
             _welded_normals(garment.vertices, garment.triangles),
         )  # fmt: skip
+    found["skin"].colours[:, :3] *= _flushed(found["skin"], bones)
+    _shade([piece for piece in found.values() if piece.kind != "neck"])
     return found, bones
+
+
+def _flushed(piece: Piece, bones: rig.Rig) -> Float64:
+    """(V, 3) what fingertips, knuckles and elbows multiply the complexion by."""
+    middles = bones.bind[:, :3, 3]
+    tips = [n for n, name in enumerate(bones.names) if name[-1] == "3"]
+    bends = [n for n, name in enumerate(bones.names) if name[-1] in "12" and name[2:-1] in rig.FINGERS]
+    elbows = [n for n, name in enumerate(bones.names) if name.endswith("elbow")]
+    share = np.zeros(len(piece.vertices))
+    for joints, strength, reach in ((tips, 0.8, 0.014), (bends, 0.55, 0.010), (elbows, 0.5, 0.035)):
+        away = np.linalg.norm(piece.vertices[:, None] - middles[joints], axis=2).min(axis=1)
+        share = np.maximum(share, strength * np.exp(-((away / reach) ** 2)))
+    return 1 - share[:, None] * (0.03, 0.20, 0.22)
+
+
+def _shade(found: list[Piece]) -> None:
+    """Colours darkened where little light falls: in folds, between fingers, under hems."""
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in found)])
+    vertices = np.concatenate([piece.vertices for piece in found]).astype(np.float32)
+    normals = np.concatenate([piece.normals for piece in found]).astype(np.float32)
+    triangles = np.concatenate([p.triangles + s for p, s in zip(found, starts, strict=False)]).astype(
+        np.int32
+    )
+    free = bake(vertices, normals, triangles).open
+    for piece, start in zip(found, starts, strict=False):
+        here = free[start : start + len(piece.vertices)]
+        piece.colours[:, :3] *= (DARKEST + (1 - DARKEST) * np.clip(here / 0.85, 0, 1))[:, None]
 
 
 def _piece(kind: str, cloth: Cloth, colour: Float64) -> Piece:

@@ -18,8 +18,6 @@ Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
 
 LIMB = ("shoulder", "elbow", "wrist")
-SHOULDER_FADE = 0.25
-"""Above this share of the upper arm the trunk takes over: what is there stays where its joints carry it."""
 WRIST_FROM = 0.35
 """From this share of the forearm on, it takes part in the twist of the wrist."""
 LEAST = 0.02
@@ -44,9 +42,8 @@ def twists(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, 
         along = [_along(bind, pair, vertices) for pair in ((shoulder, elbow), (elbow, wrist))]
         arm = carried[0] > LEAST
         upper = arm & (along[0] < 1)
-        place = np.clip(along[0], 0.0, 1.0)
-        fade = _smooth(along[0] / SHOULDER_FADE)
-        own, child = (place - carried[0]) * fade, -carried[1]
+        # What the shoulder twists is wide enough as it is, and some of it hangs on the trunk.
+        own, child = np.zeros(len(vertices)), -carried[1]
         for bone in (upper, arm & ~upper):
             turned = np.flatnonzero(bone & (np.maximum(np.abs(own), np.abs(child)) > SMALL))
             rows.append(turned)
