@@ -86,7 +86,7 @@ def _kept(solver: BapSolver, values: npt.NDArray[np.int32], moving: bool) -> lis
     names = solver.skeleton.names
     if not moving:
         return list(range(len(names)))
-    moved = values.any(axis=0)
+    moved: npt.NDArray[np.bool_] = np.asarray(values.any(axis=0))
     return [
         number
         for number, name in enumerate(names)

@@ -16,6 +16,7 @@ from fba.animation import Animation
 from fba.capture import SkeletonMotion, from_skeleton, matching, rotations
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError
+from fba.formats.gltf_own import note_of, read_note
 from fba.formats.gltf_pose import BindPose, Sampler, key_times
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
@@ -48,11 +49,20 @@ def read(
 ) -> Animation:
     """A glTF skeleton's animation as BAPs (see `fba.capture.from_skeleton`, and `read_motion` for clip).
 
+    Files that this project wrote are taken as they are, with their own frames, where only clip is given.
+
     Raises FormatError for anything that is not glTF, or whose skeleton is not a body; warns (FbaWarning)
     of what is left out.
     """
     try:
-        motion = read_motion(path, clip=clip, rate=rate)
+        gltf = read_gltf(path)
+        plain = (rate, scale, origin, ground, spine) == (None, None, "source", "floor", "spread")
+        if plain and gltf.animations:
+            own = gltf.animations[0] if clip is None else _clip(gltf, clip, set(range(len(gltf.nodes))))
+            note = note_of(gltf, own)
+            if note is not None:
+                return read_note(gltf, own, note)
+        motion = motion_of(gltf, clip=clip, rate=rate)
         return from_skeleton(motion, scale=scale, origin=origin, ground=ground, spine=spine)
     except ModelError as error:
         raise FormatError(str(error), path=path) from error

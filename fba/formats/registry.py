@@ -103,8 +103,9 @@ def formats() -> tuple[Format, ...]:
             captured=True,
         ),
         Format(
-            "gltf", (".glb", ".gltf"), "glTF 2.0: a skeleton and its animation, as exported from FBX",
-            place("sniff", "gltf"), place("read", "gltf"), None, ("body",), captured=True,
+            "gltf", (".glb", ".gltf"), "glTF 2.0: read, an animated skeleton; written, a skinned person",
+            place("sniff", "gltf"), place("read", "gltf"), place("write", "gltf_writing"),
+            captured=True,
         ),
     )  # fmt: skip
 

@@ -80,6 +80,12 @@ class Builder:
         view, offset = self._append(array, (None, None))
         return self._accessor(array, bounds, view, offset)
 
+    def matrices(self, values: npt.ArrayLike) -> int:
+        """Accessor of matrices, (N, 4, 4), in a view of their own: a skin shares none with an animation."""
+        array = _native(np.swapaxes(np.asarray(values, dtype=np.float64), -1, -2).reshape(-1, 16))
+        view = self._blob(array.astype(array.dtype.newbyteorder("<")).tobytes())
+        return self._accessor(array, False, view, 0)
+
     def packed(self, array: npt.NDArray[Any]) -> int:
         """Buffer view of 32-bit numbers that no plain viewer needs, without loss in few bytes."""
         return self._blob(pack(array))

@@ -122,10 +122,10 @@ def test_options(tmp_path: Path) -> None:
 
 
 def test_writing_chooses_by_suffix(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"known: FBA \(\.fba\), FAP \(\.fap\), BAP \(\.bap\) .*'\.mpg'"):
+    with pytest.raises(FormatError, match=r"known: FBA \(\.fba\), FAP \(\.fap\), BAP \(\.bap\), .*'\.mpg'"):
         fba.write(tmp_path / "a.mpg", performance())
-    with pytest.raises(UnsupportedError, match="BVH can be read only"):
-        fba.write(tmp_path / "a.bvh", performance())
+    with pytest.raises(UnsupportedError, match="EPF can be read only"):
+        fba.write(tmp_path / "a.epf", performance())
     fba.write(tmp_path / "a.mpg", performance(body=False), format="fap")
     assert fba.read(tmp_path / "a.mpg") == performance(body=False)
     with pytest.warns(FbaWarning, match="FAP holds no body; only the face was written"):
