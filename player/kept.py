@@ -58,7 +58,7 @@ def _read(path: Path, shapes: tuple[tuple[int, ...], ...]) -> list[Float16] | No
     try:
         if path.stat().st_size > most:
             return None
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             found = [np.asarray(file[f"arr_{number}"]) for number in range(len(shapes))]
         os.utime(path)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
