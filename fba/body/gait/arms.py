@@ -47,10 +47,9 @@ def swing(writer: Writer, plan: Plan, phase: Float) -> None:
         twist = -side.way * np.radians(character.arms.twist)
         upper, bend = side.arm.solve(local, np.full(len(KNOTS), twist))
         x, y, z = limb_angles(upper)
+        own = phase - start - _LATE
         for axis, angle in ((0, x), (1, y), (2, z)):
-            writer.turn(
-                f"{letter}_shoulder", axis, periodic(KNOTS, angle, phase - start - _LATE, plan.interpolation)
-            )
-        writer.turn(f"{letter}_elbow", 0, -periodic(KNOTS, bend, phase - start - _LATE, plan.interpolation))
+            writer.turn(f"{letter}_shoulder", axis, periodic(KNOTS, angle, own, plan.interpolation))
+        writer.turn(f"{letter}_elbow", 0, -periodic(KNOTS, bend, own, plan.interpolation))
         wrist = -side.way * np.radians(character.arms.wrist)
         writer.turn(f"{letter}_wrist", 2, np.full(phase.shape, wrist))

@@ -139,7 +139,7 @@ class Character:
     def named(name: str) -> Character:
         """A character of the table; ModelError with the names that there are."""
         known = _characters()
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             close = difflib.get_close_matches(str(name), known, 1)
             hint = f"did you mean {close[0]!r}? " if close else ""
             raise ModelError(f"no gait character {name!r}; {hint}there are {', '.join(known)}")
@@ -185,7 +185,10 @@ def _characters() -> dict[str, Character]:
         result[name] = Character(
             name,
             both["about"],
-            *(float(both[key]) for key in ("seconds", "stride", "width", "toes_out")),
+            float(both["seconds"]),
+            float(both["stride"]),
+            float(both["width"]),
+            float(both["toes_out"]),
             Pelvis(**parts["pelvis"]),
             Spine(**parts["spine"]),
             Arms(**parts["arms"]),

@@ -50,7 +50,7 @@ def periodic(
     one, two = step_before + 2.0 * step, 2.0 * step_before + step
     turns = before * slope <= 0.0
     safe = [np.where(turns, 1.0, s) for s in (before, slope)]
-    tangent: Float = np.where(turns, 0.0, (one + two) / (two / safe[0] + one / safe[1]))
+    tangent: Float = np.where(turns, np.zeros(len(x)), (one + two) / (two / safe[0] + one / safe[1]))
     u = np.mod(u - x[0], 1.0) + x[0]
     at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)
     after = (at + 1) % len(x)
@@ -68,7 +68,8 @@ def spline(knots: npt.ArrayLike, values: Float, first: Float, last: Float, phase
     for i in range(1, count - 1):
         matrix[i, i - 1 : i + 2] = h[i], 2.0 * (h[i - 1] + h[i]), h[i - 1]
         right[i] = 3.0 * (h[i] * slope[i - 1] + h[i - 1] * slope[i])
-    tangent: Float = np.linalg.solve(matrix, right.reshape(count, -1)).reshape(y.shape)
+    solved = np.linalg.solve(matrix, right.reshape(count, -1))
+    tangent = np.asarray(solved, dtype=np.float64).reshape(y.shape)
     u = np.asarray(phase, dtype=np.float64)
     at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, count - 2)
     tail = (...,) + (None,) * (y.ndim - 1)

@@ -74,9 +74,8 @@ class Plan:
         phase = np.mod(phase, 1.0)
         flat = self._foot_values[1]
         landing = flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / FLAT, 0.0) ** 1.5
-        return np.where(
-            phase < FLAT, landing, periodic(self._foot_knots, self._foot_values, phase, self.interpolation)
-        )
+        later = periodic(self._foot_knots, self._foot_values, phase, self.interpolation)
+        return np.where(phase < FLAT, landing, later)
 
     def knee(self, phase: Float) -> Float:
         """Bend that the poses ask for, at a phase of the leg's own."""

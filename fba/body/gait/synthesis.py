@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fba.animation import MAX_FRAMES, Animation, BodyTrack
+from fba.animation import Animation, BodyTrack
 from fba.body.gait import arms, ground, posture
 from fba.body.gait.anatomy import Anatomy, Writer
 from fba.body.gait.characters import Character
@@ -17,7 +17,9 @@ from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
 
 FEWEST = 8
-"""Frames of a cycle: fewer than two a pose is no walk."""
+"""Frames of a cycle: one for each pose of it."""
+MOST = 100_000
+"""Frames that are made at once: an hour and more."""
 
 
 def walk(
@@ -46,15 +48,15 @@ def walk(
     ModelError where a stride is too long for the legs, or a character or a skeleton cannot walk;
     ValueError for other arguments that make no sense.
     """
-    if isinstance(character, str):
+    if not isinstance(character, Character):
         character = Character.named(character)
     anatomy = Anatomy.of(Skeleton.default() if skeleton is None else skeleton)
     stride = _stride(stride, character, anatomy)
     rate = Fraction(rate)
     if rate <= 0:
         raise ValueError(f"walk: the frame rate must be positive, not {rate}")
-    period = round(float(character.seconds * rate)) if rate < MAX_FRAMES else 0
-    if not FEWEST <= period <= MAX_FRAMES:
+    period = round(float(character.seconds * rate)) if rate < MOST else 0
+    if not FEWEST <= period <= MOST:
         raise ValueError(
             f"walk: {rate} frames/s make {float(character.seconds * rate):.4g} frames of a cycle of "
             f"{character.seconds:g} s; needs at least {FEWEST}, and a plausible rate"
@@ -142,6 +144,6 @@ def _count(cycles: float | None, seconds: float | None, rate: Fraction, period: 
     if not (np.isfinite(wanted) and wanted > 0):
         raise ValueError(f"walk: {what} must be a positive number, not {wanted!r}")
     frames = float(wanted) * float(rate) if seconds is not None else float(wanted) * period + 1
-    if frames > MAX_FRAMES:
-        raise ValueError(f"walk: {wanted:g} {what} would be {frames:.3g} frames (at most {MAX_FRAMES})")
+    if frames > MOST:
+        raise ValueError(f"walk: {wanted:g} {what} would be {frames:.3g} frames (at most {MOST})")
     return max(1, round(frames))
