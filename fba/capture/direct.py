@@ -27,14 +27,12 @@ LIMBS = tuple(
     for side in "lr"
     for upper, lower in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
 )
-STANDING = 0.15
-"""Share of the figure's height that its lowest joint may be above the ground."""
 
 
 def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
     """Whether the joints are the standard's, by name and hierarchy, and rest in the default posture.
 
-    All limbs must be there, and the root's offset must be its place above the ground.
+    All limbs must be there.
     """
     names = motion.names
     known = len(set(names)) == len(names) and all(name in skeleton for name in names)
@@ -47,10 +45,7 @@ def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
         if above < 0 or names[motion.parents[number]] != skeleton.names[above]:
             return False
     places = motion.rest()
-    tall = float(np.ptp(places[:, 1]))
-    if not all(upper in names and lower in names for upper, lower in LIMBS) or not tall > 0:
-        return False
-    if not 0 <= float(places[:, 1].min()) <= STANDING * tall:
+    if not all(upper in names and lower in names for upper, lower in LIMBS):
         return False
     for upper, lower in LIMBS:
         theirs = places[names.index(lower)] - places[names.index(upper)]
@@ -69,7 +64,11 @@ def values(
     metres = _metres(motion, skeleton, numbers) if scale is None else float(scale)
     if not (np.isfinite(metres) and metres > 0):
         raise ValueError(f"scale must be a positive number, not {scale}")
-    moved = (motion.positions - motion.offsets[0]) * metres
+    hips = [motion.names.index(f"{side}_hip") for side in "lr"]
+    theirs = motion.rest()[hips].mean(axis=0) - motion.offsets[0]
+    ours = skeleton.centres[[numbers[hip] for hip in hips]].mean(axis=0) - skeleton.centres[0]
+    # with another body's proportions, its hips are where the source's are
+    moved = motion.positions * metres + (theirs * metres - ours) - skeleton.centres[0]
     if origin != "source":
         away = moved[0] if origin == "start" else (moved.min(axis=0) + moved.max(axis=0)) / 2
         moved[:, [0, 2]] -= away[[0, 2]]
@@ -92,7 +91,7 @@ def values(
 
 def _metres(motion: SkeletonMotion, skeleton: Skeleton, numbers: list[int]) -> float:
     """Metres of the body for one unit: exact for the same body, else by the length of the legs."""
-    theirs, ours = motion.rest(), skeleton.centres[numbers]
+    theirs, ours = motion.rest() - motion.offsets[0], skeleton.centres[numbers] - skeleton.centres[0]
     metres = float((theirs * ours).sum() / (theirs * theirs).sum())
     if float(np.abs(theirs * metres - ours).max()) < EXACT * float(np.ptp(ours[:, 1])):
         return metres

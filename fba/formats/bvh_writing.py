@@ -52,8 +52,8 @@ def write(
     shoulders, ...). skeleton: the body; `Skeleton.default()` where None. axes: which way BAPs turn
     (`fba.body.convention_names()`). unit: lengths in the file for one metre, by default centimetres.
 
-    The root's OFFSET is its place in the default posture, its channels are places in the world. Read again,
-    the file gives the same BAPs (`fba.capture.direct`); times begin at 0. Raises FormatError where there is
+    The root's OFFSET is 0, its channels are its places in the world: some programs add the two. Read again, the
+    file gives the same BAPs (`fba.capture.direct`); times begin at 0. Raises FormatError where there is
     no body, no frame, or too many, OptionError for an unknown option's value.
     """
     from fba.body import BapSolver
@@ -119,8 +119,7 @@ def _hierarchy(
         number = kept[row]
         name = skeleton.names[number]
         parent = parents[row]
-        above = skeleton.centres[kept[parent]] if parent >= 0 else np.zeros(3)
-        offset = skeleton.centres[number] - above
+        offset = skeleton.centres[number] - skeleton.centres[kept[parent] if parent >= 0 else number]
         lines += [
             f"{pad}{'JOINT' if depth else 'ROOT'} {name}",
             f"{pad}{{",

@@ -187,9 +187,12 @@ def test_convert(run: Run, tmp_path: Path, face_file: Path, face: Animation) -> 
     code, _, err = run("convert", face_file, tmp_path / "x.xyz")
     assert code == 1
     assert ".fba" in err
-    code, _, err = run("convert", face_file, tmp_path / "x.bvh")
+    code, _, err = run("convert", face_file, tmp_path / "x.epf")
     assert code == 1
     assert "read only" in err
+    code, _, err = run("convert", face_file, tmp_path / "x.bvh")
+    assert code == 1
+    assert "only a face" in err
     code, _, err = run("convert", face_file, tmp_path / "x.bap")
     assert code == 1
     assert not (tmp_path / "x.bap").exists()
