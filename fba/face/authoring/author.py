@@ -9,20 +9,21 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.face.authoring.binding import SURFACE_KINDS, Binding, bind_points, face_size, lip_sides, part_lips
+from fba.face.authoring.binding import Binding, bind_points, face_size, part_lips
 from fba.face.authoring.carry import LARGEST, NEAR, Anchors
 from fba.face.authoring.ears import ear_motions
 from fba.face.authoring.extremes import Limiter
 from fba.face.authoring.eyes import Eye, eye_transforms, eyes, pupil_motions
 from fba.face.authoring.jaw import CHIN, Jaw, jaw, opening, share_of_part, turned
-from fba.face.authoring.landmarks import Landmarks, landmarks
-from fba.face.authoring.lids import LIDS, lash_motion, lid_motion
+from fba.face.authoring.landmarks import Landmarks, landmarks, surface_of
+from fba.face.authoring.lashes import lash_motion
+from fba.face.authoring.lids import lid_motion
 from fba.face.authoring.lips import HANDLES, lip_motions
 from fba.face.authoring.motion import Motion, by_part, tables
+from fba.face.authoring.opening import LIDS
 from fba.face.authoring.relax import relaxed
 from fba.face.authoring.saturation import guarded, linear
 from fba.face.authoring.spots import spot_motions
-from fba.face.authoring.surface import Surface
 from fba.face.authoring.tongue import FAPS as TONGUE_FAPS
 from fba.face.authoring.tongue import tongue_motion
 from fba.face.expressions import Definitions
@@ -78,13 +79,8 @@ def author(
         raise ModelError(f"feature point {names()[int(np.argwhere(np.isinf(places))[0, 0])]} is infinite")
     places[np.isnan(places).any(axis=1)] = np.nan
     _check_size(parts)
-    skins = [part for part in parts if part.kind in SURFACE_KINDS]
-    surface = Surface(skins)
-    pool = _numbers(parts, skins)
     binding = bind_points(parts, places, bound)
-    sides = lip_sides(surface, parts, binding.points, binding.bound)
-    if sides is not None:
-        surface = Surface(skins, sides)
+    surface, pool = surface_of(parts, binding.points, binding.bound)
     if bound is None:
         binding = part_lips(surface, parts, places, binding, face_size(places))
     marks = landmarks(surface, binding.points, binding.bound, pool)
@@ -121,18 +117,6 @@ def _kinds(parts: tuple[Part, ...]) -> str:
     return (
         ", ".join(f"{part.name!r} ({part.kind}, {len(part.triangles)} triangles)" for part in parts) or "none"
     )
-
-
-def _numbers(parts: tuple[Part, ...], chosen: list[Part]) -> npt.NDArray[np.intp]:
-    """Vertices of some parts, counted through all."""
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    return np.concatenate(
-        [
-            np.arange(start, start + len(part.vertices))
-            for part, start in zip(parts, starts, strict=False)
-            if any(part is other for other in chosen)
-        ]
-    ).astype(np.intp)
 
 
 class _Authoring:

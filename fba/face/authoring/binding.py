@@ -78,7 +78,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
     sought = [name for name in names() if found[row_of()[name]] < 0 and name not in FREE_POINTS]
     for name in sought:
         row = row_of()[name]
-        pool = _pool(parts, kinds_of(name))
+        pool = pool_of(parts, kinds_of(name))
         if np.isnan(points[row]).any() or not len(pool):
             continue
         away = np.linalg.norm(vertices[pool] - points[row], axis=1)
@@ -113,7 +113,7 @@ def part_lips(
     outer = [int(found[row[name]]) for name in ("8.1", "8.2")]
     if min(outer) < 0:
         return binding
-    pool = _pool(parts, SURFACE_KINDS)
+    pool = pool_of(parts, SURFACE_KINDS)
     number = np.full(len(found) if not len(pool) else int(pool.max()) + 1, -1, dtype=np.intp)
     number[pool] = surface.number
     walk = [surface.distances([number[vertex]], limit=2 * size) for vertex in outer]
@@ -168,7 +168,7 @@ def lip_sides(
     seam and joined.
     """
     row = row_of()
-    pool = _pool(parts, SURFACE_KINDS)
+    pool = pool_of(parts, SURFACE_KINDS)
     number = np.full(int(pool.max(initial=-1)) + 1, -1, dtype=np.intp)
     number[pool] = surface.number
     line = [int(bound[row[name]]) for name in ("2.4", "2.2", "2.5")]
@@ -200,7 +200,7 @@ def kinds_of(name: str) -> tuple[str, ...]:
     return KINDS_OF_GROUP.get(int(name.split(".", maxsplit=1)[0]), SURFACE_KINDS)
 
 
-def _pool(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:
+def pool_of(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:
     """Vertices of the parts of some kinds, counted through all parts."""
     start, found = 0, [np.zeros(0, dtype=np.intp)]
     for part in parts:

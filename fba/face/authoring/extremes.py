@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +35,13 @@ class Limiter:
         areas = np.linalg.norm(np.cross(first, second), axis=1)
         typical = float(np.median(areas)) if len(areas) else 0.0
         self._triangles = triangles[areas > DEGENERATE * typical]
+
+    def without(self, vertices: Int) -> Limiter:
+        """The same, blind to the triangles about some vertices."""
+        other = copy(self)
+        other.__dict__.pop("_fans", None)
+        other._triangles = self._triangles[~np.isin(self._triangles, vertices).any(axis=1)]
+        return other
 
     def __len__(self) -> int:
         return len(self._vertices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -9,9 +10,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from fba.face.authoring.binding import SURFACE_KINDS, lip_sides, pool_of
 from fba.face.authoring.surface import Surface
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, neutral_points, row_of
+from fba.face.model import Part
 
 Float64 = npt.NDArray[np.float64]
 Int = npt.NDArray[np.intp]
@@ -145,3 +148,15 @@ def landmarks(surface: Surface, points: Float64, bound: npt.NDArray[np.int32], p
         if held >= 0 and number[held] >= 0
     }
     return Landmarks(surface, points, vertex, Fapu.measure(points))
+
+
+def surface_of(parts: Sequence[Part], points: Float64, bound: npt.NDArray[np.int32]) -> tuple[Surface, Int]:
+    """(surface, pool): skin and inner mouth as one surface, and its vertices counted through all parts.
+
+    A mouth that is a slit, its edges on each other, stays open.
+    """
+    skins = [part for part in parts if part.kind in SURFACE_KINDS]
+    pool = pool_of(parts, SURFACE_KINDS)
+    surface = Surface(skins)
+    sides = lip_sides(surface, parts, points, bound)
+    return (surface if sides is None else Surface(skins, sides)), pool

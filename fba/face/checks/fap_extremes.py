@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from fba.face.checks.findings import Finding
 from fba.face.checks.posing import Poser
+from fba.face.model import Part
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_ROLL
 from fba.parameters import faps
 
@@ -19,12 +20,16 @@ TURNING = {OPEN_JAW, 19, 20, 21, 22, TONGUE_ROLL}
 """Where these move the skin, it turns: a triangle has turned over when it faces away from its neighbours."""
 HAIR = ("lash", "hair")
 """Has two sides: it cannot turn over."""
+LIDS = {19, 20, 21, 22}
+EYE_CORNERS = ("3.7", "3.11", "3.8", "3.12")
+CORNER = 0.12
+"""Share of the eye's width about its corners that is not looked at."""
 RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 LONGEST = 8.0
 """Edges may get this many times as long..."""
 SHORT = 0.3
 """... where they are not shorter than this share of the typical edge of their part."""
-SPECK = 0.002
+SPECK = 0.003
 """Share of the moving surface that may turn over where skin closes on itself: in the corners of eyes."""
 DEGENERATE = 1e-5
 FACING = -0.3
@@ -45,7 +50,7 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
             before, after = poser.neutral[own], moved[own]
             if np.abs(after - before).max(initial=0.0) < 1e-9 or _rigid(before, after):
                 continue
-            over, torn, share = damage(before, after, part.triangles, turning=fap in TURNING)
+            over, torn, share = damage(before, after, _counted(poser, part, fap), turning=fap in TURNING)
             if part.kind in HAIR:
                 over = 0
             if over and not (fap in TURNING and share <= SPECK):
@@ -62,6 +67,18 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
                     f"{torn} edges of part {part.name!r} more than {LONGEST:g} times as long at {value:g}",
                     "none",
                 )
+
+
+def _counted(poser: Poser, part: Part, fap: int) -> npt.NDArray[np.integer]:
+    """Triangles of a part, without those about the corners of the eyes where lids close on themselves."""
+    if fap not in LIDS:
+        return part.triangles
+    corners = np.array([poser.place(name) for name in EYE_CORNERS])
+    wide = np.linalg.norm(corners[0] - corners[1]), np.linalg.norm(corners[2] - corners[3])
+    away = np.linalg.norm(part.vertices[:, None] - corners, axis=2)
+    within = (np.nan_to_num(away, nan=np.inf) < CORNER * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
+    counted: npt.NDArray[np.integer] = part.triangles[~within[part.triangles].any(axis=1)]
+    return counted
 
 
 def damage(

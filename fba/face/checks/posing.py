@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.authoring.binding import SURFACE_KINDS
 from fba.face.authoring.eyes import Eye, eyes
-from fba.face.authoring.landmarks import Landmarks, landmarks
+from fba.face.authoring.landmarks import Landmarks, landmarks, surface_of
 from fba.face.authoring.surface import Surface
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
@@ -75,20 +74,18 @@ class Poser:
         return place
 
     @cached_property
+    def _surface(self) -> tuple[Surface, Int]:
+        return surface_of(self.model.parts, self.model.points, self.model.bound)
+
+    @property
     def pool(self) -> Int:
         """Vertices of skin and inner mouth, counted through all parts."""
-        own = [part for part in self.model.parts if part.kind in SURFACE_KINDS]
-        starts = self.model.starts
-        return np.concatenate(
-            [np.zeros(0, dtype=np.intp)]
-            + [np.arange(starts[part.name], starts[part.name] + len(part.vertices)) for part in own]
-        )
+        return self._surface[1]
 
     @cached_property
     def marks(self) -> Landmarks:
         """Contours and points on the skin."""
-        surface = Surface([part for part in self.model.parts if part.kind in SURFACE_KINDS])
-        return landmarks(surface, self.model.points, self.model.bound, self.pool)
+        return landmarks(self._surface[0], self.model.points, self.model.bound, self.pool)
 
     @cached_property
     def eyes(self) -> dict[str, Eye]:
