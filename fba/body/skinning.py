@@ -27,7 +27,7 @@ class Skinner:
 
     vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
     sum to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32
-    (F, 3), by which normals follow the surface (`fba.body.rings`); without them they turn as their vertices do.
+    (F, 3), by which normals follow the surface (`fba.body.rings`); without them they only turn.
 
     Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
     several threads, one after the other.
@@ -51,14 +51,16 @@ class Skinner:
         self._joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
         self._weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
         self._counts = (self._weights > 0).sum(axis=1).astype(np.int32)
-        self._vertices = np.ascontiguousarray(vertices, dtype=np.float32)
-        self._normals = np.ascontiguousarray(normals, dtype=np.float32)
+        self._modelled = np.ascontiguousarray(vertices, dtype=np.float32)
+        self._upright_modelled = np.ascontiguousarray(normals, dtype=np.float32)
+        # copies to work on: compiled code is made anew for arrays that may not be written to
+        self._vertices, self._upright = self._modelled.copy(), self._upright_modelled.copy()
         self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
         self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
-        self._twists = twists(skeleton, bind, self._vertices, self._joints, self._weights)
+        self._twists = twists(skeleton, bind, self._modelled, self._joints, self._weights)
         self._wrung = self._vertices.copy()
         faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
-        self._around, self._numbers = rings(self._vertices, self._normals, faces)
+        self._around, self._numbers = rings(self._modelled, self._upright_modelled, faces)
         self._scratch = np.empty((len(bind), 12), dtype=np.float32)
         self._lock = threading.Lock()
 
@@ -70,7 +72,7 @@ class Skinner:
         method: str = "dual",
     ) -> Float32:
         """Vertices for joint matrices: see `BodyModel.skin`."""
-        return self._run(self._vertices, self._normals, matrices, out, normals, method)
+        return self._run(self._modelled, self._upright_modelled, matrices, out, normals, method)
 
     def carry(
         self,
@@ -82,20 +84,19 @@ class Skinner:
         method: str = "dual",
     ) -> Float32:
         """The same for other places (V, 3) of the vertices, and their normals (V, 3) where wanted."""
-        shape = self._vertices.shape
-        _check_target(vertices, shape, "vertices")
-        if normals is not None:
-            if upright is None:
-                raise ValueError("normals are wanted, but not given as modelled")
-            _check_target(upright, shape, "upright")
-        return self._run(
-            vertices, self._normals if upright is None else upright, matrices, out, normals, method
-        )
+        if normals is not None and upright is None:
+            raise ValueError("normals are wanted, but not given as modelled")
+        for array in (vertices, upright):
+            if array is not None and array.shape != self._modelled.shape:
+                raise ValueError(
+                    f"vertices and normals must have shape {self._modelled.shape}, not {array.shape}"
+                )
+        return self._run(vertices, upright, matrices, out, normals, method)
 
     def _run(
         self,
         vertices: Float32,
-        modelled: Float32,
+        upright: Float32 | None,
         matrices: npt.ArrayLike,
         out: Float32 | None,
         normals: Float32 | None,
@@ -114,12 +115,17 @@ class Skinner:
             if np.may_share_memory(out, normals):
                 raise ValueError("out and normals share memory; give each an array of its own")
         placed = out[None] if single else out
-        upright = placed[:0] if normals is None else normals[None] if single else normals
-        mesh = (vertices, modelled, self._joints, self._weights, self._counts, self._around, self._numbers)
-        wrung = self._wrung if len(self._twists.rows) else vertices
+        turned = placed[:0] if normals is None else normals[None] if single else normals
+        mesh = (
+            self._vertices, self._upright, self._joints, self._weights, self._counts, self._around,
+            self._numbers,
+        )  # fmt: skip
         with self._lock, np.errstate(all="ignore"):
-            if wrung is not vertices:
-                np.copyto(wrung, vertices)
+            np.copyto(self._vertices, vertices)
+            if upright is not None:
+                np.copyto(self._upright, upright)
+            if method == "dual":
+                np.copyto(self._wrung, vertices)
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)
                 if method == "dual":
@@ -130,13 +136,13 @@ class Skinner:
                         *mesh,
                         self._scratch,
                         self._twists,
-                        wrung,
+                        self._wrung,
                         placed[part],
-                        upright[part],
+                        turned[part],
                     )
                 else:
                     self._loops.linear_frames(
-                        frames[part], self._inverse, *mesh, self._scratch, placed[part], upright[part]
+                        frames[part], self._inverse, *mesh, self._scratch, placed[part], turned[part]
                     )
         return out
 
@@ -150,6 +156,8 @@ class Skinner:
         if array.dtype.kind not in "iuf":
             raise ValueError(f"joint matrices must be real numbers, not {array.dtype}")
         frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, count, 4, 4)
+        if not frames.flags.writeable:
+            frames = frames.copy()  # see above
         if not np.isfinite(frames).all():
             frame, joint = (int(place) for place in np.argwhere(~np.isfinite(frames))[0, :2])
             raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")

@@ -46,18 +46,18 @@ def dual_frames(
     matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, upright (V, 3): as modelled.
     joints, weights (V, 4): those that carry, first; counts (V,): how many. around, numbers: see `rings`.
     scratch (J, 12). twists: what turns some of the vertices beforehand. wrung (V, 3): scratch, the
-    vertices; the same array where nothing is turned. out (T, V, 3). normals: the same, or (0, V, 3) for none.
+    vertices. out (T, V, 3). normals: the same, or (0, V, 3) for none.
     """
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
         _duals(matrices[frame], inverse, parents, scratch)
         _wring(vertices, parents, scratch, twists, wrung)
-        x0, y0, z0 = np.float32(root[0, 3]), np.float32(root[1, 3]), np.float32(root[2, 3])
         upper = normals[frame] if normals.shape[0] else out[frame]
         wanted = upright if normals.shape[0] else upright[:0]
-        _dual_places(wrung, joints, weights, counts, scratch, x0, y0, z0, out[frame], wanted, around, upper)
+        _dual_places(wrung, joints, weights, counts, scratch, out[frame], wanted, around, upper)
         if normals.shape[0]:
             _across(out[frame], around, numbers, upper)
+        _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
 @compiled
@@ -78,14 +78,12 @@ def linear_frames(
                     if column == 3:
                         total -= root[row, 3]
                     scratch[joint, 4 * row + column] = total
-        x0, y0, z0 = np.float32(root[0, 3]), np.float32(root[1, 3]), np.float32(root[2, 3])
         upper = normals[frame] if normals.shape[0] else out[frame]
         wanted = upright if normals.shape[0] else upright[:0]
-        _linear_places(
-            vertices, joints, weights, counts, scratch, x0, y0, z0, out[frame], wanted, around, upper
-        )
+        _linear_places(vertices, joints, weights, counts, scratch, out[frame], wanted, around, upper)
         if normals.shape[0]:
             _across(out[frame], around, numbers, upper)
+        _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
 @compiled
@@ -189,8 +187,7 @@ def _quaternion(s: Float64) -> tuple[float, float, float, float]:
 @compiled
 def _dual_places(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
-    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32,
-    upright: Float32, around: Int32, normals: Float32,
+    out: Float32, upright: Float32, around: Int32, normals: Float32,
 ) -> None:  # fmt: skip
     with_normals = upright.shape[0] > 0
     for i in range(vertices.shape[0]):
@@ -217,9 +214,9 @@ def _dual_places(
             w * c - y * a + z * b - x * d,
             w * d - z * a + x * c - y * b,
         )
-        out[i, 0] = px + per * (y * uz - z * uy + tx) + x0
-        out[i, 1] = py + per * (z * ux - x * uz + ty) + y0
-        out[i, 2] = pz + per * (x * uy - y * ux + tz) + z0
+        out[i, 0] = px + per * (y * uz - z * uy + tx)
+        out[i, 1] = py + per * (z * ux - x * uz + ty)
+        out[i, 2] = pz + per * (x * uy - y * ux + tz)
         if with_normals and around[i, 0] < 0:
             px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
             ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
@@ -231,8 +228,7 @@ def _dual_places(
 @compiled
 def _linear_places(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, tops: Float32,
-    x0: np.float32, y0: np.float32, z0: np.float32, out: Float32,
-    upright: Float32, around: Int32, normals: Float32,
+    out: Float32, upright: Float32, around: Int32, normals: Float32,
 ) -> None:  # fmt: skip
     with_normals = upright.shape[0] > 0
     m = np.empty(12, dtype=np.float32)
@@ -243,9 +239,9 @@ def _linear_places(
             for e in range(12):
                 m[e] += share * tops[j, e]
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        out[i, 0] = m[0] * px + m[1] * py + m[2] * pz + m[3] + x0
-        out[i, 1] = m[4] * px + m[5] * py + m[6] * pz + m[7] + y0
-        out[i, 2] = m[8] * px + m[9] * py + m[10] * pz + m[11] + z0
+        out[i, 0] = m[0] * px + m[1] * py + m[2] * pz + m[3]
+        out[i, 1] = m[4] * px + m[5] * py + m[6] * pz + m[7]
+        out[i, 2] = m[8] * px + m[9] * py + m[10] * pz + m[11]
         if with_normals and around[i, 0] < 0:
             px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
             nx = m[0] * px + m[1] * py + m[2] * pz
@@ -276,3 +272,12 @@ def _across(places: Float32, around: Int32, numbers: Float32, normals: Float32) 
         normals[i, 0] = nx * per
         normals[i, 1] = ny * per
         normals[i, 2] = nz * per
+
+
+@compiled
+def _shift(places: Float32, x: float, y: float, z: float) -> None:
+    """Places from the root's frame into the world: last, so that nothing above is lost to rounding."""
+    for i in range(places.shape[0]):
+        places[i, 0] += x
+        places[i, 1] += y
+        places[i, 2] += z
