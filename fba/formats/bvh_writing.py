@@ -52,8 +52,8 @@ def write(
     shoulders, ...). skeleton: the body; `Skeleton.default()` where None. axes: which way BAPs turn
     (`fba.body.convention_names()`). unit: lengths in the file for one metre, by default centimetres.
 
-    The root's OFFSET is 0, its channels are its places in the world: some programs add the two. Read again, the
-    file gives the same BAPs (`fba.capture.direct`); times begin at 0. Raises FormatError where there is
+    The root's OFFSET is 0, its channels are its places in the world: some programs add the two. Read again,
+    the file gives the same BAPs (`fba.capture.direct`); times begin at 0. Raises FormatError where there is
     no body, no frame, or too many, OptionError for an unknown option's value.
     """
     from fba.body import BapSolver
