@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import figure
 import numpy as np
 import numpy.typing as npt
-from cutting import Cloth, triangulated
+from cutting import MIDLINE, Cloth, triangulated
 from scipy.interpolate import PchipInterpolator
 
+from fba.body import Skeleton
 from fba.mesh import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
@@ -22,6 +23,9 @@ Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
 Way = Callable[[Float64, Float64], Float64]
 
+_NAMES = list(Skeleton.default().names)
+MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2:]) for n in _NAMES])
+"""The joint of the other side, of each."""
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.040, 0.042, 0.048])
@@ -163,6 +167,8 @@ def _made(
     everything = np.concatenate([vertices, fold])
     across = np.concatenate([cloth.values[:, 0], cloth.values[rim, 0]])
     shade = np.where(across[faces].max(axis=1) < band + 1e-6, SEAM, 1.0)
+    side = np.concatenate([cloth.vertices[:, 0], cloth.vertices[rim, 0]])
+    everything, weights, faces, shade = _mirrored(everything, weights, faces, shade, side)
     everything, weights, faces, tone = _parted(everything, weights, faces, shade)
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)
     return Garment(everything, faces, colours, weights, value)
@@ -190,6 +196,28 @@ def _even_rim(vertices: Float64, border: Int64, rim: Int64) -> Float64:
             np.add.at(total, a, vertices[b])
         vertices[rim] += share * (total[rim] / count[rim] - vertices[rim])
     return vertices
+
+
+def _mirrored(
+    vertices: Float64, weights: Float64, faces: Int64, shade: Float64, side: Float64
+) -> tuple[Float64, Float64, Int64, Float64]:
+    """The left half and its mirror image. side (V,): x of the vertices as they were cut."""
+    half = (side[faces] > -MIDLINE).all(axis=1)
+    used, left = np.unique(faces[half], return_inverse=True)
+    left = left.reshape(-1, 3)
+    middle = np.abs(side[used]) < MIDLINE
+    places, carried = vertices[used].copy(), weights[used].copy()
+    other = carried[:, MIRROR]
+    places[middle, 0] = 0.0
+    carried[middle] = (carried[middle] + other[middle]) / 2
+    number = np.arange(len(used))
+    number[~middle] = len(used) + np.arange((~middle).sum())
+    return (
+        np.concatenate([places, places[~middle] * (-1.0, 1.0, 1.0)]),
+        np.concatenate([carried, other[~middle]]),
+        np.concatenate([left, number[left][:, ::-1]]),
+        np.tile(shade[half], 2),
+    )
 
 
 def _parted(

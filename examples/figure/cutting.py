@@ -11,6 +11,8 @@ Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
 
+MIDLINE = 1e-6
+"""Metres from the plane of symmetry."""
 SNAP = 0.28
 """A corner nearer to the line than this share of an edge is moved onto it: no slivers."""
 
@@ -78,6 +80,8 @@ class Cloth:
             for array, rows in zip(arrays, moved, strict=True):
                 array[corner[chosen]] = rows[chosen]
             height[corner[chosen]] = 0.0
+        for array in arrays[:2]:  # what is on the midline stays there
+            array[np.abs(self.vertices[:, 0]) < MIDLINE, 0] = 0.0
         on_line = Cloth(arrays[0], arrays[1], arrays[2], arrays[3], self.triangles)
         a, b = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0].T
         fresh = on_line.blended(a, b, height[a] / (height[a] - height[b]))

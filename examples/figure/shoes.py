@@ -5,7 +5,7 @@ from __future__ import annotations
 import figure
 import numpy as np
 import numpy.typing as npt
-from clothes import Garment
+from clothes import MIRROR, Garment
 
 from fba.mesh import vertex_normals
 
@@ -34,13 +34,12 @@ def shoes(surface: figure.Surface, weights: Float64) -> Garment:
     foot = np.flatnonzero(left & (surface.vertices[:, 1] < TOP + 0.01))
     vertices, triangles, colours = _shoe(surface.vertices[foot])
     carried = _carried(vertices, surface.vertices[foot], weights[foot])
-    mirror = _mirrored_joints(surface, weights)
     other = vertices * (-1.0, 1.0, 1.0)
     return Garment(
         np.concatenate([vertices, other]),
         np.concatenate([triangles, triangles[:, ::-1] + len(vertices)]),
         np.concatenate([colours, colours]),
-        np.concatenate([carried, carried[:, mirror]]),
+        np.concatenate([carried, carried[:, MIRROR]]),
         np.where(surface.vertices[:, 1] < TOP + 0.01, COVERED - surface.vertices[:, 1], -1.0),
     )
 
@@ -186,17 +185,6 @@ def _carried(places: Float64, foot: Float64, weights: Float64) -> Float64:
     share = 1 / (away + 0.01) ** 2
     share /= share.sum(axis=1, keepdims=True)
     return np.einsum("nk,nkj->nj", share, weights[rows])
-
-
-def _mirrored_joints(surface: figure.Surface, weights: Float64) -> Int64:
-    from fba.body import Skeleton
-
-    names = list(Skeleton.default().names)
-    return np.array([names.index(_other(name)) for name in names])
-
-
-def _other(name: str) -> str:
-    return {"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]
 
 
 def _smooth(value: Float64) -> Float64:
