@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import click
@@ -45,7 +46,7 @@ def still(faps: tuple[str, ...], visemes: tuple[str, ...], expressions: tuple[st
             expression[0, 2 * place] = select
             expression[0, 2 * place + 1] = INTENSITY_MAX if intensity is None else intensity
         mask[0, 1] = True
-    return Animation(25, np.arange(1), FaceTrack(values, mask, viseme, expression), name="still")
+    return Animation(Fraction(25), np.arange(1), FaceTrack(values, mask, viseme, expression), name="still")
 
 
 def _fap(text: str) -> tuple[int, int]:

@@ -120,7 +120,7 @@ def test_the_file_itself_and_a_folder_without_fitted_eyes(folder: Path, tmp_path
 
 def test_damaged_base_meshes_are_refused(folder: Path, tmp_path: Path) -> None:
     text = (folder / "base.obj").read_text()
-    (tmp_path / "base.obj").write_text(text[: text.index('g helper-tongue')])
+    (tmp_path / "base.obj").write_text(text[: text.index("g helper-tongue")])
     with pytest.raises(ModelError, match=r"not MakeHuman's base mesh hm08.*no group"):
         import_model(tmp_path)
     (tmp_path / "base.obj").write_text(text.replace("g body", "g bodice"))
