@@ -86,7 +86,13 @@ def _mask(points: np.ndarray) -> tuple[Part, dict[str, int]]:
     for j in range(-corner, corner + 1):
         x = points[row["2.4"], 0] * j / corner
         fixed[int(number[slit, middle + j])] = np.array([x, points[row["2.2"], 1]])
-    for name, j in (("2.4", corner), ("2.5", -corner), ("2.2", 0), ("2.6", corner // 2), ("2.7", -(corner // 2))):
+    for name, j in (
+        ("2.4", corner),
+        ("2.5", -corner),
+        ("2.2", 0),
+        ("2.6", corner // 2),
+        ("2.7", -(corner // 2)),
+    ):
         vertex[name] = int(number[slit, middle + j])
 
     for name in FACE_POINTS:
@@ -120,7 +126,9 @@ def _mask(points: np.ndarray) -> tuple[Part, dict[str, int]]:
     for name, upper in (("2.3", "2.2"), ("2.8", "2.6"), ("2.9", "2.7")):
         vertex[name] = twin[vertex[upper]]
 
-    known = np.array([[*plane[v], points[row[name], 2]] for name, v in vertex.items() if name not in LOWER_LIP])
+    known = np.array(
+        [[*plane[v], points[row[name], 2]] for name, v in vertex.items() if name not in LOWER_LIP]
+    )
     edge = np.array([[x, y, -0.09] for x in (-WIDTH, WIDTH) for y in np.linspace(BOTTOM, TOP, 6)])
     known = np.vstack([known, edge])
     depth = RBFInterpolator(known[:, :2], known[:, 2], kernel="thin_plate_spline", smoothing=1e-9)
@@ -150,7 +158,9 @@ def _ring(line: int, column: int, across: int, up: int, sign: int) -> list[tuple
     return upper + lower
 
 
-def _on_lids(share: float, inner: np.ndarray, top: np.ndarray, outer: np.ndarray, bottom: np.ndarray) -> np.ndarray:
+def _on_lids(
+    share: float, inner: np.ndarray, top: np.ndarray, outer: np.ndarray, bottom: np.ndarray
+) -> np.ndarray:
     """A place on the opening's outline, which is through its four points a quarter of the way each."""
     corners = [inner, top, outer, bottom, inner]
     k, t = divmod(share * 4, 1)
@@ -166,7 +176,10 @@ def _on_lids(share: float, inner: np.ndarray, top: np.ndarray, outer: np.ndarray
 def _relaxed(plane: np.ndarray, number: np.ndarray, fixed: dict[int, np.ndarray]) -> np.ndarray:
     """The grid with some vertices put elsewhere and the others evenly between them."""
     pairs = np.concatenate(
-        [np.stack([number[:, :-1], number[:, 1:]], -1).reshape(-1, 2), np.stack([number[:-1], number[1:]], -1).reshape(-1, 2)]
+        [
+            np.stack([number[:, :-1], number[:, 1:]], -1).reshape(-1, 2),
+            np.stack([number[:-1], number[1:]], -1).reshape(-1, 2),
+        ]
     )
     both = np.concatenate([pairs, pairs[:, ::-1]])
     graph = csr_array((np.ones(len(both)), tuple(both.T)), shape=(len(plane),) * 2)
@@ -190,7 +203,9 @@ def _triangles(number: np.ndarray, hole: np.ndarray) -> np.ndarray:
     return np.concatenate([one[~hole], two[~hole]])
 
 
-def _off_eyes(skin: np.ndarray, points: np.ndarray, fixed: dict[int, np.ndarray], vertex: dict[str, int]) -> np.ndarray:
+def _off_eyes(
+    skin: np.ndarray, points: np.ndarray, fixed: dict[int, np.ndarray], vertex: dict[str, int]
+) -> np.ndarray:
     """Lids laid on their eyeballs, with some room; nothing else within them."""
     del fixed
     result = skin.copy()
@@ -206,7 +221,9 @@ def _off_eyes(skin: np.ndarray, points: np.ndarray, fixed: dict[int, np.ndarray]
     return result
 
 
-def _with_ears(skin: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+def _with_ears(
+    skin: np.ndarray, triangles: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
     """Two flaps that stand off the sides of the mask, hung on its rim."""
     row, vertex = row_of(), {}
     for side, names in (
@@ -215,16 +232,25 @@ def _with_ears(skin: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> t
     ):
         top, back, lobe, below, above = (points[row[name]] for name in names)
         x = WIDTH if side == "left" else -WIDTH
-        rim = np.flatnonzero((np.abs(skin[:, 0] - x) < 1e-9) & (skin[:, 1] > below[1]) & (skin[:, 1] < above[1]))
+        rim = np.flatnonzero(
+            (np.abs(skin[:, 0] - x) < 1e-9) & (skin[:, 1] > below[1]) & (skin[:, 1] < above[1])
+        )
         rim = rim[np.argsort(skin[rim, 1])]
         share = np.linspace(0, 1, len(rim))
-        outer = np.array([_through([lobe, (lobe + back) / 2 + (0, 0, -0.004), back, (back + top) / 2, top], s) for s in share])
+        outer = np.array(
+            [
+                _through([lobe, (lobe + back) / 2 + (0, 0, -0.004), back, (back + top) / 2, top], s)
+                for s in share
+            ]
+        )
         steps = 5
         start = len(skin)
         sheets = [skin[rim] * (1 - t) + outer * t for t in np.linspace(0, 1, steps + 1)[1:]]
         index = np.vstack([rim, start + np.arange(steps * len(rim)).reshape(steps, -1)])
         a, b, c, d = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
-        faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+        faces = np.concatenate(
+            [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+        )
         skin = np.vstack([skin, *sheets])
         triangles = np.vstack([triangles, faces if side == "left" else faces[:, ::-1]])
         count = len(rim)
@@ -249,7 +275,9 @@ def _inside(points: np.ndarray) -> list[tuple[Part, dict[str, int]]]:
         rows = [points[row[edge]] * (1 - t) + points[row[root]] * t + arch for t in (0, 0.5, 1)]
         index = np.arange(75).reshape(3, 25)
         a, b, c, d = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
-        faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+        faces = np.concatenate(
+            [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+        )
         part = Part(f"{jaw} teeth", "teeth", np.vstack(rows), faces if jaw == "upper" else faces[:, ::-1])
         found.append((part, {edge: 12, root: 62}))
     vertices, triangles = ball((0, 0, 0), 1.0, rings=12)
