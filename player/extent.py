@@ -1,23 +1,58 @@
-"""Which part of a picture a view fills: what lies outside need not be looked at again."""
+"""Where a view may leave steps in a picture: what lies elsewhere need not be smoothed."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from player.shapes import View
+from fba.compiled import is_compiled
+from player.outline import Outliner
+from player.shapes import FaceMesh, View
 
 Float64 = npt.NDArray[np.float64]
 
 MARGIN = 0.03
 """Added on every side, as a share of what is filled."""
 NEAR = 1e-3
+PIXELS_A_CORNER = 25
+"""So many pixels are looked at in the time that one corner of a band takes, in software OpenGL."""
 STILL = 0.3
 """What goes with the head by less than this is looked at apart: shoulders are wide, and low."""
 
 Rectangle = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Where a picture has to be smoothed.
+
+    rectangles: left, bottom, width and height in pixels. bands: float32 (N, 2), corners of triangles, -1..1
+    across the picture.
+    """
+
+    rectangles: list[Rectangle]
+    bands: npt.NDArray[np.float32]
+
+
+def steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner) -> Steps:
+    """Along the outlines of faces, and anywhere in the rectangles that hold what else is drawn.
+
+    matrix: (4, 4), world to clip space. size: of the picture in pixels.
+    """
+    if not is_compiled():
+        return Steps(filled(view, matrix, size), np.zeros((0, 2), dtype=np.float32))
+    whole, bands = [], [np.zeros((0, 2), dtype=np.float32)]
+    for face in view.faces:
+        along = outliner.outlines([face], matrix, size)
+        held = filled(View(faces=[face]), matrix, size)
+        if sum(_area(rectangle) for rectangle in held) < len(along) * PIXELS_A_CORNER:
+            whole.append(face)  # teeth and lashes: all outline
+        else:
+            bands.append(along)
+    return Steps(filled(replace(view, faces=whole), matrix, size), np.concatenate(bands))
 
 
 def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:
@@ -26,11 +61,7 @@ def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle
     matrix: (4, 4), world to clip space. None of them lies within another.
     """
     boxes = [_corners(mesh.positions) @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3] for mesh in view.meshes]
-    for face in view.faces:
-        still = face.shape.sway < STILL
-        for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
-            both = np.concatenate([box, _turned(box, face.turn, face.centre)])  # the neck bends between them
-            boxes.append(both @ face.matrix[:3, :3].T + face.matrix[:3, 3])
+    boxes += [box for face in view.faces for box in _face_boxes(face)]
     for round_ in (view.capsules, view.marks):
         if len(round_):
             reach = float(round_[:, [3, 7]].max())
@@ -41,6 +72,15 @@ def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle
         found = [other for other in found if not _within(other, rectangle)]
         if _area(rectangle):
             found.append(rectangle)
+    return found
+
+
+def _face_boxes(face: FaceMesh) -> list[Float64]:
+    still = face.shape.sway < STILL
+    found = []
+    for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
+        both = np.concatenate([box, _turned(box, face.turn, face.centre)])  # the neck bends between them
+        found.append(both @ face.matrix[:3, :3].T + face.matrix[:3, 3])
     return found
 
 

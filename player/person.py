@@ -40,7 +40,8 @@ class Person:
         eyes = model.points[[point_row("3.5"), point_row("3.6")]]
         self.head = HeadOnBody(body, model.vertices, eyes, skull)
         self._face = self._face_shapes()
-        self._parts = [part for part in body.parts if part.kind != "neck" or not self.head.brings_neck]
+        left_out = ("head", "neck") if self.head.brings_neck else ("head",)
+        self._parts = [part for part in body.parts if part.kind not in left_out]
         self._rows = {
             part.name: slice(start, start + len(part.vertices))
             for part, start in zip(body.parts, body.starts.values(), strict=True)

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from player.camera import Camera
-from player.extent import Rectangle, filled
+from player.extent import Steps, steps
 from player.face_renderer import FaceRenderer
+from player.outline import Outliner
 from player.primitives import capsule_mesh, sphere_mesh
 from player.programs import load_program, matrix_bytes, set_uniform
 from player.shapes import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
@@ -61,13 +62,14 @@ class Renderer:
             [(self._eye_parts[0], "3f", "in_position")],
             index_buffer=self._eye_parts[1],
         )
+        self._outliner = Outliner()
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
-    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> list[Rectangle]:
+    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps:
         """Clear the bound framebuffer and draw the view; size: its width and height in pixels.
 
-        Returns where the picture is not backdrop: rectangles of left, bottom, width, height.
+        Returns where its steps are.
         """
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
@@ -89,7 +91,7 @@ class Renderer:
         for ball in view.eyes:
             self._draw_eye(ball)
         self._faces.draw(view.faces)
-        return filled(view, matrix, size)
+        return steps(view, matrix, size, self._outliner)
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""

@@ -6,7 +6,6 @@ and a pass that smooths the finished picture's edges.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from fba.errors import DisplayError
 from player.context import import_moderngl
+from player.extent import Steps
 
 
 class Target:
@@ -48,6 +48,8 @@ class Target:
         self._result = self._kept(gl.framebuffer([self._kept(gl.renderbuffer(size, 4))]))
         depth = self._kept(gl.depth_renderbuffer(size, samples=samples))
         self._pass: Any = None
+        self._bands: Any = None
+        self._along: Any = None
         if samples:
             colour = self._kept(gl.renderbuffer(size, 4, samples=samples))
         else:
@@ -59,7 +61,7 @@ class Target:
                 f"{stage}_shader": (folder / f"smooth.{suffix}").read_text(encoding="utf-8")
                 for stage, suffix in (("vertex", "vert"), ("fragment", "frag"))
             }
-            program = self._kept(gl.program(**texts))
+            program = self._program = self._kept(gl.program(**texts))
             corners = self._kept(gl.buffer(np.array([-1, -1, 3, -1, -1, 3], dtype="f4").tobytes()))
             self._pass = self._kept(gl.vertex_array(program, [(corners, "2f", "in_corner")]))
         self._colour = colour
@@ -73,10 +75,10 @@ class Target:
         """Bind it for drawing."""
         self._drawn.use()
 
-    def finish(self, into: Any = None, within: Sequence[tuple[int, int, int, int]] | None = None) -> Any:
+    def finish(self, into: Any = None, within: Steps | None = None) -> Any:
         """The framebuffer that now holds the picture: one of its own, or, with samples = 0, `into`.
 
-        within: left, bottom, width and height of the parts whose edges are to be smoothed; all by default.
+        within: where there are edges to be smoothed; everywhere by default.
 
         `into` may be a window's framebuffer: its size is taken to be that of this target, as moderngl does
         not notice that a window was resized.
@@ -86,18 +88,29 @@ class Target:
             return self._result
         result = self._result if into is None else into
         whole = (0, 0, *self.size)
-        parts = [whole] if within is None else within
-        if whole not in parts:
+        rectangles = [whole] if within is None else within.rectangles
+        if whole not in rectangles:
             self._gl.copy_framebuffer(result, self._drawn)
         result.use()
         self._gl.viewport = whole
         self._gl.enable_only(self._gl.NOTHING)
         self._colour.use(0)
-        for part in parts:
-            self._gl.scissor = part
+        for rectangle in rectangles:
+            self._gl.scissor = rectangle
             self._pass.render()
         self._gl.scissor = None
+        if within is not None and len(within.bands) and whole not in rectangles:
+            self._smooth_bands(within)
         return result
+
+    def _smooth_bands(self, within: Steps) -> None:
+        data = np.ascontiguousarray(within.bands, dtype="f4")
+        if self._bands is None or self._bands.size < data.nbytes:
+            self._bands = self._kept(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
+            self._along = self._kept(self._gl.vertex_array(self._program, [(self._bands, "2f", "in_corner")]))
+        self._bands.orphan()
+        self._bands.write(data)
+        self._along.render(vertices=len(data))
 
     def close(self) -> None:
         """Give everything back."""

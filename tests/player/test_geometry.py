@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from fba.compiled import is_compiled
 from fba.face.model import FaceModel, Part
 from player.camera import Camera
 from player.extent import filled
 from player.eyeball import find_eyeball
 from player.face_parts import hairs
+from player.outline import Outliner
 from player.primitives import sphere_mesh
-from player.shapes import Mesh, MeshShape, View, rotation_vector
+from player.shapes import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 2.0, 3.1, np.pi])
@@ -110,3 +112,21 @@ def test_broad_strips_are_no_hairs() -> None:
     vertices = np.array([[0, 0, 0], [0.02, 0, 0], [0, 0.01, 0], [0.02, 0.01, 0]])
     assert hairs(Part("strip", "lash", vertices, np.array([[0, 1, 2], [1, 3, 2]]))) is None
     assert hairs(Part("nothing", "lash", vertices, np.zeros((0, 3), dtype=int))) is None
+
+
+@pytest.mark.skipif(not is_compiled(), reason="without numba, rectangles are smoothed instead")
+def test_the_outline_of_a_ball_is_a_circle() -> None:
+    vertices, triangles = sphere_mesh(24, 48)
+    shape = FaceShape(triangles, np.zeros((len(vertices), 4), np.float32), np.ones(len(vertices), np.float32))
+    light = np.ones((len(vertices), 4), dtype=np.float32)
+    mesh = FaceMesh(shape, vertices * 0.1, vertices, light, np.eye(4), np.zeros(3), np.zeros(3))
+    camera, size = Camera(distance=2.0), (200, 200)
+    matrix = camera.projection_matrix(1.0) @ camera.view_matrix()
+    bands = Outliner().outlines([mesh], matrix, size)
+    assert len(bands) % 6 == 0
+    # A sphere of radius r at a distance d is seen under the angle asin(r / d).
+    radius = 100 * np.tan(np.arcsin(0.1 / 2.0)) / np.tan(np.radians(12))
+    away = np.linalg.norm(bands * 100, axis=1)
+    assert abs(np.median(away) - radius) < 1.5
+    assert away.max() < radius + 4
+    assert len(bands) // 6 < 4 * 48
