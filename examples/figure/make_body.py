@@ -24,6 +24,7 @@ from sculpt import ORIGIN
 from fba.body import Skeleton
 from fba.body.heads import strongest
 from fba.body.model import BodyModel, BodyPart, Material
+from fba.body.posture import FINGERS
 from fba.face.model import FaceModel, point_row
 from fba.mesh import vertex_normals
 from player.visibility import bake
@@ -61,7 +62,7 @@ def pieces() -> tuple[dict[str, Piece], rig.Rig]:
     arm = [
         n
         for n, name in enumerate(bones.names)
-        if name[2:].startswith(("shoulder", "elbow", "wrist", "thumb", *rig.FINGERS))
+        if name[2:].startswith(("shoulder", "elbow", "wrist", "thumb", *FINGERS))
     ]
     body = clothes.Body(surface, weights, weights[:, arm].sum(axis=1))
     made = {
@@ -99,7 +100,7 @@ def _flushed(piece: Piece, bones: rig.Rig) -> Float64:
     """(V, 3) what fingertips, knuckles and elbows multiply the complexion by."""
     middles = bones.bind[:, :3, 3]
     tips = [n for n, name in enumerate(bones.names) if name[-1] == "3"]
-    bends = [n for n, name in enumerate(bones.names) if name[-1] in "12" and name[2:-1] in rig.FINGERS]
+    bends = [n for n, name in enumerate(bones.names) if name[-1] in "12" and name[2:-1] in FINGERS]
     elbows = [n for n, name in enumerate(bones.names) if name.endswith("elbow")]
     share = np.zeros(len(piece.vertices))
     for joints, strength, reach in ((tips, 0.8, 0.014), (bends, 0.55, 0.010), (elbows, 0.5, 0.035)):

@@ -24,9 +24,9 @@ Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
 
-BODY_PART_KINDS = ("skin", "neck", "cloth", "shoe", "hair", "other")
+BODY_PART_KINDS = ("skin", "neck", "head", "cloth", "shoe", "hair", "other")
 """What a part is. "neck": neck and shoulders under the clothes, shown only where the face that stands on the
-body brings none of its own."""
+body brings none of its own. "head": the head of a body that has one, left out where a face is put on it."""
 INFLUENCES = 4
 """Joints that carry a vertex, at most."""
 WEIGHT_TOLERANCE = 1e-3

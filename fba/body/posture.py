@@ -1,0 +1,124 @@
+"""Where a modelled figure's joints stand, seen from the standard's default posture.
+
+Models are made with their arms held off the sides or straight out. Bones tell how each joint is turned
+there against the default posture: arms at the sides, palms to the thighs, feet forward.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.skeleton import Skeleton
+from fba.parameters import joints
+
+Float64 = npt.NDArray[np.float64]
+
+FINGERS = ("index", "middle", "ring", "pinky")
+
+
+def bind_matrices(places: Float64) -> Float64:
+    """float64 (J, 4, 4) for places (J, 3) of the default skeleton's joints in a figure, metres.
+
+    The figure stands upright, feet flat, looking along +z. Limbs turn as their bones do; trunk and head
+    stand in the figure as in the default posture.
+    """
+    default = Skeleton.default()
+    bind = np.tile(np.eye(4), (len(default), 1, 1))
+    bind[:, :3, 3] = places
+    at = {name: places[number] for number, name in enumerate(default.names)}
+    rest = {name: default.centres[number] for number, name in enumerate(default.names)}
+
+    def bone(joint: str, tip: str) -> tuple[Float64, Float64]:
+        return rest[tip] - rest[joint], at[tip] - at[joint]
+
+    def turn(joint: str, bones: tuple[Float64, Float64], sides: tuple[Float64, Float64]) -> None:
+        before, after = (frame(direction, side) for direction, side in zip(bones, sides, strict=True))
+        bind[default.number(joint), :3, :3] = after @ before.T
+
+    def follow(joint: str, other: str) -> None:
+        bind[default.number(joint), :3, :3] = bind[default.number(other), :3, :3]
+
+    for s in "lr":
+        upper, lower = bone(f"{s}_shoulder", f"{s}_elbow"), bone(f"{s}_elbow", f"{s}_wrist")
+        hinge = (np.array([-1.0, 0, 0]), np.cross(upper[1], lower[1]))  # the elbow bends forwards
+        turn(f"{s}_shoulder", upper, hinge)
+        turn(f"{s}_elbow", lower, hinge)
+        across = bone(f"{s}_pinky1", f"{s}_index1")
+        turn(f"{s}_wrist", bone(f"{s}_wrist", f"{s}_middle1"), across)
+        for finger in FINGERS:
+            for k in (0, 1, 2):
+                turn(f"{s}_{finger}{k}", bone(f"{s}_{finger}{k}", f"{s}_{finger}{k + 1}"), across)
+            follow(f"{s}_{finger}3", f"{s}_{finger}2")
+        for k in (1, 2):
+            turn(f"{s}_thumb{k}", bone(f"{s}_thumb{k}", f"{s}_thumb{k + 1}"), across)
+        follow(f"{s}_thumb3", f"{s}_thumb2")
+        foot = at[f"{s}_metatarsal"] - at[f"{s}_ankle"]
+        ahead = (np.array([0.0, 0, 1]), np.array([foot[0], 0.0, foot[2]]))
+        turn(f"{s}_hip", bone(f"{s}_hip", f"{s}_knee"), ahead)
+        turn(f"{s}_knee", bone(f"{s}_knee", f"{s}_ankle"), ahead)
+        down = np.array([0.0, -1, 0])
+        flat = frame(down, ahead[1]) @ frame(down, ahead[0]).T
+        for joint in ("ankle", "subtalar", "midtarsal", "metatarsal"):  # feet stand flat in both
+            bind[default.number(f"{s}_{joint}"), :3, :3] = flat
+    return bind
+
+
+def unposed(bind: Float64) -> Skeleton:
+    """The skeleton in the default posture, whose joints are bound so (J, 4, 4) in the figure."""
+    default = Skeleton.default()
+    centres = bind[:, :3, 3].copy()
+    for number in range(1, len(default)):
+        above = default.parents[number]
+        shift = bind[number, :3, 3] - bind[above, :3, 3]
+        centres[number] = centres[above] + bind[above, :3, :3].T @ shift
+    return Skeleton(default.names, default.parents, centres)
+
+
+def vertebrae(places: Float64, knots: Float64, neck: int) -> None:
+    """Fill in what is NaN in places (J, 3): vertebrae, and what else lies on the midline, along a spine.
+
+    knots: (K, 3), places along the figure's spine from the pelvis up to the base of the skull; knot number
+    `neck` is where the neck begins. Joints stand between these three as they stand in the standard's body.
+    """
+    default = Skeleton.default()
+    table = {joint.name: joint.centre for joint in joints()}
+    known = [table["HumanoidRoot"][1], table["vc7"][1], table["skullbase"][1]]
+    own = [knots[0, 1], knots[neck, 1], knots[-1, 1]]
+    for number, name in enumerate(default.names):
+        if np.isnan(places[number]).any():
+            height = np.interp(table[name][1], known, own)
+            places[number] = [0.0, height, np.interp(height, knots[:, 1], knots[:, 2])]
+
+
+def chain(first: str, last: str) -> list[str]:
+    """Names of the vertebrae from one to another, upwards."""
+    default = Skeleton.default()
+    names = [name for name in default.names if name.startswith("v")]
+    order = sorted(names, key=lambda name: default.centres[default.number(name), 1])
+    return order[order.index(first) : order.index(last) + 1]
+
+
+def shares(height: Float64, joints_at: Float64) -> Float64:
+    """(V, K) how a chain of joints (K,) shares what lies at heights (V,): each moves what is above it."""
+    middles = np.concatenate([(joints_at[:-1] + joints_at[1:]) / 2, [joints_at[-1] + 0.01]])
+    found = np.zeros((len(height), len(joints_at)))
+    place = np.interp(height, middles, np.arange(len(middles)))
+    low = np.floor(place).astype(int)
+    high = np.minimum(low + 1, len(middles) - 1)
+    rows = np.arange(len(height))
+    found[rows, low] += 1 - (place - low)
+    found[rows, high] += place - low
+    for _ in range(2):  # eased over the neighbours
+        padded = np.pad(found, ((0, 0), (1, 1)), mode="edge")
+        found = (padded[:, :-2] + 2 * padded[:, 1:-1] + padded[:, 2:]) / 4
+        found /= found.sum(axis=1, keepdims=True)
+    return found
+
+
+def frame(direction: Float64, side: Float64) -> Float64:
+    """(3, 3) columns: the direction, what is left of the side across it, and both crossed."""
+    first = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    second = side - first * (first @ side)
+    second = second / max(float(np.linalg.norm(second)), 1e-12)
+    return np.stack([first, second, np.cross(first, second)], axis=1)
