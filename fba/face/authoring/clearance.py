@@ -27,6 +27,8 @@ BULGE = np.radians(12.0)
 STRICT = np.radians(4.0)
 OUTSIDE = 0.97
 """What is this far out, in radii of the eyeball, lies before it."""
+DEEPEST = 0.02
+"""How deep an edge is taken to dip, as a share of the eyeball's radius: a longer one is left as it is."""
 BRIDGINGS = 3
 """Moving a vertex off the eyeball may pull another edge into it; so many times this is looked after."""
 
@@ -62,6 +64,11 @@ class Profile:
         angle = np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1))
         result: Float64 = np.interp(angle, self._angles, self._around if around else self._here)
         return result
+
+    @property
+    def reach(self) -> float:
+        """Radius of the eyeball, metres."""
+        return self._eye.radius
 
     def before(self, points: Float64) -> Bool:
         """(N,) which points lie outside the eyeball."""
@@ -122,6 +129,9 @@ def bridged(
         for _ in range(BRIDGINGS):
             middles = points[local].mean(axis=1)
             push = profile.lift(middles, result[k][local].mean(axis=1), edges=False)[:, 2]
+            # an edge may dip between ends that are outside; an end that is not pulls nothing along
+            push[~profile.before(points + result[k])[local].all(axis=1)] = 0.0
+            push = np.minimum(push, DEEPEST * profile.reach)
             worst = np.zeros(len(vertices))
             np.maximum.at(worst, local[free], np.repeat(2 * share * push, 2)[free.ravel()])
             if not worst.any():

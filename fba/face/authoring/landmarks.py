@@ -71,7 +71,8 @@ class Landmarks:
             return np.zeros(0, dtype=np.intp)
         walk: list[int] = [known[0]]
         for start, end in pairwise(known):
-            step = self.surface.path(start, end, rim=rim)
+            on_rim = bool(self.surface.open_edge[[start, end]].all())
+            step = self.surface.path(start, end, rim=rim and on_rim)
             if not len(step):
                 return np.zeros(0, dtype=np.intp)
             walk += step[1:].tolist()
