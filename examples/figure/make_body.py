@@ -37,6 +37,8 @@ DARKEST = 0.55
 """What is left of a colour where no light of the sky falls."""
 UNDER = 0.03
 """Skin stays this far (m) under the edges of clothes."""
+EVENED = 1.46
+"""Height above which weights are, metres."""
 SKULL_WHOLE = 0.9
 """What the skull carries to this share it carries alone: jaw and chin do not lag behind."""
 
@@ -58,7 +60,7 @@ def pieces() -> tuple[dict[str, Piece], rig.Rig]:
     """Skin and garments of the body, and its rig."""
     surface, _ = figure.load()
     bones = rig.rig()
-    weights = _skull(bones)
+    weights = _skull(surface, bones)
     arm = [
         n
         for n, name in enumerate(bones.names)
@@ -134,12 +136,21 @@ def _inside_head(surface: figure.Surface) -> npt.NDArray[np.bool_]:
     return (surface.tile == 1) & high
 
 
-def _skull(bones: rig.Rig) -> Float64:
-    weights = bones.weights.copy()
+def _skull(surface: figure.Surface, bones: rig.Rig) -> Float64:
+    """(V, J) the rig's weights, the head's whole, the step to the neck evened: skin there stretches far."""
     skull = bones.names.index("skullbase")
-    share = np.minimum(weights[:, skull] / SKULL_WHOLE, 1.0)
+    share = np.minimum(bones.weights[:, skull] / SKULL_WHOLE, 1.0)
+    head = surface.vertices_of(surface.tile == 0)
+    free = (head & (share < 1) & (surface.vertices[:, 1] > EVENED)).astype(np.float64)
+    triangles = triangulated(surface.vertices, surface.quads)
+    cloth = Cloth(surface.vertices, surface.vertices, bones.weights, bones.weights, triangles)
+    share = cloth.smoothed(share[:, None], free, 12)[:, 0]
+    weights = bones.weights.copy()
     rest = 1 - weights[:, skull]
-    weights *= ((1 - share) / np.where(rest > 1e-9, rest, 1.0))[:, None]
+    lone = rest < 1e-9  # nothing else carries it: its neighbours in the chain do
+    weights[lone, bones.names.index("vc1")] = rest[lone] = 1.0
+    weights[lone, skull] = 0.0
+    weights *= ((1 - share) / rest)[:, None]
     weights[:, skull] = share
     return weights
 
@@ -149,7 +160,12 @@ def _neck(whole: Cloth, of_head: npt.NDArray[np.bool_], bones: rig.Rig) -> Cloth
     head = whole.kept(of_head)
     head = head.above(clothes.collar(head.vertices) * -1 + UNDER)
     skull = bones.names.index("skullbase")
-    return head.above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
+    neck = head.above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
+    rim = np.unique(neck.border)
+    rim = rim[neck.weights[rim, skull] > 0.9]
+    neck.weights[rim] = 0.0
+    neck.weights[rim, skull] = 1.0
+    return neck
 
 
 def complexion() -> Float64:

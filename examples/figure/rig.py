@@ -94,7 +94,9 @@ def _weights(
     for group, names in (("torso", TORSO), ("neck", NECK)):
         share = given[:, [source.index(name) for name in names]].sum(axis=1)
         numbers = [default.number(name) for name in groups[group]]
-        weights[:, numbers] += share[:, None] * shares(height, places[numbers, 1])
+        weights[:, numbers] += share[:, None] * shares(
+            height, places[numbers, 1], 1 if group == "torso" else 0
+        )
     weights[:, default.number("skullbase")] += given[:, [source.index(name) for name in HEAD]].sum(axis=1)
     for side in "lr":  # the sole's parts: toes bend, the rest follows the ankle
         _split(weights, default, surface, f"{side}_ankle", f"{side}_midtarsal", places)

@@ -21,7 +21,7 @@ SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
 SAME_SIZE = 0.005
 """Sizes that differ by less than this share are taken as the same."""
-NEAR, FAR = 0.012, 0.045
+NEAR, FAR = 0.010, 0.030
 """Metres from the body's neck: up to the first a vertex moves as the neck there, beyond the second with the
 skull alone."""
 NEIGHBOURS = 4
@@ -69,16 +69,16 @@ class HeadOnBody:
 
             anchors = np.concatenate([part.vertices for part in neck])
             dense = _dense(neck, len(body.skeleton))
-            free = np.ones(len(places), dtype=bool) if skull is None else ~np.asarray(skull)
-            joints[free], weights[free] = _nearest(
-                cKDTree(anchors), dense, placed[free], self._skull, len(body.skeleton)
-            )
             edge, outward = _lower_edge(anchors, neck)
             if len(edge) and len(placed):
                 low = np.setdiff1d(np.flatnonzero(anchors[:, 1] < anchors[:, 1].mean()), edge)
                 away = cKDTree(placed).query(anchors[low])[0] if len(low) else np.full(1, np.inf)
                 self.brings_neck = bool(np.median(away) < SEAM)
                 self.hidden = _beyond(cKDTree(anchors), edge, outward, anchors, placed)
+            free = np.ones(len(places), dtype=bool) if skull is None else ~np.asarray(skull)
+            joints[free], weights[free] = _nearest(
+                cKDTree(anchors), dense, placed[free], self._skull, self.hidden[free]
+            )
         self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(places))
         self._below = _descendants(body, self._skull)
         self._bind = body.bind
@@ -172,15 +172,17 @@ def _dense(neck: list[BodyPart], joints: int) -> Float64:
     return dense
 
 
-def _nearest(tree: Any, dense: Float64, places: Float64, skull: int, joints: int) -> tuple[Int32, Float32]:
-    """Weights of the nearest anchors, handed over to the skull with distance."""
+def _nearest(
+    tree: Any, dense: Float64, places: Float64, skull: int, below: npt.NDArray[np.bool_]
+) -> tuple[Int32, Float32]:
+    """Weights of the nearest anchors, handed over to the skull with distance, but for what lies below."""
     away, rows = tree.query(places, k=min(NEIGHBOURS, len(dense)))
     away, rows = away.reshape(len(places), -1), rows.reshape(len(places), -1)
     share = 1 / np.maximum(away, 1e-6) ** 2
     share /= share.sum(axis=1, keepdims=True)
     found = np.einsum("vk,vkj->vj", share, dense[rows])
     t = np.clip((away[:, :1] - NEAR) / (FAR - NEAR), 0.0, 1.0)
-    alone = t * t * (3 - 2 * t)
+    alone = np.where(below[:, None], 0.0, t * t * (3 - 2 * t))
     found *= 1 - alone
     found[:, skull] += alone[:, 0]
     return strongest(found)

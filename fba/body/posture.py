@@ -99,8 +99,12 @@ def chain(first: str, last: str) -> list[str]:
     return order[order.index(first) : order.index(last) + 1]
 
 
-def shares(height: Float64, joints_at: Float64) -> Float64:
-    """(V, K) how a chain of joints (K,) shares what lies at heights (V,): each moves what is above it."""
+def shares(height: Float64, joints_at: Float64, eased: int = 1) -> Float64:
+    """(V, K) how a chain of joints (K,) shares what lies at heights (V,): each moves what is above it.
+
+    eased: how often shares are spread over the neighbours in the chain. Two joints share a place at first,
+    and two more each time; a vertex has room for four in all.
+    """
     middles = np.concatenate([(joints_at[:-1] + joints_at[1:]) / 2, [joints_at[-1] + 0.01]])
     found = np.zeros((len(height), len(joints_at)))
     place = np.interp(height, middles, np.arange(len(middles)))
@@ -109,7 +113,7 @@ def shares(height: Float64, joints_at: Float64) -> Float64:
     rows = np.arange(len(height))
     found[rows, low] += 1 - (place - low)
     found[rows, high] += place - low
-    for _ in range(2):  # eased over the neighbours
+    for _ in range(eased):
         padded = np.pad(found, ((0, 0), (1, 1)), mode="edge")
         found = (padded[:, :-2] + 2 * padded[:, 1:-1] + padded[:, 2:]) / 4
         found /= found.sum(axis=1, keepdims=True)

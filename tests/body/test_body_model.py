@@ -120,7 +120,7 @@ def part(**changes: Any) -> BodyPart:
     ("make", "message"),
     [
         (lambda: part(name=""), "needs a name"),
-        (lambda: part(kind="nose"), "part 'sleeve': its kind 'nose' is none of skin, neck, cloth"),
+        (lambda: part(kind="nose"), "part 'sleeve': its kind 'nose' is none of skin, neck, head"),
         (lambda: part(vertices=np.zeros((3, 2))), "part 'sleeve': vertices must have shape"),
         (lambda: part(triangles=[[0, 1, 99]]), "part 'sleeve': triangle 0 names vertex"),
         (

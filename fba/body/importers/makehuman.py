@@ -187,7 +187,9 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, pl
     ):
         numbers = [default.number(name) for name in row]
         share = np.sum([given[name] for name in names if name in given], axis=0)
-        weights[:, numbers] += share[:, None] * shares(vertices[:, 1], places[numbers, 1])
+        weights[:, numbers] += share[:, None] * shares(
+            vertices[:, 1], places[numbers, 1], 1 if names is TRUNK else 0
+        )
     for side in "lr":  # the shoulder girdle: what is near the arm goes with the blade
         inner, outer, arm = (
             default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular", "shoulder")
