@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 Float64 = npt.NDArray[np.float64]
 
-MOST_VERTICES = 1_000_000
-"""A denser mesh is refused: it shows nothing more, and its tables would fill the memory."""
+MOST_VERTICES = 250_000
+"""A denser mesh is refused: it shows nothing more, and would take minutes and gigabytes."""
 EYE_FAPS = {"left": (23, 25, 27), "right": (24, 26, 28)}
 PUPIL_FAPS = {"left": 29, "right": 30}
 HEAD_AXES = {48: (1.0, 0.0, 0.0), 49: (0.0, 1.0, 0.0), 50: (0.0, 0.0, 1.0)}
@@ -69,7 +69,7 @@ def author(
 
     FAPs for which a point or part is missing are in the model's `lost`, with the reason. Raises
     ModelError where there is no skin, a FAPU is not positive, most points are far from the mesh, or it
-    has more than a million vertices.
+    has more than a quarter of a million vertices.
     """
     parts = tuple(parts)
     places = np.array(points, dtype=np.float64)
