@@ -223,10 +223,11 @@ def test_feature_points_of_an_unmarked_head_are_found() -> None:
         assert fapu[unit] == pytest.approx(wanted[unit], rel=0.12), unit
     away = np.linalg.norm(found - head.points, axis=1) * 1000
     row = row_of()
+    # The ears are an average adult's: nothing shows where they are.
     for name, most in (
         ("3.1", 1.5), ("3.2", 1.5), ("3.3", 2), ("3.4", 2), ("2.2", 2), ("2.3", 2), ("8.3", 5), ("8.4", 5),
         ("2.4", 4), ("2.5", 4), ("9.3", 3), ("9.15", 4), ("2.1", 8), ("2.10", 6), ("8.1", 3), ("8.2", 7),
-        ("4.1", 8), ("4.3", 8), ("5.1", 12), ("9.1", 6), ("10.1", 25),  # ears are those of an average adult: nothing shows where they are
+        ("4.1", 8), ("4.3", 8), ("5.1", 12), ("9.1", 6), ("10.1", 25),
     ):  # fmt: skip
         assert away[row[name]] < most, (name, away[row[name]])
 
