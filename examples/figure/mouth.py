@@ -42,12 +42,11 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
         tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
         meshes += [_placed(tooth, place, turn, front, 1.0), _placed(tooth, place, turn, front, -1.0)]
         along += width + 0.00008
-    found = {"edge": int(np.abs(meshes[0][0][:, 1] - front[1]).argmin())}
     # Of all lowest vertices of the first incisor the one nearest to the midline and the front.
     vertices = meshes[0][0]
     lowest = np.abs(vertices[:, 1] - front[1]) < 0.0004
     score = np.where(lowest, vertices[:, 2] - 2 * np.abs(vertices[:, 0]), -1.0)
-    found["edge"] = int(score.argmax())
+    found = {"edge": int(score.argmax())}
     gum = _gum(front, sign, inset, rows)
     start = sum(len(mesh[0]) for mesh in meshes)
     meshes.append(gum)
