@@ -12,6 +12,8 @@ from PIL import Image
 import fba
 import player
 from fba import Animation, FaceTrack
+from fba.face import FaceModel, feature_point_names
+from fba.face.calibration import fit
 from fba.formats import merge
 from player.recording import write_picture
 
@@ -62,8 +64,39 @@ def faces() -> UInt8:
     return strip(found)
 
 
+def fitted() -> Image.Image:
+    """The built-in head, fitted to a broad person, to a child, and to the points of docs/calibrate.md."""
+    head = FaceModel.default()
+    row = {name: number for number, name in enumerate(feature_point_names())}
+    child = head.points * 0.82
+    down = np.clip(-child[:, 1] / 0.06, 0, 2)
+    child *= 1 - 0.06 * down[:, None] * (1, 2, 0)
+    child[:, 2] -= 0.003 * down
+    for pupil, lids in (("3.5", "3.1 3.3 3.7 3.9 3.11 3.13"), ("3.6", "3.2 3.4 3.8 3.10 3.12 3.14")):
+        rows = [row[name] for name in lids.split()]
+        child[rows] += (child[rows] - child[row[pupil]]) * (0.1, 0.16, 0.1)
+    page = IMAGES.with_name("calibrate.md").read_text(encoding="utf-8")
+    given = np.full((len(row), 3), np.nan)
+    for name, *place in filter(None, map(str.split, page.split("\nEND\n")[0].splitlines())):
+        if name in row and len(place) == 3:
+            given[row[name]] = [float(number) for number in place]
+    people = [
+        head,
+        *(fit(head, points, tables="carry") for points in (head.points * (1.12, 0.96, 1.0), child, given)),
+    ]
+    pictures = []
+    for camera in ("front", "three-quarter"):
+        for person in people:
+            scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)), person)
+            with player.Offscreen(scene, (300, 360), scene.camera(camera, 300 / 360), samples=4) as view:
+                pictures.append(view.frame(0.0).copy())
+    columns = len(people)
+    return Image.fromarray(np.concatenate([strip(pictures[:columns]), strip(pictures[columns:])]))
+
+
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
+    fitted().save(IMAGES / "fitted.jpg", quality=88)
     Image.fromarray(hello()).save(IMAGES / "hello.png", optimize=True)
     write_picture(IMAGES / "faces.jpg", faces())
     write_picture(IMAGES / "expressions.jpg", player.contact_sheet("expressions", tile=(320, 320)))
