@@ -17,6 +17,7 @@ Float64 = npt.NDArray[np.float64]
 MARGIN = 0.03
 """Added on every side, as a share of what is filled."""
 NEAR = 1e-3
+ROW = 64
 PIXELS_A_CORNER = 25
 """So many pixels are looked at in the time that one corner of a band takes, in software OpenGL."""
 STILL = 0.3
@@ -76,6 +77,8 @@ def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle
 
 
 def _face_boxes(face: FaceMesh) -> list[Float64]:
+    if not np.any(face.turn):
+        return [_corners(face.positions) @ face.matrix[:3, :3].T + face.matrix[:3, 3]]
     still = face.shape.sway < STILL
     found = []
     for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
@@ -113,7 +116,12 @@ def _within(one: Rectangle, other: Rectangle) -> bool:
 def _corners(positions: npt.NDArray[np.float32]) -> Float64:
     if not len(positions):
         return np.zeros((0, 3))
-    return _box(positions.min(axis=0), positions.max(axis=0))
+    # Long rows are looked through faster than short ones.
+    whole = len(positions) // ROW * ROW
+    rows = positions[:whole].reshape(-1, 3 * ROW) if whole else positions[:1].repeat(ROW, 0).reshape(1, -1)
+    low = np.concatenate([rows.min(axis=0).reshape(-1, 3), positions[whole:]])
+    high = np.concatenate([rows.max(axis=0).reshape(-1, 3), positions[whole:]])
+    return _box(low.min(axis=0), high.max(axis=0))
 
 
 def _box(low: npt.NDArray[np.floating], high: npt.NDArray[np.floating]) -> Float64:

@@ -73,7 +73,11 @@ class FaceRenderer:
             set_uniform(program, "relief", 1)
         set_uniform(program, "two_sided", 1.0 if shape.two_sided else 0.0)
         (parts["picture"] or self._white).use(0)
+        if shape.closed:
+            self._gl.enable(self._gl.CULL_FACE)
         parts["array"].render()
+        if shape.closed:
+            self._gl.disable(self._gl.CULL_FACE)
 
     def _parts(self, mesh: FaceMesh) -> dict[str, Any]:
         key = id(mesh.shape)

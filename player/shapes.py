@@ -55,7 +55,7 @@ class FaceShape:
     fine: strength of the skin's relief, and how often it repeats over the picture. two_sided: False where
     the inside is to look dark. across: float32 (V, 8), of single hairs: from the vertex opposite to each,
     half the hair's width there (m), direction to the tip, and 1 or -1 on its two sides; hairs are never
-    drawn thinner than a pixel, but fainter.
+    drawn thinner than a pixel, but fainter. closed: nobody sees into it, so its inside is not drawn.
     """
 
     triangles: npt.NDArray[np.int32]
@@ -67,6 +67,7 @@ class FaceShape:
     fine: tuple[float, float] = (0.0, 1.0)
     two_sided: bool = False
     across: Float32 | None = None
+    closed: bool = False
 
     @property
     def see_through(self) -> bool:
