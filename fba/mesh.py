@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -100,8 +102,82 @@ def unit_rows(normals: Float32) -> Float32:
     return normals
 
 
-def joined(arrays: Sequence[Float32]) -> Float32:
+class Mesh(Protocol):
+    """A mesh with a name, as faces and bodies are made of."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def vertices(self) -> Float32: ...
+    @property
+    def triangles(self) -> Int32: ...
+    @property
+    def normals(self) -> Float32 | None: ...
+
+
+Part = TypeVar("Part", bound=Mesh)
+Number = TypeVar("Number", bound=np.generic)
+
+
+class Meshes(Generic[Part]):
+    """A model of several meshes: `parts`; vertices of the whole model are counted through them in order."""
+
+    parts: tuple[Part, ...]
+
+    @cached_property
+    def vertices(self) -> Float32:
+        """float32 (V, 3): the model as it rests, all parts in order, metres; read-only."""
+        return joined([part.vertices for part in self.parts])
+
+    @cached_property
+    def normals(self) -> Float32:
+        """float32 (V, 3): unit normals of the model as it rests; read-only."""
+        return joined([part.normals for part in self.parts if part.normals is not None])
+
+    @cached_property
+    def triangles(self) -> Int32:
+        """int32 (F, 3): indices into `vertices`; read-only."""
+        return joined([part.triangles + np.int32(self.starts[part.name]) for part in self.parts])
+
+    @cached_property
+    def starts(self) -> dict[str, int]:
+        """Index of each part's first vertex in `vertices`."""
+        counts = np.cumsum([0, *(len(part.vertices) for part in self.parts)])
+        return {part.name: int(start) for part, start in zip(self.parts, counts[:-1], strict=True)}
+
+    def part(self, name: str) -> Part:
+        """A part by name; ModelError where there is none."""
+        for part in self.parts:
+            if part.name == name:
+                return part
+        raise ModelError(f"no part {name!r}; there are {', '.join(part.name for part in self.parts)}")
+
+
+def joined(arrays: Sequence[npt.NDArray[Number]]) -> npt.NDArray[Number]:
     """All rows, one array after the other; read-only."""
     rows = np.concatenate(arrays)
     rows.flags.writeable = False
     return rows
+
+
+def result_array(shape: tuple[int, ...], out: Float32 | None, normals: Float32 | None) -> Float32:
+    """The array that vertices go to: `out`, or a new one where None; both given arrays are checked.
+
+    Raises ValueError where one is not a writable, C-contiguous float32 array of the shape, or they overlap.
+    """
+    for name, target in (("out", out), ("normals", normals)):
+        if target is not None:
+            _check_target(target, shape, name)
+    if out is None:
+        return np.empty(shape, dtype=np.float32)
+    if normals is not None and np.may_share_memory(out, normals):
+        raise ValueError("out and normals share memory; give each an array of its own")
+    return out
+
+
+def _check_target(target: Any, shape: tuple[int, ...], name: str) -> None:
+    if not isinstance(target, np.ndarray) or target.dtype != np.float32 or target.shape != shape:
+        found = f"{target.dtype} {target.shape}" if isinstance(target, np.ndarray) else type(target).__name__
+        raise ValueError(f"{name} must be a float32 array of shape {shape}, not {found}")
+    if not (target.flags.c_contiguous and target.flags.writeable):
+        raise ValueError(f"{name} must be C-contiguous and writable")

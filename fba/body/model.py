@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
-from fba.mesh import Material, joined, mesh_arrays
+from fba.mesh import Material, Meshes, joined, mesh_arrays
 
 if TYPE_CHECKING:
     from fba.body.skinning import Skinner
@@ -75,7 +75,7 @@ class BodyPart:
 
 
 @dataclass(frozen=True, eq=False)
-class BodyModel:
+class BodyModel(Meshes[BodyPart]):
     """A body that joint matrices move.
 
     parts: its meshes; vertices of the whole model are counted through them in order. skeleton: its joints
@@ -190,48 +190,14 @@ class BodyModel:
         )
 
     @cached_property
-    def vertices(self) -> Float32:
-        """float32 (V, 3): the body as modelled, all parts in order, metres; read-only."""
-        return joined([part.vertices for part in self.parts])
-
-    @cached_property
-    def normals(self) -> Float32:
-        """float32 (V, 3): unit normals of the body as modelled; read-only."""
-        return joined([part.normals for part in self.parts if part.normals is not None])
-
-    @cached_property
     def joints(self) -> Int32:
         """int32 (V, 4): the joints that carry each vertex; read-only."""
-        joints: Int32 = np.concatenate([part.joints for part in self.parts])
-        joints.flags.writeable = False
-        return joints
+        return joined([part.joints for part in self.parts])
 
     @cached_property
     def weights(self) -> Float32:
         """float32 (V, 4): how far they carry it; read-only."""
         return joined([part.weights for part in self.parts])
-
-    @cached_property
-    def triangles(self) -> Int32:
-        """int32 (F, 3): indices into `vertices`; read-only."""
-        triangles: Int32 = np.concatenate(
-            [part.triangles + np.int32(self.starts[part.name]) for part in self.parts]
-        )
-        triangles.flags.writeable = False
-        return triangles
-
-    @cached_property
-    def starts(self) -> dict[str, int]:
-        """Index of each part's first vertex in `vertices`."""
-        counts = np.cumsum([0, *(len(part.vertices) for part in self.parts)])
-        return {part.name: int(start) for part, start in zip(self.parts, counts[:-1], strict=True)}
-
-    def part(self, name: str) -> BodyPart:
-        """A part by name; ModelError where there is none."""
-        for part in self.parts:
-            if part.name == name:
-                return part
-        raise ModelError(f"no part {name!r}; there are {', '.join(part.name for part in self.parts)}")
 
 
 def checked_weights(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +10,7 @@ import numpy.typing as npt
 from fba.body.rings import rings
 from fba.body.skeleton import Skeleton
 from fba.body.twisting import twists
+from fba.mesh import result_array
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -106,14 +106,7 @@ class Skinner:
             raise ValueError(f"no skinning method {method!r}; there are {', '.join(METHODS)}")
         frames, single = self._frames(matrices)
         shape = (*(() if single else (len(frames),)), len(vertices), 3)
-        if out is None:
-            out = np.empty(shape, dtype=np.float32)
-        else:
-            _check_target(out, shape, "out")
-        if normals is not None:
-            _check_target(normals, shape, "normals")
-            if np.may_share_memory(out, normals):
-                raise ValueError("out and normals share memory; give each an array of its own")
+        out = result_array(shape, out, normals)
         placed = out[None] if single else out
         turned = placed[:0] if normals is None else normals[None] if single else normals
         mesh = (
@@ -162,11 +155,3 @@ class Skinner:
             frame, joint = (int(place) for place in np.argwhere(~np.isfinite(frames))[0, :2])
             raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")
         return frames, array.ndim == 3
-
-
-def _check_target(target: Any, shape: tuple[int, ...], name: str) -> None:
-    if not isinstance(target, np.ndarray) or target.dtype != np.float32 or target.shape != shape:
-        found = f"{target.dtype} {target.shape}" if isinstance(target, np.ndarray) else type(target).__name__
-        raise ValueError(f"{name} must be a float32 array of shape {shape}, not {found}")
-    if not (target.flags.c_contiguous and target.flags.writeable):
-        raise ValueError(f"{name} must be C-contiguous and writable")

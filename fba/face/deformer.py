@@ -6,7 +6,6 @@ ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +15,7 @@ from fba.face.deformer_surface import surface
 from fba.face.deformer_tables import VALUE_MAX, all_vertices, bound_points, flat_shifts, flat_transforms
 from fba.face.feature_points import names
 from fba.face.model import FaceModel
+from fba.mesh import result_array
 from fba.parameters import FAP_COUNT, faps
 
 Float32 = npt.NDArray[np.float32]
@@ -150,14 +150,7 @@ class Deformer:
         values, single = _frames(faps)
         count = len(self.model.vertices)
         shape = (count, 3) if single else (len(values), count, 3)
-        if out is None:
-            out = np.empty(shape, dtype=np.float32)
-        else:
-            _check_target(out, shape, "out")
-        if normals is not None:
-            _check_target(normals, shape, "normals")
-            if np.may_share_memory(out, normals):
-                raise ValueError("out and normals share memory; give each an array of its own")
+        out = result_array(shape, out, normals)
         placed = out[None] if single else out
         upright = placed[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
@@ -198,14 +191,6 @@ def _frames(values: npt.ArrayLike) -> tuple[Float64, bool]:
             frame=frame if array.ndim == 2 else None,
         )
     return frames, array.ndim == 1
-
-
-def _check_target(target: Any, shape: tuple[int, ...], name: str) -> None:
-    if not isinstance(target, np.ndarray) or target.dtype != np.float32 or target.shape != shape:
-        found = f"{target.dtype} {target.shape}" if isinstance(target, np.ndarray) else type(target).__name__
-        raise ValueError(f"{name} must be a float32 array of shape {shape}, not {found}")
-    if not (target.flags.c_contiguous and target.flags.writeable):
-        raise ValueError(f"{name} must be C-contiguous and writable")
 
 
 POINT_KINDS = {"3.5": "eye", "3.6": "eye", "6": "tongue", "9.8": "teeth", "9.9": "teeth", "9.10": "teeth",

@@ -16,7 +16,7 @@ from fba.face.expressions import Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, row_of
 from fba.face.tables import HEAD, FaceDefTables
-from fba.mesh import Material, joined, mesh_arrays
+from fba.mesh import Material, Meshes, mesh_arrays
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class FaceModel:
+class FaceModel(Meshes[Part]):
     """A face that FAPs can move.
 
     parts: its meshes; vertices of the whole model are counted through them in order. points: float64
@@ -134,30 +134,6 @@ class FaceModel:
 
         save(self, path)
 
-    @cached_property
-    def vertices(self) -> Float32:
-        """float32 (V, 3): the neutral face, all parts in order, metres; read-only."""
-        return joined([part.vertices for part in self.parts])
-
-    @cached_property
-    def normals(self) -> Float32:
-        """float32 (V, 3): unit normals of the neutral face; read-only."""
-        return joined([part.normals for part in self.parts if part.normals is not None])
-
-    @cached_property
-    def triangles(self) -> Int32:
-        """int32 (F, 3): indices into `vertices`; read-only."""
-        starts = self.starts
-        joined = np.concatenate([part.triangles + starts[part.name] for part in self.parts])
-        joined.flags.writeable = False
-        return joined.astype(np.int32)
-
-    @cached_property
-    def starts(self) -> dict[str, int]:
-        """Index of each part's first vertex in `vertices`."""
-        counts = np.cumsum([0, *(len(part.vertices) for part in self.parts)])
-        return {part.name: int(start) for part, start in zip(self.parts, counts[:-1], strict=True)}
-
     @property
     def feature_points(self) -> Float64:
         """float64 (84, 3): the neutral feature points, metres; NaN where the face has none."""
@@ -177,13 +153,6 @@ class FaceModel:
     def missing(self) -> tuple[str, ...]:
         """Feature points that the face does not have."""
         return tuple(n for n, p in zip(names(), self.points, strict=True) if np.isnan(p).any())
-
-    def part(self, name: str) -> Part:
-        """The part of that name; ModelError where there is none."""
-        for part in self.parts:
-            if part.name == name:
-                return part
-        raise ModelError(f"no part {name!r}; there are {', '.join(part.name for part in self.parts)}")
 
     def of_kind(self, kind: str) -> tuple[Part, ...]:
         """All parts of a kind."""
