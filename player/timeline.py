@@ -23,6 +23,8 @@ Float64 = npt.NDArray[np.float64]
 
 BLOCK = 2048
 KEPT_BLOCKS = 4
+FRAME_ROUNDING = 1e-6
+"""A time this close (in frame periods) to a frame's own is that frame's."""
 
 
 class Timeline:
@@ -30,11 +32,16 @@ class Timeline:
 
     start: time of the first frame, seconds, exact. duration: from there to one frame period after the
     last, exact. A time before or after shows the first or last frame; between two frames, values are
-    interpolated, over skipped frames too.
+    interpolated, over skipped frames too, unless `interpolate` is False: then the frame last passed is shown.
+    growing: whether frames still arrive (`player.live`); arrived: changes whenever some did.
     """
+
+    growing = False
+    arrived = 0
 
     def __init__(self, animation: Animation, model: object = None) -> None:
         self.animation = animation
+        self.interpolate = True
         self.rate: Fraction = animation.rate
         self.frames = len(animation)
         self.start = Fraction(int(animation.index[0])) / self.rate if self.frames else Fraction(0)
@@ -61,7 +68,7 @@ class Timeline:
         index = self.animation.index
         at = time * self.rate.numerator / self.rate.denominator
         nearest = round(at)
-        if abs(at - nearest) < 1e-6:
+        if abs(at - nearest) < FRAME_ROUNDING:
             at = float(nearest)  # a frame's own time shows that frame, whatever the rounding
         before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), self.frames - 1)
         after = min(before + 1, self.frames - 1)
@@ -79,7 +86,7 @@ class Timeline:
             return np.zeros(68, dtype=np.float32)
         before, after, share = self.position(time)
         first = self._face(before)
-        if share == 0.0:
+        if share == 0.0 or not self.interpolate:
             return first
         shown: npt.NDArray[np.float32] = first + (self._face(after) - first) * np.float32(share)
         return shown
@@ -90,7 +97,7 @@ class Timeline:
             return np.zeros(BAP_COUNT)
         before, after, share = self.position(time)
         first = self._body(before).astype(np.float64)
-        if share == 0.0:
+        if share == 0.0 or not self.interpolate:
             return first
         shown: Float64 = first + (self._body(after) - first) * share
         return shown

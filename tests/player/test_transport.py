@@ -10,7 +10,8 @@ from player_tracks import face_track
 
 from fba.animation import Animation
 from player.timeline import Timeline
-from player.transport import Transport, clock_text
+from player.times import clock_text, timecode
+from player.transport import Transport
 
 
 class Clock:
@@ -152,6 +153,151 @@ def test_one_frame_alone() -> None:
     clock.now += 3.33
     assert player.frame == 0
     assert player.share == 0.0
+
+
+def test_stop_stays_where_it_is() -> None:
+    player, clock = transport()
+    player.play()
+    clock.now += 0.3
+    player.stop()
+    clock.now += 9
+    assert (player.time, player.playing) == (pytest.approx(0.3), False)
+
+
+def test_a_loop_between_marks() -> None:
+    player, clock = transport()
+    player.mark_in, player.mark_out = 0.5, 1.1
+    player.play()
+    clock.now += 1.0  # it begins before the mark
+    assert player.time == pytest.approx(1.0)
+    clock.now += 0.2
+    assert player.time == pytest.approx(0.6)
+    clock.now += 0.6 * 1000
+    assert player.time == pytest.approx(0.6)
+    player.clear_marks()
+    clock.now += 1.2
+    assert player.time == pytest.approx(1.8)
+    assert (player.mark_in, player.mark_out) == (None, None)
+
+
+def test_without_loop_it_stops_at_the_mark_and_begins_again_at_the_other() -> None:
+    player, clock = transport(loop=False)
+    player.mark_in, player.mark_out = 0.5, 1.1
+    player.seek(0.7)
+    player.play()
+    clock.now += 5
+    assert (player.time, player.playing) == (pytest.approx(1.1), False)
+    player.play()
+    assert player.time == pytest.approx(0.5)
+
+
+def test_beyond_the_mark_it_plays_to_the_end_and_then_from_mark_to_mark() -> None:
+    player, clock = transport()  # two seconds
+    player.mark_in, player.mark_out = 0.5, 1.0
+    player.seek(1.5)
+    player.play()
+    clock.now += 0.4
+    assert player.time == pytest.approx(1.9)
+    clock.now += 0.3  # 0.2 beyond the end
+    assert player.time == pytest.approx(0.7)
+    clock.now += 0.4
+    assert player.time == pytest.approx(0.6)
+
+
+def test_a_mark_set_in_passing_turns_back_at_once() -> None:
+    player, clock = transport()
+    player.mark_in = 0.25
+    player.play()
+    clock.now += 0.8
+    player.mark_out = player.time
+    clock.now += 0.02
+    assert player.time == pytest.approx(0.27)
+
+
+def test_marks_stay_in_order_and_inside() -> None:
+    player, _ = transport()
+    player.mark_in = 1.0
+    player.mark_out = 0.4
+    assert (player.mark_in, player.mark_out) == (None, 0.4)
+    player.mark_in = 0.4
+    assert (player.mark_in, player.mark_out) == (0.4, None)
+    player.mark_in, player.mark_out = -5.0, 99.0
+    assert (player.mark_in, player.mark_out) == (0.0, 2.0)
+    player.mark_out = None
+    assert player.mark_out is None
+    with pytest.raises(ValueError, match="mark"):
+        player.mark_in = float("nan")
+
+
+def test_a_slow_machine_drops_frames_and_keeps_the_time() -> None:
+    player, clock = transport(list(range(1000)), rate=100)
+    player.play()
+    shown = []
+    for cost in [0.3, 0.001, 1.2, 0.017, 0.05] * 4:  # what drawing takes, seconds
+        shown.append(player.frame)
+        clock.now += cost
+    elapsed = np.cumsum([0, *([30, 0.1, 120, 1.7, 5] * 4)])[:20]  # the same in frames of 10 ms
+    assert shown == [int(frame + 1e-6) for frame in elapsed]
+    assert player.time == pytest.approx(4 * 1.568)
+
+
+def test_another_clock_goes_on_from_the_same_place() -> None:
+    player, clock = transport()
+    player.play()
+    clock.now += 0.5
+    other = Clock()
+    other.now = -3.0
+    player.use_clock(other)
+    clock.now += 1.0
+    assert player.time == pytest.approx(0.5)
+    other.now += 0.25
+    assert player.time == pytest.approx(0.75)
+
+
+def test_the_motion_tells_the_time_to_come() -> None:
+    player, clock = transport()
+    player.mark_out = 1.5
+    player.set_speed(2.0)
+    player.play()
+    motion = player.motion
+    assert [motion.time(clock.now + ahead) for ahead in (0.0, 0.5, 0.8)] == pytest.approx([0.0, 1.0, 0.1])
+    assert (motion.over(clock.now + 0.7), motion.over(clock.now + 0.8)) == (False, True)
+
+
+def test_without_interpolation_the_frame_last_passed_is_held() -> None:
+    animation = Animation(Fraction(10), np.array([0, 4, 5]), face=face_track([{3: 0}, {3: 100}, {3: 200}]))
+    timeline = Timeline(animation)
+    player = Transport(timeline)
+    assert player.interpolate
+    assert timeline.faps(0.2)[2] == pytest.approx(50)
+    player.interpolate = False
+    assert [timeline.faps(time)[2] for time in (0.0, 0.2, 0.39, 0.4, 0.49, 0.5)] == [0, 0, 0, 100, 100, 200]
+    player.seek(0.45)
+    player.step(-1)  # to the frame whose time has been passed, as with interpolation
+    assert player.time == pytest.approx(0.4)
+
+
+def test_timecode_is_the_streams_own() -> None:
+    player, _ = transport([25 * 3661 + 24, 25 * 3662], rate=25)  # 1 h, 1 min, 1 s and 24 frames
+    assert player.timecode() == "1:01:01:24"
+    player.last()
+    assert player.timecode() == "1:01:02:00"
+    assert player.timecode(0.999) == "0:00:00:24"
+
+
+@pytest.mark.parametrize(
+    ("index", "rate", "text"),
+    [
+        (29, Fraction(30000, 1001), "0:00:00:29"),  # at 0.96763 s
+        (30, Fraction(30000, 1001), "0:00:01:00"),  # at 1.001 s
+        (60, Fraction(30000, 1001), "0:00:02:00"),  # at 2.002 s
+        (29 + 1799 * 30, Fraction(30), "0:29:59:29"),
+        (3, Fraction(1, 2), "0:00:06:00"),
+        (36000 * 60, Fraction(60), "10:00:00:00"),
+    ],
+)
+def test_timecodes_of_frames(index: int, rate: Fraction, text: str) -> None:
+    assert timecode(float(index / rate), rate) == text
 
 
 def test_text() -> None:
