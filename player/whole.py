@@ -1,0 +1,59 @@
+"""Files for encoders that want a name to write to: they appear whole, or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+
+from fba.errors import FbaError, FormatError
+
+PathLike = str | os.PathLike[str]
+
+
+@contextlib.contextmanager
+def written(path: PathLike) -> Iterator[Path]:
+    """The name of a temporary file beside the target: renamed to it if all goes well, removed if not.
+
+    What `fba.atomic` does for those that write to an open file. Raises FormatError where the target cannot
+    be written.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise FormatError("is a folder; give the name of a file to write", path=path)
+    if target.exists() and not target.is_file():
+        raise FormatError("is a device or a pipe; give the name of a file to write", path=path)
+    if target.exists() and not os.access(target, os.W_OK):
+        raise FormatError(
+            "is write-protected; make it writable (chmod u+w) or choose another name", path=path
+        )
+    temporary = target.parent / f".fba-{secrets.token_hex(6)}{target.suffix}"
+    try:
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    except (OSError, ValueError) as error:
+        raise cannot(path, error, "cannot be written") from error
+    try:
+        yield temporary
+        try:
+            if target.exists():
+                temporary.chmod(target.stat().st_mode & 0o7777)
+            temporary.replace(target)
+        except OSError as error:
+            raise cannot(path, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def cannot(path: PathLike, error: BaseException, what: str = "could not be written") -> FbaError:
+    """The error to raise where writing failed: in words, with what to do where the disk is full."""
+    import errno
+
+    if isinstance(error, FbaError):
+        return error
+    reason = (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
+    if getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT):
+        reason += "; make room, or write to another disk"
+    return FormatError(f"{what}: {reason}", path=path)
