@@ -16,8 +16,8 @@ from fba.face.model import FaceModel, point_row
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
 from fba.tracks import FaceTrack
 from player.camera import Camera, Subject
+from player.lettering import label_font, shortened
 from player.offscreen import Offscreen
-from player.overlay import label_font
 from player.scene import Scene
 
 UInt8 = npt.NDArray[np.uint8]
@@ -156,13 +156,6 @@ def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> UInt8:
             subject = close_up(one.view, scene)
             view.camera = Camera(yaw=one.yaw, pitch=one.pitch).fit(subject, width / height)
             sheet.paste(Image.fromarray(view.still(one.faps)[..., :3]), (x, y))
-            draw.text((x + 2, y + height + 2), _fitted(draw, one.label, font, width), font=font, fill=TEXT)
+            draw.text((x + 2, y + height + 2), shortened(draw, one.label, font, width), font=font, fill=TEXT)
             draw.text((x + 2, y + height + 2 + line), one.note, font=small, fill=FAINT)
     return np.asarray(sheet)
-
-
-def _fitted(draw: object, text: str, font: object, width: int) -> str:
-    """The text, shortened where it is too long."""
-    while len(text) > 1 and draw.textlength(text, font=font) > width:  # type: ignore[attr-defined]
-        text = text[:-1]
-    return text

@@ -48,7 +48,7 @@ class Gif:
         self._numbers: list[int] = []
         self._keep = contextlib.ExitStack()
         self._temporary = self._keep.enter_context(written(path))
-        self._pictures = self._keep.enter_context(tempfile.SpooledTemporaryFile(IN_MEMORY))
+        self._pictures = self._keep.enter_context(tempfile.SpooledTemporaryFile(IN_MEMORY))  # noqa: SIM115
         self._colours, self._into, self._palette = self._graph("palettegen=stats_mode=full", 1)
 
     def write(self, pixels: UInt8, number: int) -> None:

@@ -1,114 +1,99 @@
-"""Pictures and films as files: PNG through Pillow, MP4 (H.264) through PyAV."""
+"""Animations drawn into files, without a window: pictures, films, numbered pictures."""
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
-import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from fba.animation import Animation
-from fba.errors import DisplayError, FbaError, RangeError, UnsupportedError
+from fba.errors import FbaError, RangeError, UnsupportedError
 from player.camera import Camera
 from player.offscreen import Offscreen
+from player.pictures import PICTURES, check_picture, write_picture
+from player.recorder import FILMS, Recorder, exact_rate
 from player.scene import Scene
+from player.sequence import Numbered, Sequence, is_sequence
+from player.whole import PathLike
 
 Progress = Callable[[int, int], None]
-PathLike = str | os.PathLike[str]
 
-PICTURES = (".png", ".jpg", ".jpeg")
-SUFFIXES = (".mp4", *PICTURES)
+__all__ = ["film_rate", "record", "render", "write_picture"]
+
 SMOOTH_RATES = (Fraction(10), Fraction(120))
 """A film's own rate lies between these where none is asked for."""
 MOST_FRAMES = 1_000_000
 """A longer film is refused: its times are damaged, or a part of it was meant."""
 PICTURE_SAMPLES = 4
 """Samples a pixel of a single picture, which may take its time."""
-JPEG_QUALITY = 90
-QUALITY = "18"
-"""H.264 constant rate factor."""
+SIZE, GIF_SIZE = (1280, 720), (480, 270)
+"""Where none is given; a GIF of full size would be huge."""
 
 
 def render(
     animation: Animation | Scene,
     path: PathLike,
     *,
-    size: tuple[int, int] = (1280, 720),
+    size: tuple[int, int] | None = None,
     fps: Fraction | int | str | None = None,
     camera: Camera | str | None = None,
     frame: int | None = None,
     time: float | None = None,
     start: float | None = None,
     end: float | None = None,
+    audio: PathLike | None = None,
+    transparent: bool = False,
+    replace: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Draw an animation into a file without a window; the suffix decides: .png or .jpg one picture, .mp4 a
-    film.
+    """Draw an animation into a file without a window; the name decides what becomes of it.
 
-    size: width and height in pixels. camera: a `Camera`, "front", "three-quarter", "profile", "body", or
-    None for the one that suits the content. For a picture: frame, its position in the animation
-    (negative from the end), or time in seconds; by default the first frame. For a film: fps (by default
-    the animation's own rate), and start and end in seconds. progress: called with (done, total) frames.
+    .png or .jpg: one picture. .mp4 or .gif: a film. frames/%05d.png, or a folder with a slash at its end:
+    numbered pictures, from 0.
 
-    Returns the path. The file appears whole or not at all. Raises UnsupportedError for another suffix,
-    DisplayError without OpenGL or video encoder, RangeError for a frame or a stretch that is not in the
-    animation, ValueError for a size or preset that does not exist, OSError where it cannot be written.
+    size: width and height in pixels; by default 1280x720, of a GIF 480x270. camera: a `Camera`, "front",
+    "three-quarter", "profile", "body", or None for the one that suits the content. For a picture: frame,
+    its position in the animation (negative from the end), or time in seconds; by default the first frame.
+    For a film: fps (by default the animation's own rate), and start and end in seconds; audio: a file whose
+    sound goes with an MP4; its beginning belongs to time 0 of the animation. transparent: PNG without a
+    background, opaque only where something is. replace: numbered pictures that exist may be overwritten.
+    progress: called with (done, total) frames.
+
+    Returns the path, of numbered pictures their folder. A file appears whole or not at all. Raises
+    UnsupportedError for another suffix, DisplayError without OpenGL or video encoder, RangeError for a frame
+    or a stretch that is not in the animation, ValueError for a size or preset that does not exist,
+    FormatError where a file cannot be written or read.
     """
+    _check_name(path)
     target = Path(path)
-    suffix = target.suffix.lower()
-    _check_suffix(target, SUFFIXES)
     scene = animation if isinstance(animation, Scene) else Scene(animation)
-    if suffix == ".mp4":
+    if is_film(path):
         if frame is not None or time is not None:
             raise ValueError(
                 "frame and time choose a single picture; write it to a .png, or give start and end"
             )
         return record(
-            scene, target, fps=fps, size=size, camera=camera, start=start, end=end, progress=progress
-        )
+            scene, path, fps=fps, size=size, camera=camera, start=start, end=end, audio=audio,
+            transparent=transparent, replace=replace, progress=progress,
+        )  # fmt: skip
+    check_picture(target, transparent=transparent)
     if fps is not None or end is not None or (start is not None and time is not None):
         raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
+    if audio is not None:
+        raise ValueError("a picture has no sound; leave the audio out, or write an .mp4")
     at = _moment(scene, frame, time if time is not None else start)
-    with Offscreen(scene, size, camera, samples=PICTURE_SAMPLES) as offscreen:
-        write_picture(target, offscreen.frame(at))
+    with (
+        _background(scene, clear=transparent),
+        Offscreen(scene, size or SIZE, camera, samples=PICTURE_SAMPLES) as offscreen,
+    ):
+        write_picture(target, offscreen.frame(at), transparent=transparent)
     if progress is not None:
         progress(1, 1)
     return target
-
-
-def write_picture(path: PathLike, pixels: npt.NDArray[np.uint8]) -> Path:
-    """Write pixels, uint8 (H, W, 3 or 4), as .png or .jpg, whole or not at all; returns the path.
-
-    Raises UnsupportedError for another suffix, OSError where it cannot be written.
-    """
-    from PIL import Image
-
-    target = Path(path)
-    _check_suffix(target, PICTURES)
-    with written(target) as temporary:
-        picture = Image.fromarray(pixels).convert("RGB")
-        if target.suffix.lower() == ".png":
-            picture.save(temporary, format="PNG")
-        else:
-            picture.save(temporary, format="JPEG", quality=JPEG_QUALITY)
-    return target
-
-
-def _check_suffix(target: Path, suffixes: tuple[str, ...]) -> None:
-    suffix = target.suffix.lower()
-    if suffix not in suffixes:
-        films = " and films as .mp4" if ".mp4" in suffixes else ""
-        raise UnsupportedError(
-            f"{target}: pictures are written as .png or .jpg{films}, not as {suffix or 'a bare name'}",
-            what=f"rendering to {suffix or 'no suffix'}",
-        )
 
 
 def record(
@@ -116,52 +101,62 @@ def record(
     path: PathLike,
     *,
     fps: Fraction | int | str | None = None,
-    size: tuple[int, int] = (1280, 720),
+    size: tuple[int, int] | None = None,
     camera: Camera | str | None = None,
     start: float | None = None,
     end: float | None = None,
+    audio: PathLike | None = None,
+    transparent: bool = False,
+    replace: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Write a film: MP4, H.264, yuv420p, at an exact frame rate. See `render`.
+    """Write a film, or numbered pictures, at an exact frame rate. See `render`.
 
-    H.264 needs even sizes: odd ones lose their last column or row.
+    MP4: H.264, yuv420p, and AAC; it needs even sizes: odd ones lose their last column or row.
     """
-    try:
-        import av
-    except ImportError as error:
-        raise DisplayError(
-            f"films need the Python package av (PyAV), which cannot be imported: {error}. "
-            "Install it with: pip install av"
-        ) from error
     shown = scene if isinstance(scene, Scene) else Scene(scene)
-    rate = film_rate(shown.rate) if fps is None else Fraction(fps)
-    if not 0 < rate <= 1000:
-        raise ValueError(f"a film's frame rate must lie above 0 and at most at 1000, not {rate}")
-    rate = rate.limit_denominator(1001) if rate.denominator > 100_000 else rate
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    gif, numbered = suffix == ".gif", is_sequence(path)
+    if transparent and not numbered:
+        raise UnsupportedError(
+            f"{path}: a film cannot be transparent; write numbered pictures, frames/%05d.png",
+            what=f"transparency in {suffix}",
+        )
+    if numbered and audio is not None:
+        raise ValueError("pictures have no sound; leave the audio out, or write an .mp4")
+    if fps is None:
+        rate = film_rate(shown.rate)
+        if gif:
+            from player.gif import gif_rate
+
+            rate = gif_rate(rate)
+    else:
+        rate = Fraction(fps)
+    rate = exact_rate(rate)
     first, count = _stretch(shown, rate, start, end)
-    width, height = size[0] // 2 * 2, size[1] // 2 * 2
-    if width < 2 or height < 2:
-        raise ValueError(f"a film must have at least 2x2 pixels, not {size[0]}x{size[1]}")
-    target = Path(path)
-    with Offscreen(shown, (width, height), camera) as offscreen, written(target) as temporary:
-        try:
-            container = av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"})
-            with container:
-                stream = _video_stream(container, rate, width, height)
-                for number in range(count):
-                    pixels = offscreen.draw(float(first + number / rate))
-                    picture = av.VideoFrame.from_ndarray(pixels[..., :3], format="rgb24")
-                    picture.pts = number
-                    picture.time_base = 1 / rate
-                    container.mux(stream.encode(picture))
-                    if progress is not None:
-                        progress(number + 1, count)
-                container.mux(stream.encode(None))
-        except av.error.FFmpegError as error:
-            raise DisplayError(
-                f"{target}: the video encoder failed at {width}x{height}, {rate} frames/s: {error}"
-            ) from error
-    return target
+    width, height = size or (GIF_SIZE if gif else SIZE)
+    if suffix == ".mp4":
+        if min(width, height) < 2:
+            raise ValueError(f"a film must have at least 2x2 pixels, not {width}x{height}")
+        width, height = width // 2 * 2, height // 2 * 2
+    with ExitStack() as stack:
+        # Whether the encoder is there, and where it writes, shows sooner than the first picture.
+        if numbered:
+            sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
+            recorder = Recorder.into(sink, path, (width, height), rate)
+        else:
+            recorder = Recorder(path, (width, height), rate=rate, audio=audio, audio_start=first)
+        stack.enter_context(recorder)
+        stack.enter_context(_background(shown, clear=transparent))
+        samples = PICTURE_SAMPLES if transparent else 0
+        offscreen = stack.enter_context(Offscreen(shown, (width, height), camera, samples=samples))
+        for number in range(count):
+            recorder.add(offscreen.draw(float(first + number / rate)))
+            if progress is not None:
+                progress(number + 1, count)
+        result = recorder.close()
+    assert result is not None
+    return result
 
 
 def film_rate(rate: Fraction) -> Fraction:
@@ -172,43 +167,32 @@ def film_rate(rate: Fraction) -> Fraction:
     return rate / math.ceil(rate / high)
 
 
-@contextlib.contextmanager
-def written(target: Path) -> Iterator[Path]:
-    """A temporary path beside the target, renamed to it if all goes well, and removed if not."""
-    if target.is_dir():
-        raise IsADirectoryError(f"{target} is a directory; give the name of a file")
-    try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.name[:40]}.", suffix=target.suffix, dir=target.parent
+def is_film(path: PathLike) -> bool:
+    """Whether a name means many pictures: a film, or numbered ones."""
+    return os.path.splitext(os.fspath(path))[1].lower() in FILMS or is_sequence(path)
+
+
+def _check_name(path: PathLike) -> None:
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    if suffix not in (*FILMS, *PICTURES) and not is_sequence(path):
+        raise UnsupportedError(
+            f"{path}: pictures are written as .png or .jpg, films as .mp4 or .gif, numbered pictures as "
+            f"folder/%05d.png, but not {suffix or 'a bare name'}",
+            what=f"rendering to {suffix or 'no suffix'}",
         )
-    except FileNotFoundError as error:
-        raise FileNotFoundError(f"{target}: there is no directory {target.parent}") from error
-    os.close(handle)
-    temporary = Path(name)
+
+
+@contextmanager
+def _background(scene: Any, *, clear: bool) -> Iterator[None]:
+    """The scene's own, or none."""
+    before = scene.switches["background"] if clear else None
+    if clear:
+        scene.show("background", "transparent")
     try:
-        yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(target)
+        yield
     finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _video_stream(container: Any, rate: Fraction, width: int, height: int) -> Any:
-    import av
-
-    codecs = av.codec.codecs_available
-    name = next((n for n in ("libx264", "libopenh264", "h264") if n in codecs), None)
-    if name is None:
-        raise DisplayError(
-            "this build of PyAV has no H.264 encoder; install av from its own wheels (pip install av)"
-        )
-    options = {"crf": QUALITY, "preset": "veryfast"} if name == "libx264" else {}
-    stream = container.add_stream(name, rate=rate, options=options)
-    stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-    stream.codec_context.time_base = 1 / rate
-    return stream
+        if clear:
+            scene.show("background", before)
 
 
 def _moment(scene: Scene, frame: int | None, time: float | None) -> float:

@@ -11,7 +11,7 @@ from PIL import Image
 from player_tracks import face_track
 
 from fba.animation import Animation
-from fba.errors import DisplayError, FbaError, RangeError, UnsupportedError
+from fba.errors import DisplayError, FbaError, FormatError, RangeError, UnsupportedError
 from player import Offscreen, Scene, render
 from player.recording import film_rate
 
@@ -77,9 +77,9 @@ class TestFiles:
 
     def test_targets_that_cannot_be_written(self, talking: Animation, tmp_path: Path) -> None:
         (tmp_path / "folder.png").mkdir()
-        with pytest.raises(IsADirectoryError, match="directory"):
+        with pytest.raises(FormatError, match="folder"):
             render(talking, tmp_path / "folder.png", size=(4, 4))
-        with pytest.raises(FileNotFoundError, match="no directory"):
+        with pytest.raises(FormatError, match="No such file"):
             render(talking, tmp_path / "nowhere" / "a.png", size=(4, 4))
 
 

@@ -1,0 +1,27 @@
+"""Words in pictures: Pillow's own font, the same on every machine."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+SMALLEST = 6
+
+
+def label_font(size: float) -> Any:
+    """The font at a size in pixels."""
+    return _font(max(round(size), SMALLEST))
+
+
+def shortened(draw: Any, text: str, font: Any, width: float) -> str:
+    """The text, cut where it is wider than so many pixels."""
+    while len(text) > 1 and draw.textlength(text, font=font) > width:
+        text = text[:-1]
+    return text
+
+
+@cache
+def _font(pixels: int) -> Any:
+    from PIL import ImageFont
+
+    return ImageFont.load_default(pixels)
