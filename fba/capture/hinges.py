@@ -5,9 +5,10 @@ about its own length until the plane is right, and the hinge's twist takes that 
 hangs below: both bones keep their directions, and the hand or foot keeps its own. Everything is an
 array over frames.
 
-The turn phi is found in closed form: with the twist tau - phi of the hinge, the sideways part of the
-lower bone's direction is c0 + c1 cos phi + c2 sin phi, which is zero for two phi: one bends the hinge the
-natural way, one the other way. `fba.capture.branches` picks one of them for each frame.
+With the twist tau - phi of the hinge, a turn phi leaves c0 + c1 cos phi + c2 sin phi of the lower bone's
+direction sideways, which is zero for two phi: one bends the hinge the natural way, one the other way. Where
+the limb is almost straight, all phi leave little. `fba.capture.branches` finds the path that misses the
+direction by little, bends the natural way, and does not jump.
 """
 
 from __future__ import annotations
@@ -19,23 +20,19 @@ import numpy.typing as npt
 
 from fba.capture import rotations
 from fba.capture.aiming import aim, product
-from fba.capture.branches import choose
+from fba.capture.branches import follow
 
 Float = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
-STRAIGHT = 0.09
-"""Where the twist changes the lower bone's direction by less than this (radians), it follows its
-neighbours in time rather than the direction. Also the weight of the preferred twists against the direction: a
-limb bent sideways by less than this is straightened, by up to 5 degrees, instead of twisted half round."""
-FIRM = 0.03
-"""From this much on, a sudden change of twist would be seen."""
+STIFF = 0.3
+"""Weight of the twists that were found against the lower bone's direction, in the last step: a limb that is
+bent by much less than this (radians) keeps them, and so does not swing round where its plane does."""
+LOOSE = 2e-3
+"""The same for flexion."""
 CLEAR_BEND = 0.3
 """From this angle on, a bend shows which way the hinge opens; less may be a little beyond straight."""
-NEIGHBOURHOOD = 0.2
-"""Seconds over which neighbours in time are asked."""
-PATIENCE = 0.3
-"""Seconds for which a limb may bend the wrong way before a sudden half turn is the lesser evil."""
+ABRUPT = 10.0
+"""Radians a second: a source that turns faster may make the result turn faster, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +58,7 @@ def solve(hinge: Hinge, direction: Float, local: Float, rate: float) -> Float:
     """
     total = turn_about(local, hinge.twist)
     along = 1.0 if hinge.upper @ hinge.twist > 0 else -1.0
-    twists, reach = _roots(hinge, direction, total, along)
-    flexions = np.stack(
-        [_flexion(hinge, direction, twists[:, k], total - along * twists[:, k]) for k in (0, 1)], 1
-    )
-    turn = _path(twists, flexions * hinge.natural, reach, rate)
+    turn = _turn(hinge, direction, total, along, rate)
 
     flexion = _flexion(hinge, direction, turn, total - along * turn)
     remains = rotations.turn(hinge.flexion, -flexion) @ rotations.turn(hinge.upper, -turn) @ local
@@ -74,7 +67,7 @@ def solve(hinge: Hinge, direction: Float, local: Float, rate: float) -> Float:
     twist = twist + np.angle(np.exp(1j * (exact - twist)))
     start = np.stack([turn, flexion, twist], axis=1)
     axes = np.stack([hinge.upper, hinge.flexion, hinge.twist])
-    return aim(axes, start, hinge.lower, direction, np.array([STRAIGHT, STRAIGHT * 0.02, STRAIGHT]))
+    return aim(axes, start, hinge.lower, direction, np.array([STIFF, LOOSE, STIFF]))
 
 
 def matrices(hinge: Hinge, angles: Float) -> tuple[Float, Float]:
@@ -98,18 +91,27 @@ def _centred(angle: Float) -> Float:
     return angle - 2 * np.pi * np.rint(np.median(angle) / (2 * np.pi)) if len(angle) else angle
 
 
-def _roots(hinge: Hinge, direction: Float, total: Float, along: float) -> tuple[Float, Float]:
-    """Both turns (T, 2) that leave nothing sideways, and by how much a turn moves the sideways part (T,)."""
+def _turn(hinge: Hinge, direction: Float, total: Float, along: float, rate: float) -> Float:
+    """Turns (T,) of the upper bone: the hinge's plane right where it means something, and no jumps."""
     a, h, y, d = hinge.upper, hinge.flexion, hinge.twist, hinge.lower
     # sideways part of the wanted direction, seen from the turned upper bone, less that of the lower bone
     constant = direction @ a * (a @ h)
     straight, across = d @ h, np.cross(y, d) @ h
     cosine = direction @ (h - a * (a @ h)) - (np.cos(total) * straight + np.sin(total) * across)
     sine = direction @ np.cross(a, h) - along * (np.sin(total) * straight - np.cos(total) * across)
-    reach = np.hypot(cosine, sine)
-    middle = np.arctan2(sine, cosine)
-    half = np.arccos(np.clip(-constant / np.maximum(reach, 1e-12), -1.0, 1.0))
-    return np.stack([middle + half, middle - half], axis=1), reach
+    sideways = np.stack([constant, cosine, sine], axis=1)
+    side = np.cross(h, d) * hinge.natural
+    flat = direction @ a * (a @ side)
+    natural = np.stack([flat, direction @ side - flat, direction @ np.cross(a, side)], axis=1)
+
+    # usually, the limb bends the natural way with nothing left sideways
+    reach = np.hypot(natural[:, 1], natural[:, 2])
+    sure = np.where(reach > CLEAR_BEND, natural[:, 1] + 1j * natural[:, 2], 0.0).sum()
+    swing = np.linalg.norm(np.diff(direction, axis=0, prepend=direction[:1]), axis=1) * rate
+    ease = 1 / (1 + (swing / ABRUPT) ** 2) ** 2
+    path = np.zeros(len(direction))
+    follow(sideways, natural, ease, float(np.angle(sure + 1e-9)), 1 / rate, path)
+    return _centred(path)
 
 
 def _flexion(hinge: Hinge, direction: Float, turn: Float, twist: Float) -> Float:
@@ -120,33 +122,3 @@ def _flexion(hinge: Hinge, direction: Float, turn: Float, twist: Float) -> Float
     cosine = np.einsum("ti,ti->t", bone, wanted) - (bone @ hinge.flexion) * (wanted @ hinge.flexion)
     result: Float = np.arctan2(sine, cosine)
     return result
-
-
-def _path(twists: Float, bends: Float, reach: Float, rate: float) -> Float:
-    """One turn a frame, (T,), without needless jumps. bends: (T, 2), positive the natural way."""
-    frames = np.arange(len(twists))
-    best = np.argmax(bends, axis=1)
-    clear = bends[frames, best] > CLEAR_BEND
-    sure = np.where(clear, reach * reach, 0.0) * np.exp(1j * twists[frames, best])
-    anchor = _direction(np.array([sure.sum() + 1e-9]))[0]  # 1 where nothing is known: the source's own twist
-    usual = np.unwrap(np.angle(_direction(_smoothed(sure, NEIGHBOURHOOD * rate) + 1e-4 * anchor)))
-    chosen = np.zeros(len(twists), dtype=np.int64)
-    firm = np.minimum(1.0, (reach / FIRM) ** 2)
-    choose(twists, np.maximum(0.0, -bends), firm, usual, 1 / rate, CLEAR_BEND, PATIENCE, chosen)
-    vote = reach * reach * np.exp(1j * twists[frames, chosen])
-    around = _direction(_smoothed(vote, NEIGHBOURHOOD * rate) + STRAIGHT * STRAIGHT * np.exp(1j * usual))
-    return _centred(np.unwrap(np.angle(vote + STRAIGHT * STRAIGHT * around)))
-
-
-def _direction(values: Complex) -> Complex:
-    size = np.abs(values)
-    return np.where(size > 1e-12, values / np.maximum(size, 1e-12), 1.0)
-
-
-def _smoothed(values: Complex, width: float) -> Complex:
-    """Moving average, three times over: close to a bell curve of this standard deviation, in frames."""
-    half = max(1, round(width))
-    for _ in range(3):
-        sums = np.concatenate([[0.0], np.cumsum(np.pad(values, half, mode="edge"))])
-        values = (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)
-    return values

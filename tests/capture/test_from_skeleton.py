@@ -286,7 +286,7 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     for bone, angles in errors.items():
         assert angles.mean() < 1.0, bone
         assert angles.max() < 5.0, bone
-    assert np.concatenate(list(errors.values())).mean() < 0.1
+    assert np.concatenate(list(errors.values())).mean() < 0.15
     report = retarget_report(captured, animation)  # says the same as the independent measurement
     for bone in report.bones:
         if (bone.joint, bone.aim) in errors:
