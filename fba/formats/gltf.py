@@ -49,7 +49,8 @@ def read(
 ) -> Animation:
     """A glTF skeleton's animation as BAPs (see `fba.capture.from_skeleton`, and `read_motion` for clip).
 
-    Files that this project wrote are taken as they are, with their own frames, where only clip is given.
+    Files that this project wrote are taken as they are, BAPs and FAPs with their own frames, where only clip
+    is given.
 
     Raises FormatError for anything that is not glTF, or whose skeleton is not a body; warns (FbaWarning)
     of what is left out.

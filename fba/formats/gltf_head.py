@@ -13,6 +13,7 @@ from fba.body.model import BodyModel
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from fba.face.tables import HEAD
+from fba.formats.gltf_fap_joints import FapJoint
 from fba.formats.gltf_joints import Clip, adopt, move
 from fba.formats.gltf_pose import nearest_rotation
 from fba.formats.gltf_targets import Targets, targets
@@ -52,6 +53,14 @@ class HeadParts:
             self.place = self.on.place
         self.bound: list[tuple[int, Float64]] = []
         """Nodes made here that carry vertices, and the matrices that they were bound with."""
+        self.fap_joints: list[tuple[FapJoint, dict[int, Float64]]] = []
+        """Nodes made here that FAPs move, and the FAPs (T,) that their motion tells."""
+        self._written: set[str] = set()
+
+    @property
+    def targets(self) -> list[Targets]:
+        """The morph targets that `meshes` put into the file, those of a FAP all or none."""
+        return [found for found in self._targets if self._written.issuperset(found.names)]
 
     @property
     def turns(self) -> bool:
@@ -65,17 +74,21 @@ class HeadParts:
         if parent is not None:
             adopt(self._builder, parent, node)
         motion = self._inside(self._moves.head_matrices(self._shown))
-        back = np.linalg.inv(bind)
+        back: Float64 = np.linalg.inv(bind).astype(np.float64)
         local = back @ motion @ bind
-        move(
-            self._builder,
-            self._clip,
-            node,
-            nearest_rotation(local[:, :3, :3]),
-            local[:, :3, 3],
-            always=always,
-        )
+        self._move(HEAD, node, local, back, np.eye(4), always)
         return node
+
+    def _move(
+        self, part: str, node: int, local: Float64, back: Float64, rest: Float64, always: bool = False
+    ) -> None:
+        """Animate a node that FAPs move. local: (T, 4, 4). back: (4, 4), from the body's frame into that of
+        the node's parent. rest: (4, 4), the node where no FAP moves it."""
+        turned = nearest_rotation(local[:, :3, :3])
+        move(self._builder, self._clip, node, turned, local[:, :3, 3], always=always)
+        joint = FapJoint.of_part(self.model, part, node, back @ self.place, rest)
+        if joint is not None:
+            self.fap_joints.append((joint, joint.values(turned, local[:, :3, 3])))
 
     def joints(self, parent: int, bind: Float64) -> dict[str, int]:
         """A joint for each part that has transforms of its own, such as an eye; by name of the part.
@@ -91,10 +104,11 @@ class HeadParts:
                 continue
             at = np.eye(4)
             at[:3, 3] = (self.place @ [*centre, 1.0])[:3]
-            local = np.linalg.inv(bind) @ self._inside(matrices) @ at
+            back: Float64 = np.linalg.inv(bind).astype(np.float64)
+            local = back @ self._inside(matrices) @ at
             node = self._builder.add("nodes", {"name": f"{part.name}_joint"})
             adopt(self._builder, parent, node)
-            move(self._builder, self._clip, node, nearest_rotation(local[:, :3, :3]), local[:, :3, 3])
+            self._move(part.name, node, local, back, back @ at)
             found[part.name] = node
             self.bound.append((node, at))
         return found
@@ -172,6 +186,7 @@ class HeadParts:
         primitive["targets"] = [
             {"POSITION": self._builder.displacements(found.shifts[k, rows] * size)} for found, k in own
         ]
+        self._written |= {found.names[k] for found, k in own}
         weights = np.stack([found.weights[:, k] for found, k in own], axis=1)
         mesh["weights"] = weights[0].tolist()
         mesh["extras"] = {"targetNames": [found.names[k] for found, k in own]}

@@ -1,7 +1,11 @@
-"""glTF files of this project read back: their joints' turns are BAPs already, nothing is retargeted."""
+"""glTF files of this project read back: their joints' turns are BAPs already, nothing is retargeted.
+
+What the face shows is told by its morph targets and joints (`fba.formats.gltf_faps`).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -11,11 +15,12 @@ from fba.animation import Animation, BodyTrack
 from fba.body import BapSolver, Skeleton, wrapped
 from fba.body.conventions import convention_names
 from fba.errors import FormatError
+from fba.formats.gltf_faps import read_face
 from fba.formats.gltf_pose import Sampler, key_times, nearest_rotation
 from fba.formats.gltf_writing import CHUNK, MARK, MOST_FRAMES
 from fba.formats.rates import parse_rate
 from fba.gltf import Animation as Clip
-from fba.gltf import Gltf
+from fba.gltf import Channel, Gltf
 from fba.gltf.values import Value, optional
 from fba.parameters import BAP_COUNT, baps
 
@@ -27,16 +32,18 @@ LARGEST = 1e6
 
 
 def note_of(gltf: Gltf, clip: Clip) -> Value | None:
-    """This project's note at an animation: rate, first frame, axes; None in files of others."""
+    """This project's note at an animation: rate, first frame, body and face; None in files of others."""
     entries = gltf.document.elements(1 << 18, "animations")
     entry = entries[gltf.animations.index(clip)]
     extras = entry.get("extras")
     held = optional(extras, MARK) if extras is not None and isinstance(extras.data, dict) else None
-    return held if held is not None and isinstance(held.data, dict) and "root" in held.data else None
+    ours = held is not None and isinstance(held.data, dict) and ("root" in held.data or "face" in held.data)
+    return held if ours else None
 
 
 def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
-    """The body track of an animation with such a note. Raises ModelError where it lies."""
+    """The tracks of an animation with such a note. Raises ModelError where it lies; warns (FbaWarning) of
+    what is not there any more."""
     if note.member("version").integer(0, 1 << 30) != VERSION:
         raise note.error(f"is version {note.member('version').data}; version {VERSION} is read here")
     text = note.member("rate")
@@ -45,19 +52,34 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
     except FormatError as error:
         raise text.error(str(error)) from None
     first = note.member("first").integer(-MOST_INDEX, MOST_INDEX)
-    axes = note.member("axes").choice(*convention_names())
-    root = note.member("root").index(len(gltf.nodes), "node")
-    centre = np.array(note.member("centre").numbers(3, -LARGEST, LARGEST))
-
-    standard = Skeleton.default()
-    nodes = _joints(gltf, root, standard)
-    channels = [channel for channel in clip.channels if channel.node in set(nodes.values())]
-    times = key_times(channels)
-    if len(times) > MOST_FRAMES:
-        raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that are read")
+    nodes: dict[str, int] = {}
+    channels: Sequence[Channel] = clip.channels
+    if note.get("root") is not None:
+        nodes = _joints(gltf, note.member("root").index(len(gltf.nodes), "node"), Skeleton.default())
+        channels = [channel for channel in clip.channels if channel.node in set(nodes.values())]
+    times = _times(channels, note)
     steps = np.rint(times * float(rate))
     if not (steps[-1] < MOST_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):
         raise text.error("the keys of the animation are closer than its frames")
+    body = _body(gltf, channels, note, nodes, times) if nodes else None
+    face = read_face(gltf, clip, held, times) if (held := note.get("face")) is not None else None
+    return Animation(rate, first + steps.astype(np.int64), face, body, clip.name)
+
+
+def _times(channels: Sequence[Channel], note: Value) -> Float64:
+    times = key_times(channels)
+    if len(times) > MOST_FRAMES:
+        raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that are read")
+    return times
+
+
+def _body(
+    gltf: Gltf, channels: Sequence[Channel], note: Value, nodes: dict[str, int], times: Float64
+) -> BodyTrack:
+    axes = note.member("axes").choice(*convention_names())
+    centre = np.array(note.member("centre").numbers(3, -LARGEST, LARGEST))
+
+    standard = Skeleton.default()
     solver = BapSolver(standard, axes)
     values = np.zeros((len(times), BAP_COUNT), dtype=np.int32)
     previous = None
@@ -69,8 +91,7 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
         previous = values[rows][-1]
     sent = np.zeros(BAP_COUNT, dtype=bool)
     sent[[bap.number - 1 for bap in baps() if bap.joint in nodes]] = True
-    track = BodyTrack(wrapped(values), np.broadcast_to(sent, values.shape))
-    return Animation(rate, first + steps.astype(np.int64), None, track, clip.name)
+    return BodyTrack(wrapped(values), np.broadcast_to(sent, values.shape))
 
 
 def _joints(gltf: Gltf, root: int, standard: Skeleton) -> dict[str, int]:

@@ -27,12 +27,14 @@ NATURAL = 0.25
 @dataclass(frozen=True, eq=False)
 class Targets:
     """What one FAP does. names: one a target. shifts: float32 (K, V, 3), displacements of the whole face at
-    weight 1, in the model's unit. weights: float32 (T, K)."""
+    weight 1, in the model's unit. weights: float32 (T, K). values: the FAP is the sum of weights times these.
+    """
 
     fap: int
     names: tuple[str, ...]
     shifts: Float32
     weights: Float32
+    values: tuple[float, ...]
 
 
 def targets(model: FaceModel, shown: Float32) -> Iterator[Targets]:
@@ -76,10 +78,11 @@ def _targets(
     straight = shifts[largest] * np.float32(1 / places[largest])
     if all(np.abs(shifts[row] - straight * np.float32(places[row])).max() <= tolerance for row in ends):
         weights = (values / reference).astype(np.float32)[:, None]
-        return Targets(table.fap, (name,), (straight * np.float32(reference))[None], weights)
+        return Targets(table.fap, (name,), (straight * np.float32(reference))[None], weights, (reference,))
     hats = np.stack([np.interp(values, places[kept], np.eye(len(kept))[kept.index(row)]) for row in ends], 1)
-    names = tuple(f"{name} {places[row]:g}" for row in ends)
-    return Targets(table.fap, names, shifts[ends], hats.astype(np.float32))
+    names = tuple(f"{name} {places[row]:.10g}" for row in ends)
+    values_at = tuple(float(places[row]) for row in ends)
+    return Targets(table.fap, names, shifts[ends], hats.astype(np.float32), values_at)
 
 
 def _bends(places: Float64, shifts: Float32, tolerance: float) -> list[int]:

@@ -52,9 +52,9 @@ def write(
     way BAPs turn (`fba.body.convention_names()`).
 
     A body track gives the whole person, with a head on it; a face track alone the head by itself. Read
-    again, the file gives the same BAPs at the same times; FAPs are not read back. Raises FormatError where
-    there is no frame, or more than 100,000, or no body for a skeleton; ModelError where glTF cannot hold a
-    model. Warns (FbaWarning) where a body has no place for a face.
+    again, the file gives the same BAPs and FAPs at the same times (docs/formats.md says what is lost).
+    Raises FormatError where there is no frame, or more than 100,000, or no body for a skeleton; ModelError
+    where glTF cannot hold a model. Warns (FbaWarning) where a body has no place for a face.
     """
     if os.fspath(path).lower().endswith(".gltf"):
         raise FormatError("glTF is written in one file; name it .glb", path=path)
@@ -74,7 +74,7 @@ def write(
     if animation.body is not None:
         roots = _person(builder, clip, animation, note, mesh, model, body, axes)
     else:
-        roots = _head(builder, clip, animation, model)
+        roots = _head(builder, clip, animation, note, model)
     builder.add("scenes", {"nodes": roots})
     builder.add(
         "animations",
@@ -115,6 +115,7 @@ def _person(
         bind = np.tile(np.eye(4), (len(skeleton), 1, 1))
         bind[:, :3, 3] = skeleton.centres
         _skin(builder, nodes, bind, nodes[0])
+        _note_face(builder, animation, note, model, None)
         return [nodes[0]]
 
     slots: dict[str, int] = {}
@@ -149,6 +150,7 @@ def _person(
         roots.append(builder.add("nodes", {"name": part.name, "mesh": shown, "skin": 0}))
     if head is not None:
         roots += head.meshes(slots, looks, True, {})
+    _note_face(builder, animation, note, model, head)
     return roots
 
 
@@ -161,7 +163,7 @@ def _head_of(
     if person.eyes is None:
         if animation.face is not None or model is not None:
             warnings.warn(
-                f"the body {person.name!r} has no place for a face; the face is left out",
+                f"the body {person.name!r} has no place for a face; none is shown",
                 FbaWarning,
                 stacklevel=5,
             )
@@ -170,7 +172,9 @@ def _head_of(
     return HeadParts(builder, clip, face, _shown(animation, face), person)
 
 
-def _head(builder: Builder, clip: Clip, animation: Animation, model: FaceModel | None) -> list[int]:
+def _head(
+    builder: Builder, clip: Clip, animation: Animation, note: dict[str, Any], model: FaceModel | None
+) -> list[int]:
     """A face by itself, in its own frame."""
     from fba.face.model import FaceModel
     from fba.formats.gltf_head import HeadParts
@@ -181,7 +185,29 @@ def _head(builder: Builder, clip: Clip, animation: Animation, model: FaceModel |
     node = head.turn(None, np.eye(4), always=True)
     hang = {"": node, **head.joints(node, np.eye(4))}
     head.meshes({}, Looks(builder), False, hang)
+    _note_face(builder, animation, note, face, head)
     return [node]
+
+
+def _note_face(
+    builder: Builder,
+    animation: Animation,
+    note: dict[str, Any],
+    model: FaceModel | None,
+    head: HeadParts | None,
+) -> None:
+    """Note which FAPs the head shows; without a head, their numbers."""
+    from fba.face.model import FaceModel
+    from fba.formats.gltf_faps import face_note
+
+    if animation.face is None:
+        return
+    face = head.model if head is not None else model or FaceModel.default()
+    shown = _shown(animation, face)
+    if head is None:
+        note["face"] = face_note(builder, animation.face, shown, face)
+    else:
+        note["face"] = face_note(builder, animation.face, shown, face, head.targets, head.fap_joints)
 
 
 def _shown(animation: Animation, model: FaceModel) -> npt.NDArray[np.float32]:

@@ -58,6 +58,7 @@ def read_document(document: Document) -> Gltf:
         roots=read_roots(document, nodes),
         order=order,
         document=document.root,
+        accessors=accessors,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fba.gltf.accessors import Accessors
 from fba.gltf.values import Value
 
 Float32 = npt.NDArray[np.float32]
@@ -119,7 +120,8 @@ class Animation:
 class Gltf:
     """A whole file. roots: nodes at the top of the default scene. order: all nodes, parents first.
 
-    document: the JSON, for extensions. Lengths are metres, +y is up, models face +z.
+    document: the JSON, and accessors: the arrays, for extensions and extras. Lengths are metres, +y is up,
+    models face +z.
     """
 
     file: str
@@ -131,6 +133,7 @@ class Gltf:
     roots: tuple[int, ...]
     order: tuple[int, ...]
     document: Value
+    accessors: Accessors
 
     def shown(self) -> tuple[int, ...]:
         """Nodes of the default scene, parents first."""

@@ -163,7 +163,7 @@ def test_the_same_body_comes_back(tmp_path: Path, written: Path, mesh: bool) -> 
         fba.write(path, animation, mesh=False)
     back = fba.read(path)
     assert (back.rate, back.index.tolist(), back.name) == (25, animation.index.tolist(), "dance")
-    assert back.face is None
+    assert back.face == animation.face
     assert back.body is not None
     assert animation.body is not None
     assert np.abs(back.body.values[:, :186] - animation.body.values[:, :186]).max() <= 2
