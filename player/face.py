@@ -23,6 +23,9 @@ Float64 = npt.NDArray[np.float64]
 CUT = 0.45
 """On a body, what sways less than this is left out: the body has a neck of its own."""
 
+EYES_APART = 0.062
+"""Metres between an adult's pupils."""
+
 
 @dataclass(frozen=True, eq=False)
 class Pose:
@@ -38,6 +41,7 @@ class FaceFigure:
     """A face model ready to be shown.
 
     model: any face. The light that reaches its vertices is worked out on first use, in about a second.
+    sway: float32 (V,), how far each vertex goes with the head, which turns about centre (3,).
     """
 
     def __init__(self, model: FaceModel) -> None:
@@ -58,8 +62,14 @@ class FaceFigure:
             else:
                 self._eyeballs.append((part, ball))
         self._cut: dict[str, FaceShape] = {}
-        self._centre = _head_centre(model)
+        self.sway = sways
+        self.centre = _head_centre(model)
         self._light = FaceLight(model, self.deformer, sways)
+
+    @property
+    def scale(self) -> float:
+        """How large it is: 1 where the eyes are as far apart as an adult's."""
+        return self.model.fapu.ES * 1024 / EYES_APART
 
     @cached_property
     def between_eyes(self) -> Float64:
@@ -108,7 +118,7 @@ class FaceFigure:
                 continue
             rows = self._ranges[name]
             arrays = pose.positions[rows], pose.normals[rows], light[rows]
-            found.append(FaceMesh(shape, *arrays, matrix, axis, self._centre))
+            found.append(FaceMesh(shape, *arrays, matrix, axis, self.centre))
         return found
 
     @property

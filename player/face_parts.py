@@ -70,6 +70,8 @@ def part_shape(part: Part, sways: Float32) -> FaceShape:
         _relief(part),
         part.kind in TWO_SIDED,
         hairs(part) if part.kind in HAIRY and picture is None else None,
+        name=part.name,
+        kind=part.kind,
     )
 
 

@@ -101,7 +101,7 @@ class Person:
 
 def _shape(part: BodyPart) -> FaceShape:
     shape = part_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
-    return replace(shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True)
+    return replace(shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True, name="")
 
 
 def _placed(shape: FaceShape, places: Float32, normals: Float32, light: Float32) -> FaceMesh:

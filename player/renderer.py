@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from player.camera import Camera
 from player.extent import Steps, steps
+from player.extras_renderer import ExtrasRenderer
 from player.face_renderer import FaceRenderer
 from player.outline import Outliner
 from player.primitives import capsule_mesh, sphere_mesh
@@ -63,6 +64,7 @@ class Renderer:
             index_buffer=self._eye_parts[1],
         )
         self._outliner = Outliner()
+        self._extras = ExtrasRenderer(context)
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
@@ -91,6 +93,8 @@ class Renderer:
         for ball in view.eyes:
             self._draw_eye(ball)
         self._faces.draw(view.faces)
+        if view.extras is not None:
+            self._extras.draw(view.extras, camera, size)
         return steps(view, matrix, size, self._outliner)
 
     def close(self) -> None:
@@ -100,6 +104,7 @@ class Renderer:
                 part.release()
         self._shapes.clear()
         self._faces.close()
+        self._extras.close()
         for part in (
             *(self._backdrop[:0:-1] if self._backdrop else ()), self._shadow, self._square, self._blobs,
             self._studio, self._studio_buffer, self._capsules, self._instances, *self._capsule_parts,
@@ -125,6 +130,9 @@ class Renderer:
     def _draw_studio(self, view: View, matrix: npt.NDArray[np.float64], size: tuple[int, int]) -> None:
         """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs."""
         gl = self._gl
+        if view.background is not None:
+            gl.clear(*view.background, 1.0, depth=1.0)
+            return
         target = gl.fbo
         blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
         middle = np.round(blobs[:, :2].mean(axis=0), 1) if len(blobs) else np.zeros(2)

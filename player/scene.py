@@ -10,26 +10,26 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from player.camera import Camera, Subject
+from player.framing import Extent, body_extent
+from player.ground import no_shadows, shadows
 from player.shapes import View
+from player.switches import SWITCHES, Switches
 from player.timeline import Timeline
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
     from fba.face.model import FaceModel
+    from player.dressing import Dressing
     from player.face import FaceFigure
     from player.person import Person
     from player.point_view import PointView
 
+__all__ = ["LOOKS", "SWITCHES", "Scene", "default_camera"]
+
 Float64 = npt.NDArray[np.float64]
 
-BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
 SAMPLES = 48
 """Moments at which the extent of a moving body is looked up to fit the camera."""
-HIPS = 0.78
-STANDING = 0.12
-"""Legs that move less than this (m) stand still."""
-MOST_TRAVEL = 4.0
-"""A performance that moves further than this (m) is followed by the camera instead of fitted whole."""
 LOOKS = ("figure", "points")
 """What a scene may be shown as: a person, or feature points and bones."""
 
@@ -41,7 +41,10 @@ class Scene:
     what BAPs move, by default the built-in person; ModelError where it has no place for a face. axes: name
     of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or "points",
     the face as its feature points with lines through them and the body as its bones; it may be set at any
-    time, ValueError where it is something else. What is drawn is worked out on first use.
+    time, ValueError where it is something else. timeline: what is shown when, by default
+    `Timeline(animation, model)`; one that grows shows a stream while it arrives.
+
+    `show` sets its `switches`, at any time. What is drawn is worked out on first use. A `Showable`.
     """
 
     def __init__(
@@ -52,19 +55,20 @@ class Scene:
         body: BodyModel | None = None,
         axes: str = "iso",
         view: str = "figure",
+        timeline: Timeline | None = None,
     ) -> None:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
         self.animation = animation
         self.model = model or _default_model()
-        self.timeline = Timeline(animation, self.model)
+        self.timeline = timeline or Timeline(animation, self.model)
+        self.switches = Switches()
         self.view = view
         self._figure: FaceFigure | None = None
         self._point_view: PointView | None = None
         self._person: Person | None = None
-        self._subject: Subject | None = None
-        self._follow = False
-        self._legs_move = False
+        self._dressing: Dressing | None = None
+        self._extent: Extent | None = None
         if animation.body is not None:
             from fba.body import BapSolver
             from fba.body.model import BodyModel
@@ -85,6 +89,18 @@ class Scene:
         if name not in LOOKS:
             raise ValueError(f"no view {name!r}; there are {', '.join(LOOKS)}")
         self._view = name
+
+    def show(self, name: str, on: object = True) -> None:
+        """Set a switch: True or False, a choice's word, or a FAP by name or number; see `SWITCHES`.
+
+        Raises ValueError for a switch that does not exist or a value that it cannot have.
+        """
+        self.switches.show(name, on)
+
+    @property
+    def title(self) -> str:
+        """The animation's name."""
+        return self.animation.name
 
     @property
     def figure(self) -> FaceFigure:
@@ -127,20 +143,18 @@ class Scene:
     @property
     def subject(self) -> Subject:
         """What a camera is to have in view over the whole performance."""
-        if self._subject is None:
-            self._subject = self._extent() if self.has_body else self.figure.subject
-        return self._subject
+        return self._framed().subject if self.has_body else self.figure.subject
 
     @property
     def gesture_subject(self) -> Subject | None:
         """The body from the hips up, where the legs stand still and the face is animated; else None."""
-        whole = self.subject
-        if self._legs_move or self.animation.face is None:
+        if not self.has_body or self.animation.face is None or self._framed().legs_move:
             return None
-        top = whole.centre[1] + whole.half_height
-        bottom = min(HIPS, top - 0.8)
-        x, _, z = whole.centre
-        return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, min(whole.half_width, 0.55))
+        return self._framed().upper_half
+
+    def refit(self) -> None:
+        """Look anew at where the performance takes place: more of a stream has arrived."""
+        self._extent = None
 
     @property
     def face_subject(self) -> Subject:
@@ -176,8 +190,17 @@ class Scene:
         return self._shown(*self._posed(time))
 
     def _shown(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
-        if self._view == "points":
-            return self._points(faps, joints)
+        view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
+        if not self.switches.changed:
+            return view
+        from player.dressing import Dressing, Posture
+
+        if self._dressing is None:
+            self._dressing = Dressing(self.figure, self._bones if self.has_body else None)
+        return self._dressing.dressed(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
+
+    def _person_or_head(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+        """The view as a figure."""
         if joints is None:
             world = np.eye(4)
             return View(eyes=self.figure.eyes(faps, world), faces=self.figure.meshes(faps, world))
@@ -185,7 +208,7 @@ class Scene:
         return View(
             eyes=self.person.eyes(faps, turned),
             faces=self.person.meshes(faps, turned),
-            blobs=_shadows(joints, self._skeleton.names),
+            blobs=shadows(joints, self._skeleton.names),
             ground=True,
         )
 
@@ -204,14 +227,13 @@ class Scene:
             capsules=capsules,
             marks=shown.marks(faps, matrix),
             faces=shown.ghost(faps, matrix, on_body=joints is not None),
-            blobs=np.zeros((0, 4), np.float32) if joints is None else _shadows(joints, self._skeleton.names),
+            blobs=no_shadows() if joints is None else shadows(joints, self._skeleton.names),
             ground=joints is not None,
         )
 
     def travel(self, time: float) -> tuple[float, float, float]:
         """How far a following camera has gone at a time: (x, y, z), metres; zeros where it stands still."""
-        self.subject  # noqa: B018 - decides whether the camera follows
-        if not self._follow:
+        if not self.has_body or not self._framed().follows:
             return (0.0, 0.0, 0.0)
         joints = self._posed(time)[1]
         assert joints is not None
@@ -228,40 +250,19 @@ class Scene:
         """Frame of the face model, without the head's own turn, into the world."""
         return np.eye(4) if joints is None else self.person.frame(joints)
 
-    def _extent(self) -> Subject:
-        frames = self.timeline.frames
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        legs = [self._skeleton.names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
-        for frame in np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int)):
-            joints = self._posed(float(self.timeline.time_of(int(frame))))[1]
-            assert joints is not None
-            low, high = np.minimum(low, joints[:, :3, 3].min(0)), np.maximum(high, joints[:, :3, 3].max(0))
-            if frame == 0:
-                first, stand = joints[0, :3, 3], joints[legs, :3, 3]
-            self._legs_move |= bool(np.abs(joints[legs, :3, 3] - stand).max() > STANDING)
-        if not np.isfinite(high - low).all() or (high - low).max() > MOST_TRAVEL:
-            self._follow = True
-            x, y, z = (float(v) for v in first)
-            return Subject((x, y - 0.09, z), BODY_SUBJECT.half_height, BODY_SUBJECT.half_width)
-        low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, 0.14, 0.10])
-        low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + _aside(low, high))
-        x, y, z = (float(v) for v in (low + high) / 2)
-        wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
-        return Subject(
-            (x, y, z), max(float(high[1] - low[1]) / 2 * 1.06, 0.9), max(wide, BODY_SUBJECT.half_width)
-        )
+    def _framed(self) -> Extent:
+        if self._extent is None:
+            frames = self.timeline.frames
+            chosen = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
+            baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in chosen])
+            self._extent = body_extent(self._solver.pose(baps)[:, :, :3, 3], self._skeleton.names)
+        return self._extent
 
 
 def _default_model() -> FaceModel:
     from fba.face.model import FaceModel
 
     return FaceModel.default()
-
-
-def _aside(low: Float64, high: Float64) -> Float64:
-    """Shift that keeps the floor below a body that stands elsewhere than at the origin."""
-    middle = (low + high) / 2
-    return np.array([middle[0], 0.0, middle[2]])
 
 
 def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:
@@ -273,19 +274,3 @@ def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:
     if scene.has_body:
         return Camera.preset("body", scene.gesture_subject or scene.subject, aspect)
     return Camera(yaw=14.0, pitch=2.0).fit(scene.subject, aspect)
-
-
-def _shadows(joints: Float64, names: tuple[str, ...]) -> npt.NDArray[np.float32]:
-    """Soft blobs under the hips and both feet, fainter the higher these are."""
-    found = []
-    for name, radius, darkness, rest in (
-        ("HumanoidRoot", 0.55, 0.42, 0.97),
-        ("l_midtarsal", 0.20, 0.55, 0.03),
-        ("r_midtarsal", 0.20, 0.55, 0.03),
-        ("l_subtalar", 0.16, 0.40, 0.04),
-        ("r_subtalar", 0.16, 0.40, 0.04),
-    ):
-        x, y, z = joints[list(names).index(name), :3, 3]
-        height = max(float(y) - rest, 0.0)
-        found.append((x, z, radius * (1 + height), darkness / (1 + 4 * height)))
-    return np.array(found, dtype=np.float32)

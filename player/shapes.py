@@ -7,9 +7,13 @@ more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres;
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from player.extras import Extras
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -56,6 +60,7 @@ class FaceShape:
     the inside is to look dark. across: float32 (V, 8), of single hairs: from the vertex opposite to each,
     half the hair's width there (m), direction to the tip, and 1 or -1 on its two sides; hairs are never
     drawn thinner than a pixel, but fainter. closed: nobody sees into it, so its inside is not drawn.
+    name, kind: of the part that it was made from, "" where there is none.
     """
 
     triangles: npt.NDArray[np.int32]
@@ -68,6 +73,8 @@ class FaceShape:
     two_sided: bool = False
     across: Float32 | None = None
     closed: bool = False
+    name: str = ""
+    kind: str = ""
 
     @property
     def see_through(self) -> bool:
@@ -119,7 +126,8 @@ class View:
 
     capsules: float32 (N, 16), see `CAPSULE_FLOATS`. marks: the same, but what hides them lets them shine
     through a little. blobs: float32 (K, 4), soft shadows on the ground:
-    x, z, radius, darkness. ground: whether there is a ground.
+    x, z, radius, darkness. ground: whether there is a ground. background: colour behind everything (sRGB,
+    0..1, as shown) instead of the studio. extras: what is drawn over the figure, see `player.extras`.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -129,6 +137,8 @@ class View:
     faces: list[FaceMesh] = field(default_factory=list)
     blobs: Float32 = field(default_factory=lambda: np.zeros((0, 4), dtype=np.float32))
     ground: bool = False
+    background: tuple[float, float, float] | None = None
+    extras: Extras | None = None
 
 
 def spheres(places: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:

@@ -117,6 +117,35 @@ def view_option(command: Command) -> Command:
     )(command)
 
 
+class ShowType(click.ParamType[tuple[str, Any]]):
+    """A switch of the player: wireframe, influence=open_jaw, shadows=off."""
+
+    name = "switch"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, Any]:
+        from player.switches import parse_switch
+
+        try:
+            return parse_switch(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+def show_option(command: Command) -> Command:
+    """`--show` as `shows`: names and values for `Scene.show`."""
+    return click.option(
+        "--show",
+        "shows",
+        type=ShowType(),
+        multiple=True,
+        metavar="SWITCH[=VALUE]",
+        help="Again for more: wireframe, points, influence=FAP, skeleton[=only], grid, normals; shadows=off, "
+        "eyes=off, teeth=off, hair=off; background=grey or transparent.",
+    )(command)
+
+
 def axes_option(command: Command) -> Command:
     return click.option(
         "--axes",

@@ -27,6 +27,7 @@ from fba.cli import options
 @options.model_option
 @options.camera_option
 @options.view_option
+@options.show_option
 @options.axes_option
 @options.bap_steps_option
 @options.salvage_option
@@ -39,6 +40,7 @@ def command(
     model: Path | None,
     camera: str | None,
     view: str,
+    shows: tuple[tuple[str, object], ...],
     axes: str,
     bap_steps: str,
     salvage: bool,
@@ -51,4 +53,6 @@ def command(
 
     animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage)
     scene = player.Scene(animation, options.read_model(model), axes=axes, view=view)
+    for switch, state in shows:
+        scene.show(switch, state)
     player.play(scene, size=size, speed=speed, loop=loop, camera=camera, title=file.name)

@@ -16,11 +16,9 @@ from fba.face import feature_point_names, resolve
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel
 from player import Offscreen, Scene
-from player.controls import Controls
 from player.face import FaceFigure
 from player.point_view import PointView
 from player.skin_lines import skin_lines
-from player.transport import Transport
 
 ROW = {name: row for row, name in enumerate(feature_point_names())}
 FACES: list[dict[int, int]] = [
@@ -139,11 +137,9 @@ def test_the_view_is_checked_and_may_change(talking: Animation) -> None:
     scene = Scene(talking)
     assert scene.view == "figure"
     assert len(scene.at(0.0).marks) == 0
-    controls = Controls(scene, Transport(scene.timeline), (100, 100))
-    assert controls.key("p")
-    assert scene.view == "points"
+    scene.view = "points"
     assert len(scene.at(0.0).marks) == 84
-    assert controls.key("p")
+    scene.view = "figure"
     assert len(scene.at(0.0).marks) == 0
 
 

@@ -1,0 +1,128 @@
+"""Switches -> what is drawn: takes things out of a view, paints it, and adds lines, dots, bones, a legend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.feature_points import names
+from player.bones import Bones, face_pivots
+from player.extras import Colour, Dots, Extras
+from player.face import FaceFigure
+from player.ground import body_grid, face_grid, no_shadows
+from player.influence import Influence
+from player.shapes import View
+from player.switches import Switches
+from player.wireframe import Wireframe
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+LEFT_OUT = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
+"""Kinds of parts that a switch takes out."""
+UNSHADED = (0.9, 0.85, 0.0, 0.25)
+"""The light that reaches everything where nothing casts a shadow."""
+BACKGROUNDS = {"studio": None, "grey": (0.5, 0.5, 0.5), "transparent": (0.5, 0.5, 0.5)}
+DOT: Colour = (0.98, 0.62, 0.20, 1.0)
+DOT_RADIUS = 3.2
+DOT_LIFT = 0.004
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """What a view was made from: FAPs (68,), face (4, 4) into the world, joints (J, 4, 4) or None."""
+
+    faps: Float32
+    face: Float64
+    joints: Float64 | None
+
+
+class Dressing:
+    """Applies switches to the views of one face, and of a body with these bones."""
+
+    def __init__(self, figure: FaceFigure, bones: Bones | None) -> None:
+        self._figure = figure
+        self._bones = bones
+        self._wires = Wireframe()
+        self._influence: Influence | None = None
+        self._pivots = face_pivots(figure.model, figure.scale)
+        model = figure.model
+        self._known: npt.NDArray[np.bool_] = np.asarray(np.isfinite(model.points).all(axis=1))
+        self._names = tuple(name for name, known in zip(names(), self._known, strict=True) if known)
+        self._scale = figure.scale
+
+    def dressed(self, view: View, switches: Switches, posture: Posture) -> View:
+        """The view as the switches have it."""
+        if not switches.changed:
+            return view
+        view = self._taken_out(view, switches)
+        extras = Extras()
+        number = switches["influence"]
+        if number is not None:
+            paint = self._painter(int(number))
+            view = replace(
+                view, faces=paint.painted(view.faces), meshes=[*view.meshes, *paint.eyes(view.eyes)], eyes=[]
+            )
+            extras = replace(extras, legend=paint.legend)
+        lines = []
+        if switches["wireframe"]:
+            lines.append(self._wires.edges(view.faces, view.meshes, view.eyes, self._scale))
+        if switches["normals"]:
+            lines.append(self._wires.normals(view.faces, self._scale))
+        if switches["skeleton"] != "off":
+            shells = tuple(view.faces) if switches["skeleton"] == "through" else ()
+            extras = replace(extras, shells=shells)
+            view = replace(view, faces=[], eyes=[], meshes=[], capsules=self._skeleton(posture))
+        if switches["grid"]:
+            joints = posture.joints
+            grid = face_grid(self._figure.subject) if joints is None else body_grid(joints)
+            extras = replace(extras, grid=grid)
+        dots = (self._dots(posture, over=len(view.marks) == 0),) if switches["points"] else ()
+        background = BACKGROUNDS[str(switches["background"])]
+        extras = replace(extras, lines=tuple(lines), dots=dots)
+        return replace(view, extras=extras, background=background)
+
+    def _taken_out(self, view: View, switches: Switches) -> View:
+        hidden = {kind for name, kinds in LEFT_OUT.items() if not switches[name] for kind in kinds}
+        if hidden:
+            view = replace(view, faces=[mesh for mesh in view.faces if mesh.shape.kind not in hidden])
+        if "eye" in hidden:
+            view = replace(view, eyes=[])
+        if not switches["shadows"]:
+            lit = [np.broadcast_to(np.array(UNSHADED, np.float32), mesh.light.shape) for mesh in view.faces]
+            faces = [replace(mesh, light=light) for mesh, light in zip(view.faces, lit, strict=True)]
+            view = replace(view, faces=faces, blobs=no_shadows())
+        return view
+
+    def _painter(self, number: int) -> Influence:
+        if self._influence is None or self._influence.fap.number != number:
+            self._influence = Influence(self._figure, number)
+        return self._influence
+
+    def _skeleton(self, posture: Posture) -> Float32:
+        """Capsules of all joints, those of the head's own among them."""
+        turned = posture.face @ self._figure.pose(posture.faps).turn
+        own = self._pivots.capsules(turned)
+        if self._bones is None or posture.joints is None:
+            return own
+        return np.concatenate([self._bones.capsules(posture.joints), own])
+
+    def _dots(self, posture: Posture, *, over: bool) -> Dots:
+        """Feature points; over: whether the dots themselves are to be drawn, not their names alone."""
+        figure, model = self._figure, self._figure.model
+        places = figure.points(posture.faps, posture.face)[self._known]
+        pose = figure.pose(posture.faps)
+        bound = model.bound[self._known]
+        turned = (posture.face @ pose.turn)[:3, :3]
+        ways = np.where(bound[:, None] >= 0, pose.normals[bound] @ turned.T, turned[:, 2])
+        radius = DOT_RADIUS if over else 0.0
+        return Dots(
+            places.astype(np.float32),
+            DOT,
+            radius,
+            DOT_LIFT * self._scale,
+            self._names,
+            ways.astype(np.float32),
+        )

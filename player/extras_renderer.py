@@ -1,0 +1,206 @@
+"""Draws a view's extras over its figure: shells, grid, lines, dots, words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from player.camera import Camera
+from player.extras import Dots, Extras, Grid, Lines
+from player.placing import directions, places
+from player.programs import load_program, matrix_bytes, set_uniform
+from player.shapes import FaceMesh
+from player.words import SMALLEST, legend_picture, names_picture, placed_names
+
+Float64 = npt.NDArray[np.float64]
+
+REFERENCE_HEIGHT = 720
+CROWDED = 7.0
+"""Lines shorter than this (pixels) are fainter: a fine mesh is a tint, not a black spot."""
+HIDDEN = 0.2
+"""How much of a dot is seen through what hides it."""
+NAME_SIZE = 13
+MARGIN = 14
+PROGRAMS = ("line", "dot", "shell", "grid", "label")
+
+
+class ExtrasRenderer:
+    """Draws extras; what it needs on the graphics card is made on first use and given back by `close`."""
+
+    def __init__(self, context: Any) -> None:
+        self._gl = context
+        self._programs: dict[str, Any] = {}
+        self._square: Any = None
+        self._buffers: dict[str, Any] = {}
+        self._textures: dict[str, tuple[object, Any, Any]] = {}
+
+    def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
+        """Over what the bound framebuffer shows from that camera, its depths known."""
+        if not self._programs:
+            self._programs = {name: load_program(self._gl, f"extra_{name}") for name in PROGRAMS}
+            self._square = self._gl.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4").tobytes())
+        gl = self._gl
+        matrix = camera.projection_matrix(size[0] / max(size[1], 1)) @ camera.view_matrix()
+        for program in self._programs.values():
+            set_uniform(program, "camera", matrix_bytes(matrix))
+            set_uniform(program, "eye", tuple(float(v) for v in camera.eye))
+            set_uniform(program, "size", (float(size[0]), float(size[1])))
+        scale = max(size[1] / REFERENCE_HEIGHT, 0.5)
+        gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA
+        self._draw_shells(extras.shells)
+        gl.fbo.depth_mask = False
+        if extras.grid is not None:
+            self._draw_grid(extras.grid)
+        for lines in extras.lines:
+            self._draw_lines(lines, scale)
+        for dots in extras.dots:
+            if dots.radius > 0:
+                self._draw_dots(dots, scale)
+        gl.enable_only(gl.BLEND)
+        if size[1] >= SMALLEST:
+            for dots in extras.dots:
+                self._draw_names(dots, matrix, camera.eye, size, scale)
+            if extras.legend is not None:
+                legend = extras.legend
+                words = self._words("legend", (legend, scale), lambda: (legend_picture(legend, scale), None))
+                wide, high = words[1].size
+                edge = round(MARGIN * scale)
+                if wide + 2 * edge <= size[0]:
+                    self._draw_label("legend", np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
+        gl.fbo.depth_mask = True
+        gl.enable_only(gl.DEPTH_TEST)
+
+    def close(self) -> None:
+        """Free everything allocated on the graphics card."""
+        for _, texture, _ in self._textures.values():
+            texture.release()
+        for part in (*self._buffers.values(), *self._programs.values()):
+            part.release()
+        if self._square is not None:
+            self._square.release()
+        self._square = None
+        self._textures.clear()
+        self._buffers.clear()
+        self._programs.clear()
+
+    def _filled(self, name: str, data: npt.NDArray[Any]) -> Any:
+        """A buffer kept under a name, with this in it."""
+        held = self._buffers.get(name)
+        if held is None or held.size < data.nbytes:
+            if held is not None:
+                held.release()
+            held = self._buffers[name] = self._gl.buffer(reserve=max(data.nbytes, 64) * 5 // 4, dynamic=True)
+        held.orphan()
+        held.write(np.ascontiguousarray(data))
+        return held
+
+    def _render(self, program: str, content: list[tuple[Any, ...]], instances: int) -> None:
+        array = self._gl.vertex_array(self._programs[program], content)
+        array.render(self._gl.TRIANGLE_STRIP, vertices=4, instances=instances)
+        array.release()
+
+    def _draw_shells(self, shells: tuple[FaceMesh, ...]) -> None:
+        gl, arrays, parts = self._gl, [], []
+        for number, mesh in enumerate(shells):
+            at = np.concatenate([places(mesh), directions(mesh)], axis=1).astype("f4")
+            vertices = self._filled(f"shell {number}", at)
+            triangles = gl.buffer(np.ascontiguousarray(mesh.shape.triangles, dtype="i4").tobytes())
+            content = [(vertices, "3f 3f", "in_position", "in_normal")]
+            arrays.append(gl.vertex_array(self._programs["shell"], content, index_buffer=triangles))
+            parts.append(triangles)
+        # Depths first, so that only the nearest skin is seen.
+        gl.fbo.color_mask = False, False, False, False
+        for array in arrays:
+            array.render()
+        gl.fbo.color_mask = True, True, True, True
+        gl.depth_func = "<="
+        for array in arrays:
+            array.render()
+        gl.depth_func = "<"
+        for part in (*arrays, *parts):
+            part.release()
+
+    def _draw_grid(self, grid: Grid) -> None:
+        program = self._programs["grid"]
+        set_uniform(program, "centre", grid.centre)
+        set_uniform(program, "height", grid.height)
+        set_uniform(program, "reach", grid.reach)
+        set_uniform(program, "step_", grid.step)
+        self._render("grid", [(self._square, "2f", "in_corner")], 1)
+
+    def _draw_lines(self, lines: Lines, scale: float) -> None:
+        if not len(lines.ends):
+            return
+        program = self._programs["line"]
+        set_uniform(program, "width", max(lines.width * scale, 0.8))
+        set_uniform(program, "lift", lines.lift)
+        set_uniform(program, "crowded", CROWDED * scale)
+        corners = self._filled("corners", np.array([0, -1, 1, -1, 0, 1, 1, 1], dtype="f4"))
+        ends = self._filled("ends", lines.ends.astype("f4"))
+        names = ("in_from_colour", "in_to_colour")
+        if isinstance(lines.colours, tuple):
+            colours = self._filled("colour", np.array([lines.colours] * 2, dtype="f4"))
+            tint = (colours, "4f 4f/r", *names)
+        else:
+            colours = self._filled("colours", lines.colours.astype("f4"))
+            tint = (colours, "4f 4f/i", *names)
+        content = [(corners, "2f", "in_corner"), (ends, "3f 3f/i", "in_from", "in_to"), tint]
+        self._render("line", content, len(lines.ends))
+
+    def _draw_dots(self, dots: Dots, scale: float) -> None:
+        if not len(dots.places):
+            return
+        gl, program = self._gl, self._programs["dot"]
+        set_uniform(program, "radius", max(dots.radius * scale, 0.9))
+        set_uniform(program, "lift", dots.lift)
+        set_uniform(program, "colour", dots.colour)
+        content = [
+            (self._square, "2f", "in_corner"),
+            (self._filled("places", dots.places.astype("f4")), "3f/i", "in_place"),
+        ]
+        for opacity, depth in ((HIDDEN, ">"), (1.0, "<")):
+            set_uniform(program, "opacity", opacity)
+            gl.depth_func = depth
+            self._render("dot", content, len(dots.places))
+
+    def _draw_names(
+        self, dots: Dots, matrix: Float64, eye: Float64, size: tuple[int, int], scale: float
+    ) -> None:
+        pixels = round(NAME_SIZE * scale)
+        key = (dots.names, pixels)
+        _, _, boxes = self._words("names", key, lambda: names_picture(dots.names, pixels))
+        at = dots.places.astype(np.float64)
+        clip = np.column_stack([at, np.ones(len(at))]) @ matrix.T
+        seen = (clip[:, 3] > 1e-6) & (np.einsum("ij,ij->i", dots.facing, eye - at) >= 0)
+        clip[~seen] = np.nan
+        flat = clip[:, :2] / clip[:, 3:]
+        pixel = (flat * (0.5, -0.5) + 0.5) * size
+        chosen, corners = placed_names(pixel, boxes[:, 2:], dots.radius * scale, size)
+        if len(chosen):
+            own = boxes[chosen].astype(np.float64)
+            whole = np.array(self._textures["names"][1].size * 2, dtype=np.float64)
+            self._draw_label("names", np.concatenate([corners, own[:, 2:], own / whole], axis=1))
+
+    def _words(self, name: str, key: object, make: Any) -> tuple[object, Any, Any]:
+        """A texture of words kept under a name, and what `make` gave with it."""
+        held = self._textures.get(name)
+        if held is None or held[0] != key:
+            if held is not None:
+                held[1].release()
+            picture, more = make()
+            texture = self._gl.texture((picture.shape[1], picture.shape[0]), 4, picture.tobytes())
+            texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
+            held = self._textures[name] = (key, texture, more)
+        return held
+
+    def _draw_label(self, texture: str, boxes: Float64) -> None:
+        self._textures[texture][1].use(0)
+        corners = self._filled("label corners", np.array([0, 0, 1, 0, 0, 1, 1, 1], dtype="f4"))
+        content = [
+            (corners, "2f", "in_corner"),
+            (self._filled(texture, boxes.astype("f4")), "4f 4f/i", "in_box", "in_part"),
+        ]
+        self._render("label", content, len(boxes))
