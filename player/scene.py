@@ -178,6 +178,13 @@ class Scene:
         whole = self.has_body and preset == "body"
         return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
 
+    def of(self, faps: npt.NDArray[np.float32], baps: Float64) -> View:
+        """What is drawn for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), whatever is played.
+
+        baps count only where the animation has a body.
+        """
+        return self._shown(faps, self._solver.pose(baps) if self.has_body else None)
+
     def still(self, faps: npt.NDArray[np.float32]) -> View:
         """The face for FAPs (68,) as they are shown, in the body's posture at the start."""
         return self._shown(faps, self._posed(float(self.start))[1])
