@@ -134,11 +134,9 @@ def record(
         rate = Fraction(fps)
     rate = exact_rate(rate)
     first, count = _stretch(shown, rate, start, end)
-    width, height = size or (GIF_SIZE if gif else SIZE)
-    if suffix == ".mp4":
-        if min(width, height) < 2:
-            raise ValueError(f"a film must have at least 2x2 pixels, not {width}x{height}")
-        width, height = width // 2 * 2, height // 2 * 2
+    width, height = picture_size(size, path)
+    if min(width, height) < 1:
+        raise ValueError(f"a film must have at least 2x2 pixels, not {size}")
     with ExitStack() as stack:
         # Whether the encoder is there, and where it writes, shows sooner than the first picture.
         if numbered:
@@ -157,6 +155,13 @@ def record(
         result = recorder.close()
     assert result is not None
     return result
+
+
+def picture_size(size: tuple[int, int] | None, path: PathLike) -> tuple[int, int]:
+    """Width and height that a picture or a film of that name gets where a size, or None, was asked for."""
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    width, height = size or (GIF_SIZE if suffix == ".gif" else SIZE)
+    return (width // 2 * 2, height // 2 * 2) if suffix == ".mp4" else (width, height)
 
 
 def film_rate(rate: Fraction) -> Fraction:

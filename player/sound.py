@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -110,14 +109,6 @@ class Soundtrack:
             raise FormatError(f"the sound is damaged: {error}", path=self._path) from error
 
 
-def length(path: PathLike) -> float:
-    """Seconds of sound in a file, as it says itself; infinite where it does not."""
-    from player.films import import_av
-
-    av = import_av()
-    try:
-        with av.open(str(path)) as container:
-            duration = container.duration
-    except (av.error.FFmpegError, OSError) as error:
-        raise FormatError(f"cannot be read as sound: {error}", path=path) from error
-    return math.inf if duration is None else float(duration / av.time_base)
+def check(path: PathLike) -> None:
+    """Raise FormatError where a file cannot be read as sound."""
+    Soundtrack(path, Fraction(0)).close()

@@ -147,7 +147,7 @@ def command(
     if file is None and not given:
         raise click.UsageError("give a file, or a face by --fap, --viseme, --expression or --contact-sheet")
     moments = {"--frame": frame, "--time": time, "--start": start, "--end": end, "--fps": fps}
-    for name, value in {**moments, "--audio": audio}.items():
+    for name, value in (*moments.items(), ("--audio", audio)):
         if file is None and value is not None:
             raise click.UsageError(f"{name} goes with a file; {given[0]} makes a single picture")
     film = is_film(output)
