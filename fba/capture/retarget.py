@@ -235,7 +235,7 @@ class Retarget:
             return
         foot = self.wanted[ankle]
         if self.aims.get(ankle) != toe:
-            self.wanted[subtalar] = foot
+            self._split(ankle, subtalar)
             return
         places = {j: self.skeleton.centres[self.skeleton.number(j)] for j in (ankle, subtalar, toe)}
         heel, sole = places[subtalar] - places[ankle], places[toe] - places[subtalar]
@@ -257,6 +257,20 @@ class Retarget:
         angles = aiming.aim(ankle_axes, start, bent, _in(above, direction), np.full(2, LOOSE))
         self.wanted[ankle] = above @ aiming.product(ankle_axes, angles)
         self.wanted[subtalar] = self.wanted[ankle] @ aiming.product(axes, roll)
+
+    def _split(self, ankle: str, subtalar: str) -> None:
+        """Both joints together take the foot's rotation: flexion, twisting and roll make any of them."""
+        foot, above = self.wanted[ankle], self._before(ankle)
+        own = self._turns(ankle)[0]
+        axes = np.concatenate([own, self._turns(subtalar)[0]])
+        self.wanted[subtalar] = foot
+        handed = np.linalg.det(axes) if len(axes) == 3 else 0.0
+        if abs(handed) < 0.5:
+            return
+        last = np.einsum("ki,tji,tjl,l->tk", axes, above, foot, axes[2])  # the last axis, as turned by two
+        outer = np.arctan2(-handed * last[:, 1], last[:, 2])
+        inner = np.arctan2(handed * last[:, 0], np.hypot(last[:, 1], last[:, 2]))
+        self.wanted[ankle] = above @ aiming.product(own, np.stack([outer, inner], axis=1))
 
     def _unit(self) -> float:
         """Metres of the body for one unit of the source."""
