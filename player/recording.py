@@ -59,7 +59,7 @@ def render(
     "three-quarter", "profile", "body", or None for the one that suits the content. For a picture: frame,
     its position in the animation (negative from the end), or time in seconds; by default the first frame.
     For a film: fps (by default the animation's own rate), and start and end in seconds; audio: a file whose
-    sound goes with an MP4; its beginning belongs to time 0 of the animation. transparent: PNG without a
+    sound goes with an MP4; it begins with the animation's first frame. transparent: PNG without a
     background, opaque only where something is. replace: numbered pictures that exist may be overwritten.
     progress: called with (done, total) frames.
 
@@ -143,7 +143,9 @@ def record(
             sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
             recorder = Recorder.into(sink, path, (width, height), rate)
         else:
-            recorder = Recorder(path, (width, height), rate=rate, audio=audio, audio_start=first)
+            recorder = Recorder(
+                path, (width, height), rate=rate, audio=audio, audio_start=first - shown.start
+            )
         stack.enter_context(recorder)
         stack.enter_context(_background(shown, clear=transparent))
         samples = PICTURE_SAMPLES if transparent else 0
