@@ -42,6 +42,7 @@ class Transport:
     ) -> None:
         self._timeline = timeline
         self._clock = clock
+        self._latency = 0.0
         self._loop = loop
         self._speed = 1.0
         self._playing = False
@@ -119,7 +120,7 @@ class Transport:
         if (here >= self._last_time() and not self._timeline.growing) or here == self._mark_out:
             here = self._low()
         self._playing = True
-        self._move(here)
+        self._move(here, later=True)
 
     def pause(self) -> None:
         """Stop here, without jumping anywhere."""
@@ -145,7 +146,7 @@ class Transport:
         if not math.isfinite(time):
             raise ValueError(f"cannot seek to {time} seconds")
         self._settle()
-        self._move(min(max(time, self.start), self.end))
+        self._move(min(max(time, self.start), self.end), later=True)
 
     def seek_share(self, share: float) -> None:
         """Go to a share of the whole, 0 the start, 1 the last frame."""
@@ -252,11 +253,16 @@ class Transport:
     def interpolate(self, interpolate: bool) -> None:
         self._timeline.interpolate = bool(interpolate)
 
-    def use_clock(self, clock: Callable[[], float]) -> None:
-        """Follow another clock from now on, without a jump."""
+    def use_clock(self, clock: Callable[[], float] = wall.monotonic, latency: float = 0.0) -> None:
+        """Follow another clock from now on, without a jump.
+
+        latency: seconds that playing waits before it starts, here or elsewhere, so that sound which a
+        device still has to be given begins with the picture and whole.
+        """
         here = self.time
         self._clock = clock
-        self._move(here)
+        self._latency = latency
+        self._motion = self._motion_from(clock(), here)
 
     # ---- for people
 
@@ -316,8 +322,9 @@ class Transport:
             loop=self._loop and (inside or not self._timeline.growing),
         )
 
-    def _move(self, here: float) -> None:
-        self._motion = self._motion_from(self._clock(), here)
+    def _move(self, here: float, *, later: bool = False) -> None:
+        now = self._clock()
+        self._motion = self._motion_from(now + self._latency if later else max(now, self._motion.since), here)
 
     def _settle(self) -> Motion:
         """Deal with an end that has been passed, and with frames that have arrived."""

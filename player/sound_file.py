@@ -1,0 +1,200 @@
+"""Any stretch of an audio file, decoded when it is asked for: an hour of sound needs no hour's memory."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import DisplayError, FbaWarning, FormatError
+from player.whole import PathLike
+
+Int16 = npt.NDArray[np.int16]
+
+CHANNELS = 2
+RATES = (8000, 192_000)
+"""Sound outside these is resampled to `USUAL_RATE`."""
+USUAL_RATE = 48_000
+RUN_UP = 0.5
+"""Seconds decoded before the place that is wanted: MP3 and AAC frames need the ones before them."""
+GAP = 0.02
+"""Seconds by which a file's own times may leave its count of samples before they are believed."""
+MOST_AT_ONCE = 1 << 24
+"""Samples; one piece of a file that decodes to more is damaged."""
+
+
+class SoundFile:
+    """The first sound of an audio or video file, as stereo samples at one rate.
+
+    path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rate: samples a second, the file's own
+    where devices play it. duration: seconds as the file says itself, None where it does not. Mono goes to
+    both sides; more than two channels are mixed down.
+
+    Not for several threads at once. Raises FormatError where it cannot be read or holds no sound.
+    """
+
+    _container: Any = None
+    _stream: Any = None
+
+    def __init__(self, path: PathLike) -> None:
+        try:
+            import av
+        except ImportError as error:
+            raise DisplayError(
+                f"sound needs the Python package av (PyAV), which cannot be imported: {error}. "
+                "Install it with: pip install av"
+            ) from error
+        self._av = av
+        self.path = Path(path)
+        self._damaged = False
+        self._open()
+        self.rate = self._rate(int(self._stream.rate or 0))
+        length, base = self._stream.duration, self._stream.time_base
+        whole = self._container.duration
+        if length is None or base is None:
+            self.duration = None if whole is None else max(float(whole / av.time_base), 0.0)
+        else:
+            self.duration = max(float(length * base), 0.0)
+        self._first = 0  # sample that the first part since the last seek begins with
+        self._parts: Iterator[Int16] = iter(())
+        self._next: int | None = None  # sample that the next part begins with
+        self._rest: Int16 = np.zeros((0, CHANNELS), dtype=np.int16)
+        if not len(self.read(0, 1)):
+            self.close()
+            raise FormatError("holds no sound that can be decoded", path=path)
+
+    def read(self, start: int, count: int) -> Int16:
+        """Samples int16 (count, 2) from a sample on; fewer, or none, where the sound ends."""
+        start, missing = max(start, 0), max(count, 0)
+        at = self._next
+        if at is None or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP * self.rate:
+            at = self._seek(start)
+        found: list[Int16] = []
+        while missing > 0:
+            self._rest = self._rest[max(start - at + len(self._rest), 0) :]
+            if not len(self._rest):
+                part = next(self._parts, None)
+                if part is None:
+                    break
+                self._rest, at = part, at + len(part)
+                continue
+            taken = self._rest[:missing]
+            self._rest = self._rest[len(taken) :]
+            found.append(taken)
+            start, missing = start + len(taken), missing - len(taken)
+        self._next = at
+        return np.concatenate([np.zeros((0, CHANNELS), dtype=np.int16), *found])
+
+    def close(self) -> None:
+        """Close the file; safe to call twice."""
+        self._parts = iter(())
+        if self._container is not None:
+            self._container.close()
+
+    def __enter__(self) -> SoundFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _open(self) -> None:
+        av = self._av
+        try:
+            if not self.path.stat().st_size:
+                raise FormatError("is empty (0 bytes), not a sound file", path=self.path)
+            if self._container is not None:
+                self._container.close()
+            self._container = av.open(str(self.path))
+        except (av.error.FFmpegError, OSError) as error:
+            if isinstance(error, FormatError):
+                raise
+            reason = getattr(error, "strerror", None) or error
+            raise FormatError(f"cannot be read as sound: {reason}", path=self.path) from error
+        if not self._container.streams.audio:
+            self._container.close()
+            raise FormatError("holds no sound", path=self.path)
+        self._stream = self._container.streams.audio[0]
+
+    def _rate(self, rate: int) -> int:
+        if rate < 1:
+            raise FormatError(f"says {rate} samples a second", path=self.path)
+        return rate if RATES[0] <= rate <= RATES[1] else USUAL_RATE
+
+    def _seek(self, start: int) -> int:
+        """Let `_parts` begin at or before a sample; the one it begins with."""
+        self._rest = self._rest[:0]
+        before = max(start / self.rate - RUN_UP, 0.0)
+        stream = self._stream
+        if self._next is not None or before > 0:  # not for a file that has just been opened
+            try:
+                offset = round(before / stream.time_base) + (stream.start_time or 0)
+                self._container.seek(offset, stream=stream)
+            except (self._av.error.FFmpegError, OverflowError):
+                self._open()  # it cannot seek: from its beginning
+        self._first = start
+        self._parts = self._decoded()
+        self._rest = next(self._parts, self._rest)
+        return self._first + len(self._rest)
+
+    def _decoded(self) -> Iterator[Int16]:
+        """Parts (N, 2) one after the other from where the container is; the first one's place is `_first`."""
+        stream = self._stream
+        sides = 1 if stream.channels == 1 else CHANNELS  # mixing would make mono softer
+        layout = "mono" if sides == 1 else "stereo"
+        resampler = self._av.AudioResampler(format="s16", layout=layout, rate=self.rate)
+        begun, at = stream.start_time or 0, None
+        for frame in self._frames():
+            told = None
+            if frame.pts is not None:
+                told = round(float((frame.pts - begun) * frame.time_base) * self.rate)
+            if at is None:
+                at = self._first = told or 0
+            elif told is not None and GAP * self.rate < told - at < MOST_AT_ONCE:
+                yield np.zeros((told - at, CHANNELS), dtype=np.int16)
+                at = told
+            frame.pts = None
+            for part in _parts(resampler, frame, sides):
+                at += len(part)
+                yield part
+        if at is not None:
+            yield from _parts(resampler, None, sides)
+
+    def _frames(self) -> Iterator[Any]:
+        """Decoded frames; what is damaged is left out, with a warning the first time."""
+        error_type = self._av.error.FFmpegError
+        packets = self._container.demux(self._stream)
+        while True:
+            try:
+                packet = next(packets, None)
+            except error_type as error:
+                self._warn(error)
+                return
+            if packet is None:
+                return
+            try:
+                frames = packet.decode()
+            except error_type as error:
+                if not isinstance(error, EOFError):
+                    self._warn(error)
+                continue
+            for frame in frames:
+                if 0 < frame.samples <= MOST_AT_ONCE:
+                    yield frame
+
+    def _warn(self, error: Exception) -> None:
+        if not self._damaged:
+            self._damaged = True
+            warnings.warn(
+                f"{self.path}: part of the sound is damaged and left out: {error}", FbaWarning, stacklevel=2
+            )
+
+
+def _parts(resampler: Any, frame: Any, sides: int) -> Iterator[Int16]:
+    """A decoded frame as samples (N, 2)."""
+    for piece in resampler.resample(frame):
+        samples = np.asarray(piece.to_ndarray(), dtype=np.int16).reshape(-1, sides)
+        yield np.broadcast_to(samples, (len(samples), CHANNELS))
