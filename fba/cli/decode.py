@@ -1,15 +1,20 @@
-"""`fba decode`: FBA streams to FAP, BAP and EPF files."""
+"""`fba decode`: FBA streams to FAP, BAP and EPF files, and to files that other programs open."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from fba.animation import Animation
-from fba.cli import options
+from fba.cli import options, writer_options
 from fba.errors import BitstreamError
+
+if TYPE_CHECKING:
+    from fba.codec import PlaneSettings
+    from fba.formats.registry import Format
 
 _FOLDER_OR_FILE = click.Path(path_type=Path)
 
@@ -19,7 +24,10 @@ _FOLDER_OR_FILE = click.Path(path_type=Path)
         "fba decode talk.fba --fap talk.fap",
         "fba decode both.fba --fap face.fap --bap body.bap",
         "fba decode talk.fba --fap talk.fap --epf talk.epf    # encode --epf makes the same bytes again",
+        "fba decode both.fba -o person.glb",
+        "fba decode walk.fba -o walk.bvh --joints moving",
         "fba decode archive/*.fba --fap decoded/",
+        "fba decode archive/*.fba -o decoded/ --to glb",
     )
 )
 @click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=options.EXISTING)
@@ -30,6 +38,15 @@ _FOLDER_OR_FILE = click.Path(path_type=Path)
 @click.option(
     "--epf", type=_FOLDER_OR_FILE, metavar="OUT.epf", help="How it was coded, for fba encode --epf; likewise."
 )
+@click.option(
+    "-o",
+    "--output",
+    type=_FOLDER_OR_FILE,
+    metavar="OUT.bvh|OUT.glb",
+    help="A file for other programs, its suffix says which; likewise.",
+)
+@click.option("--to", metavar="FORMAT", help="Format of --output, where its suffix does not say it.")
+@writer_options.writer_options
 @options.bap_steps_option
 @options.salvage_option
 @options.json_option
@@ -38,18 +55,22 @@ def command(
     fap: Path | None,
     bap: Path | None,
     epf: Path | None,
+    output: Path | None,
+    to: str | None,
     bap_steps: str,
     salvage: bool,
     as_json: bool,
+    **given: Any,
 ) -> None:
-    """Decode FBA streams to ASCII FAP and BAP files, and to EPF files that say how they were coded."""
-    targets = {".fap": fap, ".bap": bap, ".epf": epf}
-    if not any(targets.values()):
-        raise click.UsageError("say what to write: --fap, --bap, --epf")
+    """Decode FBA streams: to ASCII FAP and BAP files, to EPF files that say how they were coded, and to BVH
+    and glTF for other programs."""
+    targets = _targets({"--fap": fap, "--bap": bap, "--epf": epf}, output, to, given)
     several = len(inputs) > 1
-    for suffix, target in targets.items():
-        if target is not None and several and not target.is_dir():
-            raise click.UsageError(f"several inputs need a folder for --{suffix[1:]}, and {target} is none")
+    for target in targets:
+        if several and not target.place.is_dir():
+            raise click.UsageError(
+                f"several inputs need a folder for {target.flag}, and {target.place} is none"
+            )
     reports = []
     with options.progress("decoding", len(inputs)) as step:
         for path in inputs:
@@ -62,36 +83,96 @@ def command(
         click.echo(f"{report['input']}: {report['frames']} frames to {', '.join(report['written'])}")
 
 
-def _decode(path: Path, targets: dict[str, Path | None], *, bap_steps: str, salvage: bool) -> dict[str, Any]:
-    from fba.codec import Decoder, PlaneSettings, decode
+@dataclass(frozen=True)
+class _Target:
+    """flag: as given. place: a file, or a folder. suffix: of files in a folder. writing: None for EPF.
+    settings: for its writer."""
+
+    flag: str
+    place: Path
+    suffix: str
+    writing: Format | None
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    def file(self, source: Path) -> Path:
+        """Where the content of a stream goes."""
+        return self.place / f"{source.stem}{self.suffix}" if self.place.is_dir() else self.place
+
+
+def _targets(
+    by_flag: dict[str, Path | None], output: Path | None, to: str | None, given: dict[str, Any]
+) -> list[_Target]:
+    """All files to write; click.UsageError where there are none, or options that fit none."""
+    from fba.formats import writer_for
+
+    targets = []
+    for flag, place in by_flag.items():
+        if place is not None:
+            name = flag.removeprefix("--")
+            writing = None if name == "epf" else writer_for(place, name)
+            targets.append(_Target(flag, place, f".{name}", writing))
+    if output is not None:
+        if output.is_dir() and to is None:
+            raise click.UsageError(f"{output} is a folder; say with --to what to write there, as in --to bvh")
+        writing = writer_for(output, to)
+        if writing.name == "fba":
+            raise click.UsageError(
+                f"{output}: streams are decoded here; fba convert and fba encode write them"
+            )
+        settings = writer_options.settings(output, writing, given)
+        targets.append(_Target("--output", output, writing.suffixes[0], writing, settings))
+    else:
+        lonely = [writer_options.FLAGS.get(name, "--to") for name in given if given[name] is not None]
+        if to is not None or lonely:
+            raise click.UsageError(f"{', '.join(lonely) or '--to'} says how to write --output; give that too")
+    if not targets:
+        raise click.UsageError("say what to write: --fap, --bap, --epf, --output")
+    return targets
+
+
+def _decode(path: Path, targets: list[_Target], *, bap_steps: str, salvage: bool) -> dict[str, Any]:
     from fba.formats import write
     from fba.formats.epf import write_epf
 
-    on_error: Literal["raise", "salvage"] = "salvage" if salvage else "raise"
     with options.input_file(path) as file:
         data = file.read_bytes()
-    settings: list[PlaneSettings] = []
-    if targets[".epf"] is not None:
-        decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
-        frames = decoder.push(data) + decoder.finish()
-        if not frames:
-            raise BitstreamError("the stream holds no plane that can be decoded", plane=0)
-        settings = [frame.plane.settings for frame in frames if frame.plane is not None]
-        animation = Animation.from_frames(frames, name=path.stem)
-    else:
-        decoded = decode(data, bap_steps=bap_steps, on_error=on_error)
-        animation = Animation(decoded.rate, decoded.index, decoded.face, decoded.body, path.stem)
-    for suffix, track in ((".fap", animation.face), (".bap", animation.body)):
-        if targets[suffix] is not None and track is None:
-            raise click.UsageError(f"{path} carries no {suffix[1:].upper()}s; leave --{suffix[1:]} out")
+    animation, settings = _read(data, path.stem, any(t.writing is None for t in targets), bap_steps, salvage)
+    parts = {"face": "FAPs", "body": "BAPs"}
+    for target in targets:
+        held = parts if target.writing is None else target.writing.carries
+        if all(getattr(animation, part) is None for part in held):
+            lacking = " or ".join(parts[part] for part in held)
+            raise click.UsageError(f"{path} carries no {lacking}; leave {target.flag} out")
     written = []
-    for suffix, target in targets.items():
-        if target is None:
-            continue
-        place = target / f"{path.stem}{suffix}" if target.is_dir() else target
-        if suffix == ".epf":
+    for target in targets:
+        place = target.file(path)
+        if target.writing is None:
             write_epf(place, settings)
         else:
-            write(place, animation, format=suffix[1:])
+            # --fap and --bap name what they want of the stream; only --output may lose something unawares
+            wanted = animation if target.flag == "--output" else _only(animation, target.writing.carries)
+            write(place, wanted, format=target.writing.name, **target.settings)
         written.append(str(place))
     return {"input": str(path), "frames": len(animation), "rate": str(animation.rate), "written": written}
+
+
+def _only(animation: Animation, parts: tuple[str, ...]) -> Animation:
+    face, body = animation.face if "face" in parts else None, animation.body if "body" in parts else None
+    return replace(animation, face=face, body=body)
+
+
+def _read(
+    data: bytes, name: str, with_settings: bool, bap_steps: str, salvage: bool
+) -> tuple[Animation, list[PlaneSettings]]:
+    """The animation, and where wanted how each plane was coded."""
+    from fba.codec import Decoder, decode
+
+    on_error: Literal["raise", "salvage"] = "salvage" if salvage else "raise"
+    if not with_settings:
+        return replace(decode(data, bap_steps=bap_steps, on_error=on_error), name=name), []
+    decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
+    frames = decoder.push(data) + decoder.finish()
+    if not frames:
+        raise BitstreamError("the stream holds no plane that can be decoded", plane=0)
+    settings = [frame.plane.settings for frame in frames if frame.plane is not None]
+    return Animation.from_frames(frames, name=name), settings

@@ -15,7 +15,7 @@ from fba.errors import FbaError, FbaWarning
 _COMMANDS = {
     "info": "What a file holds: frames, rate, parameters, bits; every syntax element with --trace.",
     "encode": "Encode FAP, BAP or motion-capture files as an FBA stream.",
-    "decode": "Decode FBA streams to FAP, BAP and EPF files.",
+    "decode": "Decode FBA streams to FAP, BAP, EPF, BVH and glTF files.",
     "convert": "Convert a file into another format.",
     "play": "Play a file in a window.",
     "render": "Render a file to a picture or a video, without a window.",

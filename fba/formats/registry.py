@@ -218,8 +218,9 @@ def probe(data_or_path: bytes | bytearray | memoryview | Path, *, bap_steps: str
 
 
 def _named(name: str) -> Format:
+    wanted = str(name).lower().removeprefix(".")
     for entry in formats():
-        if entry.name == str(name).lower().removeprefix("."):
+        if wanted == entry.name or f".{wanted}" in entry.suffixes:
             return entry
     raise OptionError(f"there is no format {name!r}; known: {', '.join(entry.name for entry in formats())}")
 

@@ -1,0 +1,106 @@
+"""Options of formats that are written, for every subcommand that writes files of other formats than FBA."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options
+
+if TYPE_CHECKING:
+    from fba.formats.registry import Format
+
+UNITS = {"cm": 100.0, "m": 1.0, "mm": 1000.0, "in": 1 / 0.0254}
+"""Lengths in the file for one metre."""
+FLAGS = {
+    "joints": "--joints",
+    "unit": "--unit",
+    "mesh": "--mesh/--no-mesh",
+    "model": "--model",
+    "body": "--body",
+    "axes": "--axes",
+}
+"""How the writers' keywords are given on the command line."""
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def writer_options(command: options.Command) -> options.Command:
+    """Adds the options; the command takes them as keywords and hands them to `settings`."""
+    for option in reversed(
+        (
+            click.option(
+                "--joints",
+                type=click.Choice(["all", "moving"]),
+                help="BVH: all joints of the standard (default), or only what moves, and the limbs.",
+            ),
+            click.option("--unit", type=click.Choice(list(UNITS)), help="BVH: of lengths; default: cm."),
+            click.option(
+                "--mesh/--no-mesh",
+                default=None,
+                help="glTF: the person (default), or the skeleton alone.",
+            ),
+            click.option(
+                "--model",
+                type=click.Path(exists=True, path_type=Path),
+                metavar="FILE",
+                help="glTF: the face; default: the built-in head.",
+            ),
+            click.option(
+                "--body",
+                type=FILE,
+                metavar="FILE.glb",
+                help="glTF: the body; default: the built-in person.",
+            ),
+            click.option(
+                "--axes",
+                type=click.Choice(["iso", "vreng"]),
+                help="BVH, glTF: which way BAPs turn: as the standard says (default), or as in old files.",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def settings(target: Path, writing: Format, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keywords for the writer of a format. given: what the command line says, None where it says nothing.
+
+    Raises click.UsageError for an option that the format does not have, ModelError or FormatError for a
+    model that cannot be read.
+    """
+    said = {name: value for name, value in given.items() if value is not None}
+    for name in said:
+        if name not in writing.write_options:
+            raise click.UsageError(_misplaced(name, target, writing))
+    return {name: _MADE.get(name, _as_it_is)(value) for name, value in said.items()}
+
+
+def _misplaced(name: str, target: Path, writing: Format) -> str:
+    from fba.formats import formats
+
+    takers = [entry.name.upper() for entry in formats() if name in entry.write_options]
+    own = [flag for option, flag in FLAGS.items() if option in writing.write_options]
+    return (
+        f"{FLAGS[name]} is an option for {' and '.join(takers)}, and {target} becomes "
+        f"{writing.name.upper()}, which takes {', '.join(own) or 'none of these options'}"
+    )
+
+
+def _body(path: Path) -> object:
+    from fba.body.model import BodyModel
+
+    return BodyModel.load(path)
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+_MADE: dict[str, Callable[[Any], Any]] = {
+    "unit": UNITS.__getitem__,
+    "model": options.read_model,
+    "body": _body,
+}

@@ -1,0 +1,140 @@
+"""decode --output and convert: files for other programs, and the options of their writers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation
+from fba.body.model import BodyModel
+from fba.gltf import read_gltf
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def stream(tmp_path: Path, face: Animation, body: Animation) -> Path:
+    """Face and body."""
+    path = tmp_path / "both.fba"
+    fba.write(path, Animation(25, np.arange(50), face.face, body.body, "both"), bap_steps="visage")
+    return path
+
+
+def joints(path: Path) -> list[str]:
+    return re.findall(r"(?:ROOT|JOINT) (\w+)", path.read_text())
+
+
+def test_a_stream_becomes_a_person(run: Run, tmp_path: Path, stream: Path) -> None:
+    target = tmp_path / "person.glb"
+    code, out, err = run("decode", stream, "-o", target, "--bap-steps", "visage")
+    assert (code, out, err) == (0, f"{stream}: 50 frames to {target}\n", "")
+    both, back = fba.read(stream, bap_steps="visage"), fba.read(target)
+    assert back.face == both.face
+    assert back.body is not None
+    assert both.body is not None
+    assert np.abs(back.body.values[:, 183] - both.body.values[:, 183]).max() <= 1
+
+
+def test_a_stream_becomes_bvh(run: Run, tmp_path: Path, stream: Path) -> None:
+    target = tmp_path / "all.bvh"
+    code, _, err = run("decode", stream, "-o", target)
+    assert code == 0
+    assert "BVH holds no face; only the body was written" in err
+    assert len(joints(target)) == 87
+    code, _, _ = run("decode", stream, "-o", tmp_path / "few.bvh", "--joints", "moving", "--unit", "m")
+    assert code == 0
+    few = joints(tmp_path / "few.bvh")
+    assert "l_knee" in few
+    assert len(few) < 20
+    hips = [float(line.split()[1]) for line in (target, tmp_path / "few.bvh") for line in heights(line)]
+    assert hips[0] == pytest.approx(100 * hips[1])  # centimetres and metres
+    assert 0.8 < hips[1] < 1.1  # of an adult
+
+
+def heights(path: Path) -> list[str]:
+    """The first line of motion."""
+    lines = path.read_text().splitlines()
+    return [lines[[line.startswith("Frame Time") for line in lines].index(True) + 1]]
+
+
+def test_convert_takes_the_same_options(run: Run, tmp_path: Path, stream: Path) -> None:
+    assert run("convert", stream, tmp_path / "a.bvh", "--joints", "moving")[0] == 0
+    assert len(joints(tmp_path / "a.bvh")) < 20
+    assert run("convert", stream, tmp_path / "a.glb", "--no-mesh")[0] == 0
+    assert read_gltf(tmp_path / "a.glb").meshes == ()
+    assert fba.read(tmp_path / "a.glb").face == fba.read(stream).face
+
+
+def test_another_body_and_axes(run: Run, tmp_path: Path, stream: Path) -> None:
+    person = BodyModel.default()
+    person.save(tmp_path / "body.glb")
+    target = tmp_path / "a.glb"
+    code, _, err = run("convert", stream, target, "--body", tmp_path / "body.glb", "--axes", "vreng")
+    assert (code, err) == (0, "")
+    assert {part.name for part in person.parts if part.kind != "neck"} <= {
+        mesh.name for mesh in read_gltf(target).meshes
+    }
+    code, _, err = run("convert", stream, target, "--model", tmp_path / "body.glb")
+    assert code == 1
+    assert "body.glb" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["-o", "a.glb", "--joints", "moving"],
+            "--joints is an option for BVH, and a.glb becomes GLTF, which takes --mesh/--no-mesh, --model, "
+            "--body, --axes",
+        ),
+        (["-o", "a.bvh", "--no-mesh"], "a.bvh becomes BVH, which takes --joints, --unit, --axes"),
+        (["-o", "a.fap", "--axes", "vreng"], "BVH and GLTF, and a.fap becomes FAP, which takes none"),
+        (["--fap", "a.fap", "--unit", "m"], "--unit says how to write --output; give that too"),
+        (["--fap", "a.fap", "--to", "bvh"], "--to says how to write --output"),
+        (["-o", "a.fba"], "fba convert and fba encode write them"),
+        (["-o", "."], "say with --to what to write there"),
+        ([], "--fap, --bap, --epf, --output"),
+    ],
+)
+def test_options_that_do_not_fit(
+    run: Run,
+    tmp_path: Path,
+    stream: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run("decode", stream.name, *arguments)
+    assert code == 2
+    assert message in " ".join(err.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["both.fba"]
+
+
+def test_convert_names_a_misplaced_option(run: Run, tmp_path: Path, stream: Path) -> None:
+    code, _, err = run("convert", stream, tmp_path / "a.bap", "--mesh")
+    assert code == 2
+    assert "--mesh/--no-mesh is an option for GLTF" in err
+    assert not (tmp_path / "a.bap").exists()
+
+
+def test_a_folder_of_files(run: Run, tmp_path: Path, stream: Path, face: Animation) -> None:
+    other = tmp_path / "talk.fba"
+    fba.write(other, face)
+    (tmp_path / "out").mkdir()
+    assert run("decode", stream, other, "-o", tmp_path / "out", "--to", "glb")[0] == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["both.glb", "talk.glb"]
+    code, _, err = run("decode", other, "-o", tmp_path / "talk.bvh", "--fap", tmp_path / "talk.fap")
+    assert code == 2
+    assert "carries no BAPs; leave --output out" in err
+    assert not (tmp_path / "talk.fap").exists()  # nothing is half done
+
+
+def test_only_what_was_asked_for_is_missed(run: Run, tmp_path: Path, stream: Path) -> None:
+    code, _, err = run("decode", stream, "--fap", tmp_path / "a.fap", "--bap", tmp_path / "a.bap")
+    assert (code, err) == (0, "")
