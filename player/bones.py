@@ -21,7 +21,7 @@ RADII = (0.0045, 0.019)
 SPINE_RADIUS = 0.0095
 """Vertebrae are shorter than thick: their length says nothing."""
 JOINT_PER_BONE = 1.22
-HEAD_RADIUS = 0.0085
+HEAD_RADIUS = 0.006
 SPINE = ("vl", "vt", "vc", "sacroiliac", "skullbase")
 
 

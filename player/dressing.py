@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from fba.face.feature_points import names
 from player.bones import Bones, face_pivots
-from player.extras import Colour, Dots, Extras
+from player.extras import Colour, Dots, Extras, Grid
 from player.face import FaceFigure
 from player.ground import body_grid, face_grid, no_shadows
 from player.influence import Influence
@@ -25,9 +25,14 @@ LEFT_OUT = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "br
 UNSHADED = (0.9, 0.85, 0.0, 0.25)
 """The light that reaches everything where nothing casts a shadow."""
 BACKGROUNDS = {"studio": None, "grey": (0.5, 0.5, 0.5), "transparent": (0.5, 0.5, 0.5)}
+"""Colours behind everything; pictures that can be transparent make of the last what it says."""
+HAIRS = ("lash", "brow")
+"""Kinds of parts that are too fine for colours and normals."""
+INSIDE = (*HAIRS, "teeth", "tongue", "mouth", "eye")
+"""Kinds of parts that a body of glass does without."""
 DOT: Colour = (0.98, 0.62, 0.20, 1.0)
 DOT_RADIUS = 3.2
-DOT_LIFT = 0.004
+DOT_LIFT, NAME_LIFT = 0.004, 0.006
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,22 +67,26 @@ class Dressing:
         number = switches["influence"]
         if number is not None:
             paint = self._painter(int(number))
-            view = replace(
-                view, faces=paint.painted(view.faces), meshes=[*view.meshes, *paint.eyes(view.eyes)], eyes=[]
-            )
+            faces = paint.painted([mesh for mesh in view.faces if mesh.shape.kind not in HAIRS])
+            view = replace(view, faces=faces, meshes=[*view.meshes, *paint.eyes(view.eyes)], eyes=[])
             extras = replace(extras, legend=paint.legend)
         lines = []
         if switches["wireframe"]:
             lines.append(self._wires.edges(view.faces, view.meshes, view.eyes, self._scale))
         if switches["normals"]:
-            lines.append(self._wires.normals(view.faces, self._scale))
+            smooth = [mesh for mesh in view.faces if mesh.shape.kind not in HAIRS]
+            lines.append(self._wires.normals(smooth, self._scale))
         if switches["skeleton"] != "off":
-            shells = tuple(view.faces) if switches["skeleton"] == "through" else ()
+            shells = (
+                tuple(mesh for mesh in view.faces if mesh.shape.kind not in INSIDE)
+                if switches["skeleton"] == "through"
+                else ()
+            )
             extras = replace(extras, shells=shells)
             view = replace(view, faces=[], eyes=[], meshes=[], capsules=self._skeleton(posture))
         if switches["grid"]:
             joints = posture.joints
-            grid = face_grid(self._figure.subject) if joints is None else body_grid(joints)
+            grid = self._bust_grid() if joints is None else body_grid(joints)
             extras = replace(extras, grid=grid)
         dots = (self._dots(posture, over=len(view.marks) == 0),) if switches["points"] else ()
         background = BACKGROUNDS[str(switches["background"])]
@@ -95,6 +104,10 @@ class Dressing:
             faces = [replace(mesh, light=light) for mesh, light in zip(view.faces, lit, strict=True)]
             view = replace(view, faces=faces, blobs=no_shadows())
         return view
+
+    def _bust_grid(self) -> Grid:
+        lowest = float(self._figure.model.vertices[:, 1].min())
+        return face_grid(self._figure.subject, lowest, self._scale)
 
     def _painter(self, number: int) -> Influence:
         if self._influence is None or self._influence.fap.number != number:
@@ -122,7 +135,7 @@ class Dressing:
             places.astype(np.float32),
             DOT,
             radius,
-            DOT_LIFT * self._scale,
+            (DOT_LIFT if over else NAME_LIFT) * self._scale,
             self._names,
             ways.astype(np.float32),
         )

@@ -12,7 +12,7 @@ from player.extras import Dots, Extras, Grid, Lines
 from player.placing import directions, places
 from player.programs import load_program, matrix_bytes, set_uniform
 from player.shapes import FaceMesh
-from player.words import SMALLEST, legend_picture, names_picture, placed_names
+from player.words import MOST_NAMES, SMALLEST, legend_picture, names_picture, placed_names
 
 Float64 = npt.NDArray[np.float64]
 
@@ -21,9 +21,26 @@ CROWDED = 7.0
 """Lines shorter than this (pixels) are fainter: a fine mesh is a tint, not a black spot."""
 HIDDEN = 0.2
 """How much of a dot is seen through what hides it."""
-NAME_SIZE = 13
+NAME_SIZE, SMALLEST_NAME = 13, 10
 MARGIN = 14
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
+
+
+def projected(places: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
+    """(N, 2) pixels from the upper left, and (N,) depths 0..1, of places (N, 3); NaN behind the camera.
+
+    matrix: (4, 4), world to clip space.
+    """
+    clip = np.column_stack([places, np.ones(len(places))]) @ matrix.T
+    clip[clip[:, 3] < 1e-6] = np.nan
+    flat = clip[:, :3] / clip[:, 3:]
+    return (flat[:, :2] * (0.5, -0.5) + 0.5) * size, flat[:, 2] * 0.5 + 0.5
+
+
+def _towards(eye: Float64, places: Float64, lift: float) -> Float64:
+    way = eye - places
+    shift: Float64 = way * (lift / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6))
+    return shift
 
 
 class ExtrasRenderer:
@@ -49,9 +66,10 @@ class ExtrasRenderer:
             set_uniform(program, "size", (float(size[0]), float(size[1])))
         scale = max(size[1] / REFERENCE_HEIGHT, 0.5)
         gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
-        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA
         self._draw_shells(extras.shells)
         gl.fbo.depth_mask = False
+        # What covers a pixel here is smooth already: it takes the alpha away, by which the target knows.
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA
         if extras.grid is not None:
             self._draw_grid(extras.grid)
         for lines in extras.lines:
@@ -112,10 +130,10 @@ class ExtrasRenderer:
             arrays.append(gl.vertex_array(self._programs["shell"], content, index_buffer=triangles))
             parts.append(triangles)
         # Depths first, so that only the nearest skin is seen.
-        gl.fbo.color_mask = False, False, False, False
+        gl.blend_func = gl.ZERO, gl.ONE
         for array in arrays:
             array.render()
-        gl.fbo.color_mask = True, True, True, True
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
         gl.depth_func = "<="
         for array in arrays:
             array.render()
@@ -169,20 +187,37 @@ class ExtrasRenderer:
     def _draw_names(
         self, dots: Dots, matrix: Float64, eye: Float64, size: tuple[int, int], scale: float
     ) -> None:
-        pixels = round(NAME_SIZE * scale)
+        pixels = max(round(NAME_SIZE * scale), SMALLEST_NAME)
         key = (dots.names, pixels)
         _, _, boxes = self._words("names", key, lambda: names_picture(dots.names, pixels))
         at = dots.places.astype(np.float64)
-        clip = np.column_stack([at, np.ones(len(at))]) @ matrix.T
-        seen = (clip[:, 3] > 1e-6) & (np.einsum("ij,ij->i", dots.facing, eye - at) >= 0)
-        clip[~seen] = np.nan
-        flat = clip[:, :2] / clip[:, 3:]
-        pixel = (flat * (0.5, -0.5) + 0.5) * size
+        facing = np.einsum("ij,ij->i", dots.facing, eye - at) >= 0
+        pixel, depth = projected(at, matrix, size)
+        nearer = projected(at + _towards(eye, at, dots.lift), matrix, size)[1]
+        inside = facing & np.isfinite(depth) & ((pixel >= 0) & (pixel < size)).all(axis=1)
+        if not 0 < inside.sum() <= MOST_NAMES:
+            return
+        column, row = pixel[inside].astype(int).T
+        inside[inside] = nearer[inside] <= self._depths(size)[size[1] - 1 - row, column]
+        pixel[~inside] = np.nan
         chosen, corners = placed_names(pixel, boxes[:, 2:], dots.radius * scale, size)
         if len(chosen):
             own = boxes[chosen].astype(np.float64)
             whole = np.array(self._textures["names"][1].size * 2, dtype=np.float64)
             self._draw_label("names", np.concatenate([corners, own[:, 2:], own / whole], axis=1))
+
+    def _depths(self, size: tuple[int, int]) -> npt.NDArray[np.float32]:
+        """(H, W) of what is drawn, 0..1, bottom row first."""
+        gl, source, parts = self._gl, self._gl.fbo, []
+        if source.samples:
+            parts = [gl.renderbuffer(size, 4), gl.depth_renderbuffer(size)]
+            parts.append(gl.framebuffer(parts[:1], parts[1]))
+            gl.copy_framebuffer(parts[2], source)
+        data = (parts[2] if parts else source).read(components=1, attachment=-1, dtype="f4")
+        source.use()
+        for part in reversed(parts):
+            part.release()
+        return np.frombuffer(data, dtype=np.float32).reshape(size[1], size[0])
 
     def _words(self, name: str, key: object, make: Any) -> tuple[object, Any, Any]:
         """A texture of words kept under a name, and what `make` gave with it."""

@@ -43,7 +43,8 @@ def body_grid(joints: Float64) -> Grid:
     return Grid(0.0, 1.0, (float(joints[0, 0, 3]), float(joints[0, 2, 3])), REACH)
 
 
-def face_grid(subject: Subject) -> Grid:
-    """Tenths of a metre below a head."""
-    x, y, z = subject.centre
-    return Grid(y - subject.half_height * 0.95, 0.1, (x, z), 0.1 * REACH)
+def face_grid(subject: Subject, lowest: float, scale: float) -> Grid:
+    """Tenths of a metre under a head whose lowest vertex has that y. scale: 1 for an adult's."""
+    x, _, z = subject.centre
+    step = 10.0 ** round(np.log10(max(scale, 1e-9)) - 1)
+    return Grid(lowest, step, (x, z), step * 2 * REACH)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
@@ -21,6 +22,8 @@ UInt8 = npt.NDArray[np.uint8]
 
 SAMPLES = 0
 """Samples a pixel; 0: one, and edges smoothed afterwards."""
+SAMPLES_OF_CLEAR = 4
+"""At least so many where the background is transparent."""
 
 
 class Offscreen:
@@ -53,6 +56,8 @@ class Offscreen:
         self._gl: Any = offscreen_context()
         self._target: Target | None = None
         self._renderer: Renderer | None = None
+        self._exact: Target | None = None
+        self._samples = samples
         try:
             with self._gl:  # current only while it is used: other contexts of this thread go on working
                 self._target = Target(self._gl, self.size, samples)
@@ -63,7 +68,8 @@ class Offscreen:
         self._buffer = bytearray(width * height * 4)
 
     def frame(self, time: float) -> UInt8:
-        """The picture at a time in seconds: uint8 (H, W, 4), sRGB and opaque, top row first.
+        """The picture at a time in seconds: uint8 (H, W, 4), sRGB, top row first; opaque, unless the scene's
+        background is switched to transparent.
 
         The same time gives the same picture. Raises ValueError for a time that is not finite, or after
         `close`.
@@ -89,22 +95,39 @@ class Offscreen:
     def _drawn(self, view: View, camera: Camera) -> UInt8:
         if self._target is None or self._renderer is None:
             raise ValueError("this Offscreen is closed")
+        if self.scene.switches["background"] == "transparent":
+            return cut_out(*self._before_black_and_white(view, camera))
+        return self._read(view, camera, self._target)
+
+    def _before_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
+        """Both by several samples a pixel: a pass that smooths edges overlooks dark ones before black."""
         with self._gl:
-            self._target.begin()
+            if self._exact is None:
+                self._exact = Target(self._gl, self.size, max(self._samples, SAMPLES_OF_CLEAR))
+        views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)]
+        return [self._read(one, camera, self._exact).copy() for one in views]
+
+    def _read(self, view: View, camera: Camera, target: Target) -> UInt8:
+        assert self._renderer is not None
+        with self._gl:
+            target.begin()
             within = self._renderer.draw(view, camera, self.size)
-            self._target.finish(within=within).read_into(self._buffer, components=4)
+            target.finish(within=within).read_into(self._buffer, components=4)
         width, height = self.size
-        return np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)[::-1]
+        pixels = np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)
+        if view.extras is not None:
+            pixels[..., 3] = 255  # extras leave a mark there for the target
+        return pixels[::-1]
 
     def close(self) -> None:
         """Give everything back; safe to call twice."""
         if self._gl is None:
             return
         with self._gl:
-            for part in (self._renderer, self._target):
+            for part in (self._renderer, self._target, self._exact):
                 if part is not None:
                     part.close()
-        self._renderer = self._target = None
+        self._renderer = self._target = self._exact = None
         self._gl.release()
         self._gl = None
 
@@ -117,12 +140,20 @@ class Offscreen:
         self.close()
 
 
+def cut_out(black: UInt8, white: UInt8) -> UInt8:
+    """(H, W, 4) what is in front, with alpha, of the same picture before black and before white."""
+    dark, light = (picture[..., :3].astype(np.float32) for picture in (black, white))
+    opaque = np.clip(1 - (light - dark).mean(axis=2) / 255, 0.0, 1.0)
+    found = np.empty_like(black)
+    found[..., :3] = np.clip(np.round(dark / np.maximum(opaque, 1 / 255)[..., None]), 0, 255)
+    found[..., 3] = np.round(opaque * 255)
+    return found
+
+
 def following(camera: Camera, scene: Scene, time: float) -> Camera:
     """The camera, moved along with a performance that walks away."""
     moved = scene.travel(time)
     if not any(moved):
         return camera
-    from dataclasses import replace
-
     x, y, z = (a + b for a, b in zip(camera.target, moved, strict=True))
     return replace(camera, target=(x, y, z))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -95,6 +96,7 @@ class Renderer:
         self._faces.draw(view.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
+            view = replace(view, faces=[*view.faces, *view.extras.shells])
         return steps(view, matrix, size, self._outliner)
 
     def close(self) -> None:
@@ -132,9 +134,10 @@ class Renderer:
         gl = self._gl
         if view.background is not None:
             gl.clear(*view.background, 1.0, depth=1.0)
+            self._draw_shadows(view)
             return
         target = gl.fbo
-        blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
+        blobs = view.blobs[:MOST_BLOBS]
         middle = np.round(blobs[:, :2].mean(axis=0), 1) if len(blobs) else np.zeros(2)
         key = (size, view.ground, matrix.tobytes(), *middle)
         if self._backdrop is None or self._backdrop[0] != key:
@@ -151,6 +154,12 @@ class Renderer:
         gl.copy_framebuffer(target, self._backdrop[2])
         target.use()
         gl.viewport = (0, 0, *size)
+        self._draw_shadows(view)
+
+    def _draw_shadows(self, view: View) -> None:
+        """Soft shadows on the ground."""
+        gl = self._gl
+        blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
         if view.ground and len(blobs):
             self._blobs.write(blobs)
             gl.enable_only(gl.BLEND)

@@ -22,7 +22,7 @@ FAINT = (186, 192, 200, 255)
 SHADE = (18, 21, 26, 190)
 SMALLEST = 96
 """In pictures lower than this (pixels) there are no words."""
-MOST_NAMES = 26
+MOST_NAMES = 45
 """Where more points are in view, none is named."""
 GAP = 2.0
 

@@ -15,7 +15,12 @@ float brightness(ivec2 at, ivec2 most) {
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     ivec2 most = textureSize(picture, 0) - 1;
-    vec3 centre = texelFetch(picture, at, 0).rgb;
+    vec4 here_ = texelFetch(picture, at, 0);
+    vec3 centre = here_.rgb;
+    if (here_.a < 0.5) {  // lines, dots and words, whose edges are smooth as they are drawn
+        pixel = vec4(centre, 1.0);
+        return;
+    }
     float m = dot(centre, BRIGHTNESS);
     float nw = brightness(at + ivec2(-1, 1), most);
     float ne = brightness(at + ivec2(1, 1), most);
