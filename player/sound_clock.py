@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import time as wall
+from collections import deque
 from collections.abc import Callable
 
 GAIN = 0.05
 """Share of the difference by which each call of the device moves the clock: calls come irregularly."""
-JUMP = 0.1
-"""Seconds of difference beyond which the device has stopped for a while, or been given more at once."""
+WINDOW = 10
+"""Calls of which the most punctual tells: a busy machine answers late, never early."""
+JUMP = 0.05
+"""Seconds of difference, in the most punctual call, beyond which the device has stopped for a while."""
+DRY = 2.0
+"""A device that waits for longer than its latency times this has run dry."""
 
 
 class SoundClock:
@@ -30,6 +35,7 @@ class SoundClock:
         self._samples = 0
         self._lost = 0.0  # seconds for which the device took nothing
         self._called = 0.0
+        self._recent: deque[float] = deque(maxlen=WINDOW)  # by how much calls were early
         self._filling = True
         self._last = -latency
 
@@ -49,10 +55,14 @@ class SoundClock:
         elif self._filling:
             self._filling = now - self._called < 0.5 * samples / self.rate
         if not self._filling:
+            if now - self._called > DRY * self.latency:
+                self._recent.clear()
             here = self._samples / self.rate + self._lost - self.latency
-            off = here - (now + self._ahead)
+            self._recent.append(here - now)
+            off = max(self._recent) - self._ahead
             if off < -JUMP:
                 self._lost -= off
+                self._recent.clear()
             elif off > JUMP:
                 self._ahead += off
             else:

@@ -72,6 +72,15 @@ def test_unpunctual_calls_never_turn_it_back() -> None:
             last = now
 
 
+def test_a_call_that_comes_late_changes_nothing() -> None:
+    device = Device()
+    device.run(2.0)
+    device.now += 0.11  # within what it holds: it plays on, and asks for more at once
+    device.run(2.0)
+    assert device.firsts == pytest.approx([n * PERIOD for n in range(100)])
+    assert device.clock() == pytest.approx(device.heard, abs=0.005)
+
+
 def test_a_device_that_stops_for_a_while_loses_that_sound() -> None:
     device = Device()
     device.run(2.0)
