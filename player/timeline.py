@@ -21,6 +21,10 @@ from fba.parameters import BAP_COUNT
 
 Float64 = npt.NDArray[np.float64]
 
+TURN = 2 * math.pi / 1e-5
+"""A whole turn in units of a BAP."""
+SHIFTS = slice(180, 183)
+"""Columns of the BAPs that are millimetres, not angles."""
 BLOCK = 2048
 KEPT_BLOCKS = 4
 FRAME_ROUNDING = 1e-6
@@ -92,14 +96,25 @@ class Timeline:
         return shown
 
     def baps(self, time: float) -> Float64:
-        """(296,) BAPs shown; zeros where the animation has no body."""
+        """(296,) BAPs shown; zeros where the animation has no body.
+
+        Between two frames each angle goes the shorter way round: one that jumps by a whole turn, as some
+        tools write them, stays where it is. Otherwise a joint's angles go straight, which is what turning
+        it about one axis (slerp) comes to: in real performances, at their own rates, both differ by a degree
+        or two at most, where a wrist turns by 35 degrees from one frame to the next.
+        """
         if self.animation.body is None:
             return np.zeros(BAP_COUNT)
         before, after, share = self.position(time)
         first = self._body(before).astype(np.float64)
         if share == 0.0 or not self.interpolate:
             return first
-        shown: Float64 = first + (self._body(after) - first) * share
+        way = self._body(after) - first
+        if max(way.max(), -way.min()) > TURN / 2:
+            shifts = way[SHIFTS].copy()
+            way -= TURN * np.rint(way / TURN)
+            way[SHIFTS] = shifts
+        shown: Float64 = first + way * share
         return shown
 
     def _face(self, frame: int) -> npt.NDArray[np.float32]:

@@ -58,6 +58,41 @@ def test_body_values_are_kept_and_interpolated() -> None:
     assert timeline.baps((BLOCK + 2.5) / 10)[[4, 180]] == pytest.approx([1500, 80])
 
 
+def test_angles_go_the_shorter_way_round() -> None:
+    half = 314159  # half a turn in units of 1e-5 rad
+    frames = [{1: half - 1000, 2: 1000, 181: 500_000}, {1: 1000 - half, 2: 3000, 181: -500_000}]
+    timeline = Timeline(Animation(Fraction(10), np.arange(2), body=body_track(frames)))
+    shown = timeline.baps(0.05)
+    assert abs(shown[0]) == pytest.approx(half, abs=1)  # over the back, not through 0
+    assert shown[[1, 180]] == pytest.approx([2000, 0])  # small ones and millimetres go straight
+    assert timeline.baps(0.1)[0] == 1000 - half
+    timeline.interpolate = False
+    assert timeline.baps(0.099)[0] == half - 1000
+
+
+@pytest.mark.parametrize("turns", [(9000, -20000, 5000), (150_000, 60_000, -30_000)])
+def test_between_frames_a_joint_turns_about_one_axis_nearly(turns: tuple[int, int, int]) -> None:
+    """Half way between two postures, against the half of the rotation that leads from one to the other."""
+    from scipy.spatial.transform import Rotation
+
+    from fba.body import BapSolver
+    from fba.body.skeleton import Skeleton
+
+    skeleton = Skeleton.default()
+    joint = skeleton.names.index("l_shoulder")
+    numbers = (32, 34, 36)  # l_shoulder: flexion, abduct, twisting
+    frames = [
+        dict(zip(numbers, turns, strict=True)),
+        {n: v + 20_000 for n, v in zip(numbers, turns, strict=True)},
+    ]
+    timeline = Timeline(Animation(Fraction(25), np.arange(2), body=body_track(frames)))
+    poses = BapSolver(skeleton).pose(np.stack([timeline.baps(t) for t in (0.0, 0.02, 0.04)]))
+    first, middle, last = (Rotation.from_matrix(pose[joint, :3, :3]) for pose in poses)
+    half = first * Rotation.from_rotvec((first.inv() * last).as_rotvec() / 2)
+    assert np.degrees((first.inv() * last).magnitude()) > 10
+    assert np.degrees((half.inv() * middle).magnitude()) < 1.5
+
+
 def test_ntsc_frames_are_found_by_their_own_times() -> None:
     timeline = Timeline(face_animation([{3: t} for t in range(2000)], rate="30000/1001"))
     for frame in (0, 1, 777, 1999):
