@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import figure
 import numpy as np
 import numpy.typing as npt
-from cutting import MIDLINE, Cloth, triangulated
+from cutting import MIDLINE, Cloth
+from person import Person
 from scipy.interpolate import PchipInterpolator
 
 from fba.body import Skeleton
@@ -29,10 +29,10 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.040, 0.042, 0.048])
-SEAM = 0.72
-"""How dark the bands along collar and hems are against the cloth."""
-HEM, WAIST = 0.905, 1.01
-TURN_UP = (0.078, 0.30)
+SEAM, INSIDE = 0.72, 0.6
+"""How dark the bands along collar and hems, and what turns in there, are against the cloth."""
+HEM, WAIST = 0.932, 0.982
+TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
 SLEEVE = 0.62
 """How much of the upper arm the sleeve covers."""
@@ -52,23 +52,24 @@ FOLD = 0.003
 
 @dataclass(frozen=True, eq=False)
 class Garment:
-    """vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J). covered (of the figure,): how deep
-    under the garment each vertex of the figure is, metres; negative where it is free."""
+    """vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J). covered (of the person,): how deep
+    under the garment each vertex of the person is, metres; negative where it is free. inside (V,): what
+    turns in at an edge, which is a crease."""
 
     vertices: Float64
     triangles: Int64
     colours: Float64
     weights: Float64
     covered: Float64
+    inside: Bool
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The figure as garments are made from it. arms: (V,), how far the arms move each vertex."""
+    """What garments are made from. weights: (V, J)."""
 
-    surface: figure.Surface
+    person: Person
     weights: Float64
-    arms: Float64
 
 
 def collar(p: Float64) -> Float64:
@@ -92,8 +93,8 @@ def turn_up(p: Float64) -> Float64:
 
 def shirt(body: Body) -> Garment:
     """A T-shirt."""
-    p = body.surface.vertices
-    arms = body.arms > 0.5
+    p = body.person.vertices
+    arms = body.person.arms > 0.5
 
     def way(places: Float64, kind: Float64) -> Float64:
         ends = np.stack([sleeve(places), collar(places), places[:, 1] - HEM], axis=1)
@@ -102,21 +103,26 @@ def shirt(body: Body) -> Garment:
     # On an arm only the sleeve's plane counts: the hem's and the collar's would cut it, and it the trunk.
     kind = np.where(arms, 0, np.where(p[:, 1] > 1.25, 1, 2))
     loose = _smooth((1.30 - p[:, 1]) / 0.25)
-    thick = 0.0046 + 0.0085 * loose * ~arms + 0.006 * arms * _smooth((0.13 - sleeve(p)) / 0.13)
+    thick = 0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * _smooth((0.13 - sleeve(p)) / 0.13)
     return _made(body, way, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
 
 
 def trousers(body: Body) -> Garment:
     """Plain trousers, a little wide below the knee."""
-    p = body.surface.vertices
+    p = body.person.vertices
 
     def way(places: Float64, kind: Float64) -> Float64:
         ends = np.stack([np.full(len(places), -1.0), WAIST - places[:, 1], turn_up(places)], axis=1)
         return np.take_along_axis(ends, kind.astype(int)[:, None], axis=1)[:, 0]
 
-    kind = np.where(body.arms > 0.3, 0, np.where(p[:, 1] > 0.6, 1, 2))
+    kind = np.where(body.person.arms > 0.3, 0, np.where(p[:, 1] > 0.6, 1, 2))
     below = _smooth((0.86 - p[:, 1]) / 0.5)
-    thick = 0.0035 + 0.0105 * below + 0.006 * _smooth((0.35 - p[:, 1]) / 0.25)
+    thick = (
+        0.0010
+        + 0.0025 * _smooth((0.95 - p[:, 1]) / 0.05)
+        + 0.0105 * below
+        + 0.006 * _smooth((0.35 - p[:, 1]) / 0.25)
+    )
     return _made(body, way, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 
 
@@ -135,8 +141,7 @@ def _made(
     thick (V,): how far it is off the skin. slack (V,): how far it smooths hollows over. band: width of a
     darker band along the edges.
     """
-    surface = body.surface
-    triangles = triangulated(surface.vertices, surface.quads)
+    surface, triangles = body.person, body.person.triangles
     normals = vertex_normals(surface.vertices, triangles).astype(np.float64)
     value = way(surface.vertices, kind)
     values = np.stack([value, kind, thick, slack], axis=1)
@@ -162,16 +167,18 @@ def _made(
     fold = vertices[rim] - outward[rim] * (thickness[rim] + FOLD)[:, None]
     loop = cloth.border.tolist()
     strip = [[b, a, place[a]] for a, b in loop] + [[b, place[a], place[b]] for a, b in loop]
+    inner = np.arange(len(cloth.triangles) + len(strip)) >= len(cloth.triangles)
     faces = np.concatenate([cloth.triangles, np.array(strip)])
     weights = np.concatenate([cloth.weights, cloth.weights[rim]])
     everything = np.concatenate([vertices, fold])
     across = np.concatenate([cloth.values[:, 0], cloth.values[rim, 0]])
     shade = np.where(across[faces].max(axis=1) < band + 1e-6, SEAM, 1.0)
+    shade[inner] = INSIDE
     side = np.concatenate([cloth.vertices[:, 0], cloth.vertices[rim, 0]])
     everything, weights, faces, shade = _mirrored(everything, weights, faces, shade, side)
     everything, weights, faces, tone = _parted(everything, weights, faces, shade)
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)
-    return Garment(everything, faces, colours, weights, value)
+    return Garment(everything, faces, colours, weights, value, tone == INSIDE)
 
 
 def _onto(places: Float64, level: float, way: Callable[[Float64], Float64]) -> Float64:

@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 import rig
 import shoes
-from cutting import Cloth, triangulated
+from cutting import Cloth
+from person import Person
 from sculpt import ORIGIN
 
 from fba.body import Skeleton
@@ -35,7 +36,7 @@ TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
 GLOSS = 0.38
 DARKEST = 0.55
 """What is left of a colour where no light of the sky falls."""
-UNDER = 0.03
+UNDER = 0.02
 """Skin stays this far (m) under the edges of clothes."""
 EVENED = 1.46
 """Height above which weights are, metres."""
@@ -58,28 +59,19 @@ class Piece:
 
 def pieces() -> tuple[dict[str, Piece], rig.Rig]:
     """Skin and garments of the body, and its rig."""
-    surface, _ = figure.load()
-    bones = rig.rig()
-    weights = _skull(surface, bones)
-    arm = [
-        n
-        for n, name in enumerate(bones.names)
-        if name[2:].startswith(("shoulder", "elbow", "wrist", "thumb", *FINGERS))
-    ]
-    body = clothes.Body(surface, weights, weights[:, arm].sum(axis=1))
+    person, bones = rig.rig()
+    weights = _skull(person, bones)
+    body = clothes.Body(person, weights)
     made = {
         "shirt": clothes.shirt(body),
         "trousers": clothes.trousers(body),
-        "shoes": shoes.shoes(surface, weights),
+        "shoes": shoes.shoes(person.vertices, weights),
     }
     hidden = np.max([garment.covered for garment in made.values()], axis=0)
-    triangles = triangulated(surface.vertices, surface.quads)
-    normals = vertex_normals(surface.vertices, triangles).astype(np.float64)
-    tile = np.zeros(len(surface.vertices))
-    tile[surface.quads[surface.tile != 0]] = 1.0  # what `figure.head` leaves
-    inside = surface.vertices_of(_inside_head(surface))
-    whole = Cloth(surface.vertices, normals, weights, np.stack([hidden, tile], axis=1), triangles)
-    of_tile = np.tile(surface.tile, 2)
+    triangles, of_tile = person.triangles, person.tile
+    normals = vertex_normals(person.vertices, triangles).astype(np.float64)
+    inside = person.vertices_of(person.inner)
+    whole = Cloth(person.vertices, normals, weights, hidden[:, None], triangles)
     free = (hidden[triangles] < UNDER).any(axis=1)
     colour = np.array([*complexion(), GLOSS])
     skin = whole.kept(free & (of_tile != 0) & ~inside[triangles].any(axis=1))
@@ -91,7 +83,7 @@ def pieces() -> tuple[dict[str, Piece], rig.Rig]:
         kind = "shoe" if name == "shoes" else "cloth"
         found[name] = Piece(
             kind, garment.vertices, garment.triangles, garment.colours, garment.weights,
-            _welded_normals(garment.vertices, garment.triangles),
+            _welded_normals(garment),
         )  # fmt: skip
     found["skin"].colours[:, :3] *= _flushed(found["skin"], bones)
     _shade([piece for piece in found.values() if piece.kind != "neck"])
@@ -130,20 +122,13 @@ def _piece(kind: str, cloth: Cloth, colour: Float64) -> Piece:
     return Piece(kind, cloth.vertices, cloth.triangles, colours, cloth.weights, cloth.normals)
 
 
-def _inside_head(surface: figure.Surface) -> npt.NDArray[np.bool_]:
-    """(F,) quads within the mouth and the eye sockets."""
-    high = (surface.vertices[surface.quads][:, :, 1] > figure.EYE_LEVEL - 0.12).all(axis=1)
-    return (surface.tile == 1) & high
-
-
-def _skull(surface: figure.Surface, bones: rig.Rig) -> Float64:
+def _skull(person: Person, bones: rig.Rig) -> Float64:
     """(V, J) the rig's weights, the head's whole, the step to the neck evened: skin there stretches far."""
     skull = bones.names.index("skullbase")
     share = np.minimum(bones.weights[:, skull] / SKULL_WHOLE, 1.0)
-    head = surface.vertices_of(surface.tile == 0)
-    free = (head & (share < 1) & (surface.vertices[:, 1] > EVENED)).astype(np.float64)
-    triangles = triangulated(surface.vertices, surface.quads)
-    cloth = Cloth(surface.vertices, surface.vertices, bones.weights, bones.weights, triangles)
+    head = person.vertices_of(person.tile == 0)
+    free = (head & (share < 1) & (person.vertices[:, 1] > EVENED)).astype(np.float64)
+    cloth = Cloth(person.vertices, person.vertices, bones.weights, bones.weights, person.triangles)
     share = cloth.smoothed(share[:, None], free, 12)[:, 0]
     weights = bones.weights.copy()
     rest = 1 - weights[:, skull]
@@ -185,10 +170,12 @@ def complexion() -> Float64:
     return np.median(linear * part.colours[neck, :3], axis=0)
 
 
-def _welded_normals(vertices: Float64, triangles: Int64) -> Float64:
-    """(V, 3) normals smooth across vertices in the same place."""
-    _, first, same = np.unique(np.round(vertices, 7), axis=0, return_index=True, return_inverse=True)
-    return vertex_normals(vertices[first], same.ravel()[triangles])[same.ravel()].astype(np.float64)
+def _welded_normals(garment: clothes.Garment) -> Float64:
+    """(V, 3) normals smooth across vertices in the same place, but for the creases of hems."""
+    keys = np.concatenate([np.round(garment.vertices, 7), garment.inside[:, None]], axis=1)
+    _, first, same = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    normals = vertex_normals(garment.vertices[first], same.ravel()[garment.triangles])
+    return normals[same.ravel()].astype(np.float64)
 
 
 def model() -> BodyModel:

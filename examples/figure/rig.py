@@ -10,12 +10,14 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
+import bending
 import figure
 import numpy as np
 import numpy.typing as npt
+from person import Person, person, proportioned
 
 from fba.body import Skeleton
-from fba.body.posture import bind_matrices, chain, shares, unposed, vertebrae
+from fba.body.posture import FINGERS, bind_matrices, chain, shares, unposed, vertebrae
 
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
@@ -23,13 +25,14 @@ SKULLBASE = np.array([0.0, 1.6182, -0.0177])
 """Where the head turns: feature point 7.1 of the built-in head."""
 TORSO = ("Root", "Hips", "Spine1", "Spine2", "Chest")
 NECK = ("Neck1", "Neck2")
+ARM = ("shoulder", "elbow", "wrist", "thumb", *FINGERS)
 HEAD = ("Head", "HeadEnd", "Jaw", "LeftEye", "RightEye")
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
     """names: J joints, parents first. parents (J,). centres (J, 3): in the default posture, metres.
-    bind (J, 4, 4): each joint as the figure is modelled. weights (V, J): rows sum to 1."""
+    bind (J, 4, 4): each joint as the person is modelled. weights (V, J) of its vertices: rows sum to 1."""
 
     names: tuple[str, ...]
     parents: npt.NDArray[np.int64]
@@ -38,14 +41,18 @@ class Rig:
     weights: Float64
 
 
-def rig() -> Rig:
-    """The rig of the whole figure."""
+def rig() -> tuple[Person, Rig]:
+    """The person, and its rig."""
     surface, data = figure.load()
     default = Skeleton.default()
-    places = _places(data, default)
+    given = _places(data, default)
+    coarse = _weights(surface, data, default, given)
+    arm = np.array([name[2:].startswith(ARM) for name in default.names])
+    made = person(surface, dict(zip(default.names, given, strict=True)), coarse[:, arm].sum(axis=1))
+    places = proportioned(given, arm.astype(np.float64))
     bind = bind_matrices(places)
-    centres = unposed(bind).centres
-    return Rig(default.names, default.parents, centres, bind, _weights(surface, data, default, places))
+    weights = bending.evened(made, dict(zip(default.names, places, strict=True)), made.blend @ coarse)
+    return made, Rig(default.names, default.parents, unposed(bind).centres, bind, weights)
 
 
 def _places(data: dict[str, np.ndarray], default: Skeleton) -> Float64:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import figure
 import numpy as np
 import numpy.typing as npt
 from clothes import MIRROR, Garment
@@ -22,25 +21,26 @@ THICK = 0.019
 SPRING = 0.007
 """How far the tip of the sole is off the ground."""
 TOP = 0.115
-COVERED = 0.105
+COVERED = 0.115
 """The foot is wholly inside the shoe, or the trousers, below this."""
 UPPER = (0.0, 0.10, 0.22, 0.36, 0.50, 0.64, 0.76, 0.86, 0.94, 1.0)
 """Where along its way from the sole to the ankle the upper has its rings."""
 
 
-def shoes(surface: figure.Surface, weights: Float64) -> Garment:
-    """Both shoes, for the figure as modelled. weights (V, J)."""
-    left = surface.vertices[:, 0] > 0
-    foot = np.flatnonzero(left & (surface.vertices[:, 1] < TOP + 0.01))
-    vertices, triangles, colours = _shoe(surface.vertices[foot])
-    carried = _carried(vertices, surface.vertices[foot], weights[foot])
+def shoes(body: Float64, weights: Float64) -> Garment:
+    """Both shoes, for vertices (V, 3) of the person as modelled. weights (V, J)."""
+    left = body[:, 0] > 0
+    foot = np.flatnonzero(left & (body[:, 1] < TOP + 0.01))
+    vertices, triangles, colours = _shoe(body[foot])
+    carried = _carried(vertices, body[foot], weights[foot])
     other = vertices * (-1.0, 1.0, 1.0)
     return Garment(
         np.concatenate([vertices, other]),
         np.concatenate([triangles, triangles[:, ::-1] + len(vertices)]),
         np.concatenate([colours, colours]),
         np.concatenate([carried, carried[:, MIRROR]]),
-        np.where(surface.vertices[:, 1] < TOP + 0.01, COVERED - surface.vertices[:, 1], -1.0),
+        np.where(body[:, 1] < TOP + 0.01, COVERED - body[:, 1], -1.0),
+        np.zeros(2 * len(vertices), dtype=bool),
     )
 
 

@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import numpy.typing as npt
 
+from fba.body.girdle import girdle
 from fba.body.rings import rings
 from fba.body.skeleton import Skeleton
 from fba.body.twisting import twists
@@ -58,6 +59,7 @@ class Skinner:
         self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
         self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
         self._twists = twists(skeleton, bind, self._modelled, self._joints, self._weights)
+        self._girdle = girdle(skeleton, bind)
         self._wrung = self._vertices.copy()
         faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
         self._around, self._numbers = rings(self._modelled, self._upright_modelled, faces)
@@ -129,6 +131,7 @@ class Skinner:
                         *mesh,
                         self._scratch,
                         self._twists,
+                        self._girdle,
                         self._wrung,
                         placed[part],
                         turned[part],

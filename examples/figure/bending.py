@@ -1,0 +1,95 @@
+"""How the joints of limbs share the skin about them: in what way it bends."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from cutting import Cloth
+from person import Person
+
+from fba.body import Skeleton
+
+Float64 = npt.NDArray[np.float64]
+
+HINGES = (
+    ("?_shoulder", "?_elbow", "?_wrist", (0.0, 0.0, 1.0), 0.040, 0.046),
+    ("?_elbow", "?_wrist", "?_middle1", (0.0, 0.0, 1.0), 0.040, 0.040),
+    ("?_hip", "?_knee", "?_ankle", (0.0, 0.0, -1.0), 0.060, 0.070),
+)
+"""Upper joint, the one that bends, the next; the side that folds; over what way (m) to both sides of it the
+skin changes from one to the other, on the side that folds and on that which stretches."""
+LIMB = 0.06
+"""Metres from the bone to the skin, about."""
+ARMHOLE = (0.055, 0.060)
+"""Metres to both sides of where a sleeve is set in, over which skin changes from trunk to arm: at the armpit,
+and at the top."""
+SET = (-0.005, 0.030)
+"""Metres out from the shoulder where that is."""
+BEHIND = 0.022
+"""How much further out it is at the back of the armpit, which an arm in front would carry downwards."""
+ARMPIT = (-0.18, -0.09)
+"""Heights from the shoulder between which the side of the trunk comes to go with the arm at all."""
+EASED = 10
+"""How often the weights of trunk, arms and legs are drawn to those of their neighbours."""
+
+
+def evened(person: Person, places: dict[str, Float64], weights: Float64) -> Float64:
+    """(V, J) weights, with those about the limbs' joints laid anew. places: joints by name."""
+    weights = weights.copy()
+    _shoulders(person, places, weights)
+    number = {name: n for n, name in enumerate(Skeleton.default().names)}
+    for upper, joint, lower, inside, fold, stretch in HINGES:
+        for side in "lr":
+            above, middle, below = (name.replace("?", side) for name in (upper, joint, lower))
+            bones = [places[middle] - places[above], places[below] - places[middle]]
+            along = sum(bone / np.linalg.norm(bone) for bone in bones)
+            along = along / np.linalg.norm(along)
+            away = person.vertices - places[middle]
+            turned = np.clip(away @ np.array(inside) / LIMB, -1.0, 1.0) / 2 + 0.5
+            reach = stretch + (fold - stretch) * turned
+            share = _smooth(away @ along / (2 * reach) + 0.5)
+            both = weights[:, number[above]] + weights[:, number[middle]]
+            weights[:, number[middle]] = both * share
+            weights[:, number[above]] = both * (1 - share)
+    body = np.linalg.norm(person.vertices[:, None] - [places[f"{s}_wrist"] for s in "lr"], axis=2).min(axis=1)
+    free = _smooth((body - 0.12) / 0.08) * _smooth((1.45 - person.vertices[:, 1]) / 0.06)
+    free *= _smooth((person.vertices[:, 1] - 0.14) / 0.06)
+    mesh = Cloth(person.vertices, person.vertices, weights, weights, person.triangles)
+    return mesh.smoothed(weights, free, EASED)
+
+
+def _shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> None:
+    """Skin about the shoulders: as a sleeve is set in, in an upright plane from armpit to its top."""
+    names = Skeleton.default().names
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        joint = places[f"{side}_shoulder"]
+        away = (person.vertices - joint) * (sign, 1.0, 1.0)
+        high = _smooth((away[:, 1] - ARMPIT[0]) / (ARMPIT[1] - ARMPIT[0]))
+        top = _smooth((away[:, 1] + 0.05) / 0.10)
+        reach = ARMHOLE[0] + (ARMHOLE[1] - ARMHOLE[0]) * top
+        behind = _smooth(-away[:, 2] / 0.05) * (1 - top)
+        out = away[:, 0] - SET[0] - (SET[1] - SET[0]) * top - BEHIND * behind
+        share = _smooth(out / (2 * reach) + 0.5) * np.maximum(high, _smooth(person.arms))
+        arm = names.index(f"{side}_shoulder")
+        rest = [n for n, name in enumerate(names) if not _of_arm(name, side)]
+        near = (away[:, 1] > ARMPIT[0]) & (away[:, 0] < 0.12) & (away[:, 0] > -0.12)
+        trunk = weights[:, rest].sum(axis=1)
+        girdle = names.index(f"{side}_acromioclavicular")
+        lone = near & (trunk < 1e-3)
+        weights[lone, girdle] = trunk[lone] = 1.0
+        others = weights[:, [n for n, name in enumerate(names) if _of_arm(name, side) and n != arm]].sum(
+            axis=1
+        )
+        share = np.maximum(share - others, 0.0)
+        keep = np.where(near, (1 - share - others) / np.maximum(trunk, 1e-9), 1.0)
+        weights[:, rest] *= keep[:, None]
+        weights[near, arm] = share[near]
+
+
+def _of_arm(name: str, side: str) -> bool:
+    return name[:2] == f"{side}_" and name[2:].startswith(("shoulder", "elbow", "wrist"))
+
+
+def _smooth(value: Float64) -> Float64:
+    t = np.clip(value, 0.0, 1.0)
+    return t * t * (3 - 2 * t)
