@@ -78,6 +78,18 @@ class Camera:
         moved = np.array(self.target) + (axes[0] * right + axes[1] * up) * size
         return replace(self, target=(float(moved[0]), float(moved[1]), float(moved[2])))
 
+    def between(self, other: Camera, share: float) -> Camera:
+        """A camera on the way to another, share 0 here and 1 there: the shorter way round."""
+        turn = (other.yaw - self.yaw + 180.0) % 360.0 - 180.0
+        x, y, z = (a + (b - a) * share for a, b in zip(self.target, other.target, strict=True))
+        return Camera(
+            target=(x, y, z),
+            yaw=(self.yaw + turn * share + 180.0) % 360.0 - 180.0,
+            pitch=self.pitch + (other.pitch - self.pitch) * share,
+            distance=self.distance * (other.distance / self.distance) ** share,
+            field_of_view=self.field_of_view + (other.field_of_view - self.field_of_view) * share,
+        )
+
     @property
     def eye(self) -> Float64:
         """(3,) where the camera stands."""

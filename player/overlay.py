@@ -1,4 +1,4 @@
-"""Text and timeline over the picture, drawn by Pillow and shown as textures."""
+"""The plain timeline and help, where there is no imgui: drawn by Pillow and shown as textures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from player.controls import BAR_HEIGHT, HELP, Controls
+from player.controls import BAR_HEIGHT, Controls
+from player.ui.keys import keys
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -36,18 +37,19 @@ class Overlay:
 
     def draw(self, controls: Controls) -> None:
         """Timeline and status, and the help where it is wanted."""
-        gl, (width, height) = self._gl, controls.size
+        session = controls.session
+        gl, (width, height) = self._gl, session.size
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA
         bar = bar_picture(controls)
-        self._show("bar", None, bar, 0, height - bar.height, controls.size)
-        if controls.help:
-            key = (controls.scale,)
+        self._show("bar", None, bar, 0, height - bar.height, session.size)
+        if "help" in session.open:
+            key = (session.scale,)
             kept = self._textures.get("help")
-            panel = None if kept is not None and kept[0] == key else help_picture(controls.scale)
+            panel = None if kept is not None and kept[0] == key else help_picture(session.scale)
             wide, high = panel.size if panel is not None else kept[1].size  # type: ignore[index]
             self._show(
-                "help", key, panel, max((width - wide) // 2, 0), max((height - high) // 2, 0), controls.size
+                "help", key, panel, max((width - wide) // 2, 0), max((height - high) // 2, 0), session.size
             )
 
     def close(self) -> None:
@@ -83,13 +85,13 @@ def bar_picture(controls: Controls) -> Image:
     """The strip at the bottom: timeline above, status text below."""
     from PIL import Image, ImageDraw
 
-    scale = controls.scale
-    width, height = max(controls.size[0], 1), max(round(BAR_HEIGHT * scale), 1)
+    session = controls.session
+    scale, transport = session.scale, session.transport
+    width, height = max(session.size[0], 1), max(round(BAR_HEIGHT * scale), 1)
     picture = Image.new("RGBA", (width, height), SHADE)
     draw = ImageDraw.Draw(picture)
     low, high = controls.bar()
     middle, half = 15 * scale, 3 * scale
-    transport = controls.transport
     at = low + (high - low) * transport.share
     draw.rounded_rectangle((low, middle - half, high, middle + half), radius=half, fill=TRACK)
     if at > low + 1:
@@ -100,8 +102,8 @@ def bar_picture(controls: Controls) -> Image:
     line = 28 * scale
     state = "playing" if transport.playing else "paused"
     draw.text((low, line), f"{state}   {transport.text()}", font=font, fill=TEXT)
-    hint = controls.scene.animation.name[:60]
-    hint = f"{hint}   F1 help" if hint else "F1 help"
+    words = [notice.text for notice in session.notices()[-1:]] or [session.scene.title[:60]]
+    hint = "   ".join([*filter(None, words), "F1 help"])
     wide = draw.textlength(hint, font=font)
     if wide < (high - low) * 0.45:
         draw.text((high - wide, line), hint, font=font, fill=FAINT)
@@ -112,17 +114,18 @@ def help_picture(scale: float) -> Image:
     """The help panel."""
     from PIL import Image, ImageDraw
 
-    font, row = label_font(15 * scale), 25 * scale
-    width, height = round(470 * scale), round((len(HELP) + 1) * row + 26 * scale)
+    rows = [row for row in keys() if not row.action.startswith("panel") or row.action == "panel help"]
+    font, line = label_font(13 * scale), 19 * scale
+    width, height = round(470 * scale), round((len(rows) + 1) * line + 26 * scale)
     picture = Image.new("RGBA", (width, height), (0, 0, 0, 0))
     draw = ImageDraw.Draw(picture)
     draw.rounded_rectangle((0, 0, width - 1, height - 1), radius=10 * scale, fill=(18, 21, 26, 222))
     y = 16 * scale
     draw.text((24 * scale, y), "Keys and mouse", font=font, fill=ACCENT)
-    for keys, meaning in HELP:
-        y += row
-        draw.text((24 * scale, y), keys, font=font, fill=TEXT)
-        draw.text((150 * scale, y), meaning, font=font, fill=FAINT)
+    for row in rows:
+        y += line
+        draw.text((24 * scale, y), row.shown, font=font, fill=TEXT)
+        draw.text((180 * scale, y), row.does, font=font, fill=FAINT)
     return picture
 
 

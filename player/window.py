@@ -1,35 +1,55 @@
-"""The player's window: glfw for window and input, moderngl for the picture."""
+"""The player's window: glfw for window and input, moderngl for the picture, imgui for the panels."""
 
 from __future__ import annotations
 
+import contextlib
+import os
 import time as wall
+import warnings
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
-from fba.errors import DisplayError
+from fba.errors import DisplayError, FbaWarning
 from player.camera import Camera
 from player.context import import_moderngl
 from player.controls import Controls
-from player.offscreen import following
 from player.overlay import Overlay
 from player.renderer import Renderer
 from player.scene import Scene
+from player.screen import FullScreen
 from player.target import Target
 from player.transport import Transport
+from player.ui.glfw_input import GlfwInput
+from player.ui.keeper import Keeper, pixels_of
+from player.ui.session import Session
+from player.ui.source import Source
+
+if TYPE_CHECKING:
+    from player.showable import Showable
+
+PathLike = str | os.PathLike[str]
 
 HOW_WITHOUT = (
     "On a machine without a display, `fba render FILE -o OUT.mp4` makes a film instead; "
     "with one, check that the variable DISPLAY (or WAYLAND_DISPLAY) is set"
 )
+LOST = (
+    "OpenGL stopped working ({reason}): the graphics driver was reset, or has no memory left. Start the "
+    "player again; a smaller window, or LIBGL_ALWAYS_SOFTWARE=1 (drawing without the graphics card), may help"
+)
 IDLE = 0.05
 """Seconds between looks at the input while nothing moves."""
 FASTEST = 1 / 250
 """Least seconds a picture takes, where the display does not set the pace."""
+SETTLES = 4
+"""Pictures drawn after an input, until panels have settled."""
+SAMPLES = 4
+"""Samples a pixel of a screenshot, which may take its time."""
 
 
 def play(
-    animation: Animation | Scene,
+    animation: Animation | Showable,
     *,
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),
@@ -38,61 +58,95 @@ def play(
     speed: float = 1.0,
     start: float | None = None,
     paused: bool = False,
+    interpolate: bool = True,
+    audio: PathLike | None = None,
+    file: PathLike | None = None,
+    bap_steps: str = "iso",
+    panels: tuple[str, ...] = (),
 ) -> None:
     """Open a window, play an animation in it, and return when it is closed.
 
     title: of the window; the animation's name by default. size: of the window. camera: a `Camera`, the
     name of a preset, or None for the one that suits the content. speed: 0.1 to 4. start: seconds.
-    F1 shows the keys. Motion follows the wall clock: a slow machine shows fewer pictures, not slower ones.
+    interpolate: whether motion is smooth between frames. audio: a sound file to be heard with it; the
+    sound's clock then leads. file: where the animation was read from (with bap_steps), for what the window
+    tells about it. panels: names of those open at the beginning ("file", "view", "camera", "help").
+    F1 shows the keys. Motion follows the clock: a slow machine shows fewer pictures, not slower ones.
 
-    Raises DisplayError where there is no display or no OpenGL 3.3, saying what to do; ValueError for a
-    speed, size or preset that does not exist.
+    Raises DisplayError where there is no display or no OpenGL 3.3, or where it stops working, saying what
+    to do; ValueError for a speed, size or preset that does not exist; FormatError for a sound file that
+    cannot be read.
     """
-    scene = animation if isinstance(animation, Scene) else Scene(animation)
-    with Window(scene, title=title, size=size, camera=camera, loop=loop) as window:
+    scene: Any = animation if hasattr(animation, "timeline") else Scene(animation)
+    source = Source(scene, file, bap_steps=bap_steps)
+    with Window(scene, title=title, size=size, camera=camera, loop=loop, source=source) as window:
         window.transport.set_speed(speed)
-        if start is not None:
-            window.transport.seek(start)
-        if not paused:
-            window.transport.play()
-        window.run()
+        window.transport.interpolate = interpolate
+        window.session.open |= set(panels)
+        with contextlib.ExitStack() as stack:
+            if audio is not None:
+                from player.audio import open_audio
+
+                window.session.audio = open_audio(audio, window.transport)
+                if window.session.audio is not None:
+                    stack.enter_context(window.session.audio)
+            if start is not None:
+                window.transport.seek(start)
+            if not paused:
+                window.transport.play()
+            window.run()
 
 
 class Window:
-    """A window that shows a scene; see `play`. A context manager; one at a time, in the main thread."""
+    """A window that shows a scene; see `play`. A context manager; one at a time, in the main thread.
+
+    panels: False for the plain timeline without panels, which there also is where imgui is missing. folder:
+    where pictures and films go, by default the current one.
+    """
 
     def __init__(
         self,
-        scene: Scene,
+        scene: Showable,
         *,
         title: str | None = None,
         size: tuple[int, int] = (1280, 720),
         camera: Camera | str | None = None,
         loop: bool = True,
+        source: Source | None = None,
+        panels: bool = True,
+        folder: PathLike | None = None,
     ) -> None:
         if size[0] < 1 or size[1] < 1:
             raise ValueError(f"a window must have at least 1x1 pixels, not {size[0]}x{size[1]}")
         chosen = scene.camera(camera, size[0] / size[1]) if isinstance(camera, str) else camera
-        self.scene = scene
-        self.transport = Transport(scene.timeline, loop=loop)
+        timeline: Any = scene.timeline
+        self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=chosen, size=size)
+        self.keeper = Keeper(self.session, folder)
         self.pictures = 0
-        self._title = title or scene.animation.name or "fba"
+        self._title = title or scene.title or "fba"
         self._shown_title = ""
         self._target: Target | None = None
         self._renderer: Renderer | None = None
         self._overlay: Overlay | None = None
+        self._gui: Any = None
         self._gl: Any = None
         self._window: Any = None
         self._problems: list[str] = []
-        self._stale = True
+        self._due = SETTLES
+        self._last = wall.perf_counter()
         self._glfw = self._started_glfw()
         try:
             self._open(size)
-            self.controls = Controls(scene, self.transport, self._framebuffer(), chosen)
-            self._connect()
+            self._furnish(panels)
         except Exception:
             self.close()
             raise
+        self.session.source.look()
+
+    @property
+    def transport(self) -> Transport:
+        """Where the performance is."""
+        return self.session.transport
 
     def run(self) -> None:
         """Show the scene until the window is closed."""
@@ -101,21 +155,24 @@ class Window:
 
     def update(self) -> bool:
         """Handle the input and draw one picture, or wait where nothing moves. False once closed."""
-        glfw = self._glfw
+        glfw, session = self._glfw, self.session
         begun = wall.perf_counter()
-        if self.transport.playing or self._stale:
+        if session.restless or session.source.looking:
+            self._due = max(self._due, 1)
+        if self._due:
             glfw.poll_events()
         else:
             glfw.wait_events_timeout(IDLE)
-        if glfw.window_should_close(self._window) or self.controls.closing:
+        if glfw.window_should_close(self._window) or session.closing:
             return False
-        if not (self.transport.playing or self._stale):
+        if not self._due:
             return True
         size = self._framebuffer()
         if size[0] < 1 or size[1] < 1:  # minimised
             glfw.wait_events_timeout(IDLE)
             return True
-        self._draw(size)
+        self._due -= 1
+        self._picture(size)
         glfw.swap_buffers(self._window)
         self.pictures += 1
         left = FASTEST - (wall.perf_counter() - begun)
@@ -124,18 +181,21 @@ class Window:
         return True
 
     def close(self) -> None:
-        """Close the window and give everything back; safe to call twice."""
-        for part in (self._overlay, self._renderer, self._target):
-            if part is not None:
-                part.close()
-        self._overlay = self._renderer = self._target = None
-        if self._gl is not None:
-            self._gl.release()
-            self._gl = None
-        if self._window is not None:
-            self._glfw.destroy_window(self._window)
-            self._window = None
-        self._glfw.terminate()
+        """Finish a film that is being recorded, close the window, give all back; safe to call twice."""
+        try:
+            self.keeper.close()
+        finally:
+            for part in (self._gui, self._overlay, self._renderer, self._target):
+                if part is not None:
+                    part.close()
+            self._gui = self._overlay = self._renderer = self._target = None
+            if self._gl is not None:
+                self._gl.release()
+                self._gl = None
+            if self._window is not None:
+                self._glfw.destroy_window(self._window)
+                self._window = None
+            self._glfw.terminate()
 
     def __enter__(self) -> Window:
         return self
@@ -188,7 +248,33 @@ class Window:
                 "libgl1 (Debian, Ubuntu: apt-get install libegl1 libgl1), or update the graphics driver"
             ) from error
         self._renderer = Renderer(self._gl)
-        self._overlay = Overlay(self._gl)
+
+    def _furnish(self, panels: bool) -> None:
+        """The panels, or the plain timeline in their place; and who hears the input."""
+        session = self.session
+        session.size, session.scale = self._framebuffer(), self._scale()
+        if panels:
+            try:
+                from player.ui.gui import Gui
+
+                self._gui = Gui(self._gl, session)
+            except (ImportError, RuntimeError) as error:
+                warnings.warn(
+                    f"the window has no panels, as imgui cannot be used: {error}. Install it with: "
+                    "pip install imgui-bundle",
+                    FbaWarning,
+                    stacklevel=4,
+                )
+        if self._gui is None:
+            self.controls = Controls(session, plain=True)
+            self._overlay = Overlay(self._gl)
+        else:
+            self.controls = self._gui.controls
+        self._screen = FullScreen(self._glfw, self._window)
+        self.input = GlfwInput(self._glfw, self._window, session, self.controls, self._gui, self._heard)
+
+    def _heard(self) -> None:
+        self._due = SETTLES
 
     def _reason(self, otherwise: str) -> str:
         return self._problems[-1] if self._problems else otherwise
@@ -197,88 +283,81 @@ class Window:
         width, height = self._glfw.get_framebuffer_size(self._window)
         return int(width), int(height)
 
+    def _scale(self) -> float:
+        """Pixels a point: 1 on plain displays, 2 on dense ones."""
+        return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
+
+    def _picture(self, size: tuple[int, int]) -> None:
+        """Draw; what OpenGL then complains of that cannot be mended ends the player with a word."""
+        try:
+            self._draw(size)
+            problem = self._gl.error
+        except import_moderngl().Error as error:
+            raise DisplayError(LOST.format(reason=" ".join(str(error).split()))) from error
+        if problem in ("GL_OUT_OF_MEMORY", "GL_UNKNOWN_ERROR"):  # a lost context is not known by name
+            raise DisplayError(LOST.format(reason=problem))
+
     def _draw(self, size: tuple[int, int]) -> None:
-        assert self._renderer is not None
-        assert self._overlay is not None
+        session = self.session
+        session.size, session.scale = size, self._scale()
+        session.viewpoint.aspect = size[0] / size[1]
         if self._target is None or self._target.size != size:
             if self._target is not None:
                 self._target.close()
             self._target = Target(self._gl, size, samples=0)
-        controls = self.controls
-        controls.size = size
-        controls.scale = max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5)
-        self._stale = False
-        time = self.transport.time
-        camera = following(controls.camera, self.scene, time)
-        self._target.begin()
-        within = self._renderer.draw(self.scene.at(time), camera, size)
-        self._target.finish(self._gl.screen, within)
+        self._render(self._target, self._gl.screen)
+        self.keeper.picture(lambda: pixels_of(self._gl.screen, size))
+        self._fulfil()
         self._gl.screen.use()
         self._gl.viewport = (0, 0, *size)
-        self._overlay.draw(controls)
+        now = wall.perf_counter()
+        if self._gui is not None:
+            self._gui.draw(now - self._last)
+        elif self._overlay is not None and not session.bare:
+            self._overlay.draw(self.controls)
+        self._last = now
         self._show_title()
 
+    def _render(self, target: Target, into: Any = None) -> Any:
+        """The scene as it is now, without panels; returns the framebuffer that has it."""
+        assert self._renderer is not None
+        time = self.transport.time
+        target.begin()
+        within = self._renderer.draw(self.session.view(time), self.session.camera(time), target.size)
+        return target.finish(into, within)
+
+    def _fulfil(self) -> None:
+        """What the user asked for, which needs the picture or the window."""
+        session = self.session
+        while session.wishes:
+            wish = session.wishes.popleft()
+            if wish in ("screenshot", "transparent"):
+                self._screenshot(transparent=wish == "transparent")
+            elif wish == "record":
+                self.keeper.toggle_recording()
+            elif wish == "fullscreen":
+                self._screen.toggle()
+            self._heard()
+
+    def _screenshot(self, *, transparent: bool) -> None:
+        session = self.session
+        scene = session.scene
+        before = scene.switches["background"]
+        target = Target(self._gl, session.size, SAMPLES)
+        try:
+            if transparent:
+                scene.show("background", "transparent")
+            pixels = pixels_of(self._render(target), session.size)
+        finally:
+            scene.show("background", before)
+            target.close()
+        self.keeper.screenshot(pixels if transparent else pixels[..., :3])
+
     def _show_title(self) -> None:
-        text = f"{self._title} - frame {self.transport.frame + 1} / {self.scene.timeline.frames}"
+        text = f"{self._title} - frame {self.transport.frame + 1} / {self.session.scene.timeline.frames}"
         if text != self._shown_title:
             self._glfw.set_window_title(self._window, text)
             self._shown_title = text
-
-    def _connect(self) -> None:
-        glfw, window = self._glfw, self._window
-        glfw.set_key_callback(window, self._on_key)
-        glfw.set_mouse_button_callback(window, self._on_button)
-        glfw.set_cursor_pos_callback(window, self._on_move)
-        glfw.set_scroll_callback(window, lambda _, x, y: self._act(lambda: self.controls.scroll(y)))
-        glfw.set_framebuffer_size_callback(window, lambda *_: self._act(lambda: None))
-        glfw.set_window_refresh_callback(window, lambda *_: self._act(lambda: None))
-
-    def _act(self, action: Any) -> None:
-        action()
-        self._stale = True
-
-    def _on_key(self, window: Any, key: int, code: int, action: int, modifiers: int) -> None:
-        if action == self._glfw.RELEASE:
-            return
-        name = self._key_name(key, code)
-        held = action == self._glfw.REPEAT
-        if name is None or (held and name not in ("left", "right", "+", "-")):
-            return
-        self._act(lambda: self.controls.key(name))
-
-    def _key_name(self, key: int, code: int) -> str | None:
-        glfw = self._glfw
-        named = {
-            glfw.KEY_SPACE: "space", glfw.KEY_LEFT: "left", glfw.KEY_RIGHT: "right", glfw.KEY_HOME: "home",
-            glfw.KEY_END: "end", glfw.KEY_ESCAPE: "escape", glfw.KEY_F1: "f1", glfw.KEY_KP_ADD: "+",
-            glfw.KEY_KP_SUBTRACT: "-", glfw.KEY_EQUAL: "+", glfw.KEY_MINUS: "-",
-        }  # fmt: skip
-        if key in named:
-            return named[key]
-        text = glfw.get_key_name(key, code)  # what the user's own keyboard layout has there
-        return _text(text).lower() if text else None
-
-    def _on_button(self, window: Any, button: int, action: int, modifiers: int) -> None:
-        glfw = self._glfw
-        names = {
-            glfw.MOUSE_BUTTON_LEFT: "left",
-            glfw.MOUSE_BUTTON_RIGHT: "right",
-            glfw.MOUSE_BUTTON_MIDDLE: "middle",
-        }
-        if action == glfw.PRESS and button in names:
-            x, y = self._pixels(*glfw.get_cursor_pos(window))
-            self._act(lambda: self.controls.press(names[button], x, y))
-        else:
-            self._act(self.controls.release)
-
-    def _on_move(self, window: Any, x: float, y: float) -> None:
-        self._act(lambda: self.controls.move(*self._pixels(x, y)))
-
-    def _pixels(self, x: float, y: float) -> tuple[float, float]:
-        """Window units to pixels of the picture."""
-        wide, high = self._glfw.get_window_size(self._window)
-        size = self._framebuffer()
-        return x * size[0] / max(wide, 1), y * size[1] / max(high, 1)
 
 
 def _text(value: bytes | str) -> str:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import ctypes.util
 import os
+import shutil
+import subprocess
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -45,3 +48,36 @@ def walking() -> Animation:
     bodies = [{32: 9000 * t, 8: 5000 * t, 11: -8000 * t} for t in range(10)]
     faces = [{48: 2000 * t} for t in range(10)]
     return Animation(25, np.arange(10), face_track(faces), body_track(bodies), "walking")  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="session")
+def display() -> Iterator[str]:
+    """The name of a virtual display of its own: skips where Xvfb is missing."""
+    if shutil.which("Xvfb") is None:
+        pytest.skip("Xvfb is not installed (Debian, Ubuntu: apt-get install xvfb)")
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1000x800x24", "-nolisten", "tcp", "-noreset"],
+        pass_fds=[write],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    pipe = os.fdopen(read)
+    try:
+        number = pipe.readline().strip()
+        if not number:
+            pytest.skip("Xvfb did not start")
+        yield f":{number}"
+    finally:
+        pipe.close()
+        server.terminate()
+        server.wait(10)
+
+
+@pytest.fixture
+def on_display(display: str, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Windows of this process open on the virtual display."""
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    return display

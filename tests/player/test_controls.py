@@ -9,85 +9,145 @@ import pytest
 
 from fba.animation import Animation
 from player.camera import Camera, Subject
-from player.controls import HELP, Controls
-from player.scene import Scene
-from player.transport import Transport
+from player.controls import Controls
+from player.scene import SWITCHES, Scene
+from player.ui.keys import by_name
+from player.ui.session import Session
+from player.viewpoint import GLIDE
 
 
 @pytest.fixture
 def controls(talking: Animation) -> Controls:
-    scene = Scene(talking)
-    return Controls(scene, Transport(scene.timeline), (1000, 600))
+    return Controls(Session(Scene(talking), size=(1000, 600)), plain=True)
 
 
 def test_keys_drive_the_transport(controls: Controls) -> None:
+    transport = controls.session.transport
     controls.key("right")
-    assert controls.transport.frame == 1
+    assert transport.frame == 1
     controls.key("end")
-    assert controls.transport.frame == 9
+    assert transport.frame == 9
     controls.key("left")
-    assert controls.transport.frame == 8
+    assert transport.frame == 8
     controls.key("home")
-    assert controls.transport.frame == 0
+    assert transport.frame == 0
     controls.key("space")
-    assert controls.transport.playing
+    assert transport.playing
+    controls.key("s")
+    assert not transport.playing
     controls.key("+")
-    assert controls.transport.speed == 1.25
+    assert transport.speed == 1.25
     controls.key("0")
-    assert controls.transport.speed == 1.0
-    loop = controls.transport.loop
+    assert transport.speed == 1.0
+    loop = transport.loop
     controls.key("l")
-    assert controls.transport.loop is not loop
+    assert transport.loop is not loop
+    controls.key("i")
+    assert not transport.interpolate
 
 
-def test_help_and_closing(controls: Controls) -> None:
-    controls.key("f1")
-    assert controls.help
-    controls.key("f1")
-    assert not controls.help
+def test_keys_set_and_clear_the_marks(controls: Controls) -> None:
+    transport = controls.session.transport
+    transport.seek(0.12)
+    controls.key("[")
+    controls.key("end")
+    controls.key("]")
+    assert (transport.mark_in, transport.mark_out) == (0.12, 0.36)
+    controls.key("\\")
+    assert (transport.mark_in, transport.mark_out) == (None, None)
+
+
+def test_only_some_keys_go_on_while_held(controls: Controls) -> None:
+    assert controls.key("right", held=True)
+    assert controls.session.transport.frame == 1
+    assert not controls.key("space", held=True)
+    assert not controls.session.transport.playing
+    assert not controls.key("w", held=True)
+
+
+def test_panels_closing_and_wishes(controls: Controls) -> None:
+    session = controls.session
+    controls.key("f2")
+    assert session.open == {"file"}
+    controls.key("h")
+    assert session.bare
+    controls.key("f2")  # shows all again, and what was asked for
+    assert not session.bare
+    assert session.open == {"file"}
+    controls.key("f2")
+    assert session.open == set()
+    controls.key("f12")
+    controls.key("ctrl+shift+s")
+    controls.key("ctrl+r")
+    assert list(session.wishes) == ["screenshot", "transparent", "record"]
     assert not controls.key("x")
-    assert not controls.closing
+    assert not session.closing
     controls.key("q")
-    assert controls.closing
+    assert session.closing
 
 
-def test_every_key_of_the_help_means_something(controls: Controls) -> None:
-    for keys, _ in HELP:
-        for name in keys.lower().replace(",", " ").split():
-            if keys not in ("timeline", "drag", "right drag", "wheel"):
-                assert controls.key({"esc": "escape"}.get(name, name)), name
+def test_every_key_of_the_table_does_something(controls: Controls) -> None:
+    for name, row in by_name().items():
+        assert controls.key(name), (name, row.action)
+
+
+def test_no_switch_has_a_key_of_the_window() -> None:
+    taken = [one.name for one in SWITCHES.values() if one.key.lower() in by_name()]
+    assert taken == []
+
+
+def test_keys_of_switches_press_them(controls: Controls) -> None:
+    assert controls.session.scene.switches["wireframe"] is False
+    assert controls.key("w")
+    assert controls.session.scene.switches["wireframe"] is True
+    assert [notice.text for notice in controls.session.notices()] == ["wireframe: on"]
 
 
 def test_the_timeline_seeks_by_click_and_drag(controls: Controls) -> None:
     low, high = controls.bar()
+    session = controls.session
     controls.press("left", (low + high) / 2, 590)
-    assert controls.transport.share == pytest.approx(0.5)
-    camera = controls.camera
+    assert session.transport.share == pytest.approx(0.5)
+    camera = session.viewpoint.camera
     controls.move(high + 200, 100)  # dragged off the bar it still seeks
-    assert controls.transport.share == 1.0
+    assert session.transport.share == 1.0
     controls.release()
     controls.move(low, 595)
-    assert controls.transport.share == 1.0
-    assert controls.camera == camera
+    assert session.transport.share == 1.0
+    assert session.viewpoint.camera == camera
 
 
-def test_the_mouse_moves_the_camera(controls: Controls) -> None:
-    before = controls.camera
+def test_the_mouse_moves_the_camera(talking: Animation) -> None:
+    now = [0.0]
+    session = Session(Scene(talking), size=(1000, 600), clock=lambda: now[0])
+    controls, viewpoint = Controls(session), session.viewpoint
+    before = viewpoint.camera
     controls.press("left", 500, 300)
     controls.move(600, 330)
     controls.release()
-    assert controls.camera.yaw == pytest.approx(before.yaw - 35)
-    assert controls.camera.pitch == pytest.approx(before.pitch + 10.5)
+    assert viewpoint.camera.yaw == pytest.approx(before.yaw - 35)
+    assert viewpoint.camera.pitch == pytest.approx(before.pitch + 10.5)
     controls.press("right", 500, 300)
     controls.move(500, 400)
     controls.release()
-    assert controls.camera.target[1] > before.target[1]
+    assert viewpoint.camera.target[1] > before.target[1]
     controls.scroll(1)
-    assert controls.camera.distance == pytest.approx(before.distance * 0.9)
+    assert viewpoint.camera.distance == pytest.approx(before.distance * 0.9)
     controls.key("r")
-    assert controls.camera == before
+    assert viewpoint.camera != before  # on its way
+    now[0] += GLIDE
+    assert viewpoint.camera == before
     controls.key("3")
-    assert controls.camera.yaw == 90
+    now[0] += GLIDE
+    assert viewpoint.camera.yaw == 90
+
+
+def test_a_drag_from_the_bar_turns_nothing_where_there_are_panels(talking: Animation) -> None:
+    session = Session(Scene(talking), size=(1000, 600))
+    controls = Controls(session)
+    controls.press("left", 500, 590)
+    assert session.transport.time == 0.0
+    assert controls.holding
 
 
 def test_camera_looks_where_it_should() -> None:

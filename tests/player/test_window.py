@@ -1,219 +1,207 @@
-"""The window itself, under a virtual display where Xvfb is installed."""
+"""The window itself, under a virtual display where Xvfb is installed; events handed to its callbacks."""
 
 from __future__ import annotations
 
 import os
-import shutil
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba.errors import DisplayError
+from fba.errors import DisplayError, FbaWarning
 from player.scene import Scene
 from player.window import Window, play
 
 glfw = pytest.importorskip("glfw")
 
 
-@pytest.fixture(scope="module")
-def display() -> Iterator[str]:
-    """A virtual display of its own."""
-    if shutil.which("Xvfb") is None:
-        pytest.skip("Xvfb is not installed (Debian, Ubuntu: apt-get install xvfb)")
-    read, write = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "900x700x24", "-nolisten", "tcp", "-noreset"],
-        pass_fds=[write],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(write)
-    pipe = os.fdopen(read)
+def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int, int] = (640, 480)) -> Window:
+    if panels:
+        pytest.importorskip("imgui_bundle")
     try:
-        number = pipe.readline().strip()
-        if not number:
-            pytest.skip("Xvfb did not start")
-        yield f":{number}"
-    finally:
-        pipe.close()
-        server.terminate()
-        server.wait(10)
-
-
-@pytest.fixture
-def window(display: str, talking: Animation, monkeypatch: pytest.MonkeyPatch) -> Iterator[Window]:
-    monkeypatch.setenv("DISPLAY", display)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    try:
-        opened = Window(Scene(talking), size=(320, 240))
+        return Window(Scene(animation), size=size, panels=panels, folder=folder)
     except DisplayError as error:
         if os.environ.get("CI"):
             raise
         pytest.skip(f"no OpenGL on the virtual display: {error}")
-    with opened:
-        opened.update()
-        yield opened
+
+
+@pytest.fixture
+def window(on_display: str, talking: Animation, tmp_path: Path) -> Iterator[Window]:
+    """A window with panels."""
+    with opened(talking, tmp_path, panels=True) as one:
+        settle(one)
+        yield one
+
+
+@pytest.fixture
+def plain(on_display: str, talking: Animation, tmp_path: Path) -> Iterator[Window]:
+    """A window with the plain timeline."""
+    with opened(talking, tmp_path, panels=False, size=(320, 240)) as one:
+        settle(one)
+        yield one
+
+
+def settle(window: Window) -> None:
+    """Draw what is due."""
+    while window._due and window.update():
+        pass
+
+
+def until(window: Window, reached: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Draw until something holds."""
+    begun = time.monotonic()
+    while not reached():
+        assert time.monotonic() - begun < seconds
+        assert window.update()
 
 
 def shown(window: Window) -> np.ndarray:
-    width, height = window.controls.size
+    width, height = window.session.size
     pixels = np.frombuffer(window._gl.screen.read((0, 0, width, height), components=3, alignment=1), np.uint8)
     return pixels.reshape(height, width, 3)[::-1].astype(int)
 
 
-def press(window: Window, key: int, action: int | None = None) -> None:
-    window._on_key(window._window, key, 0, glfw.PRESS if action is None else action, 0)
+def press(window: Window, key: int, modifiers: int = 0, action: int | None = None) -> None:
+    action = glfw.PRESS if action is None else action
+    window.input.on_key(window._window, key, 0, action, modifiers)
+    settle(window)
 
 
 def test_it_shows_the_face_and_the_timeline(window: Window) -> None:
-    window._stale = True
-    window.update()
+    window._heard()
+    settle(window)
     picture = shown(window)
-    assert picture.shape == (240, 320, 3)
-    assert (picture[80:120, 140:180, 0] - picture[80:120, 140:180, 2]).mean() > 25  # skin
-    bar = picture[190:, :, :]
-    assert bar.mean() < picture[:40].mean()
-    assert (bar.min(axis=2) > 200).sum() > 20  # text and knob
+    assert picture.shape == (480, 640, 3)
+    assert (picture[150:240, 290:350, 0] - picture[150:240, 290:350, 2]).mean() > 25  # skin
+    assert picture[370:].mean() < picture[:120, :100].mean() - 40  # the bar is darker than the studio
+    assert (picture[370:].min(axis=2) > 200).sum() > 60  # text, signs
+
+
+def test_the_plain_one_shows_the_face_and_the_timeline(plain: Window) -> None:
+    picture = shown(plain)
+    assert (picture[80:120, 140:180, 0] - picture[80:120, 140:180, 2]).mean() > 25
+    assert picture[190:].mean() < picture[:40].mean()
+    assert (picture[190:].min(axis=2) > 200).sum() > 20
+    press(plain, glfw.KEY_F1)
+    assert shown(plain)[60:180, 60:260].mean() < picture[60:180, 60:260].mean() - 20
 
 
 def test_keys_step_play_and_close(window: Window) -> None:
     press(window, glfw.KEY_RIGHT)
-    press(window, glfw.KEY_RIGHT, glfw.REPEAT)
+    press(window, glfw.KEY_RIGHT, action=glfw.REPEAT)
     assert window.transport.frame == 2
-    press(window, glfw.KEY_SPACE)
-    press(window, glfw.KEY_SPACE, glfw.REPEAT)  # held keys do not play and pause in turn
+    press(window, glfw.KEY_RIGHT, glfw.MOD_SHIFT)
+    assert window.transport.frame == 9
+    window.input.on_key(window._window, glfw.KEY_SPACE, 0, glfw.PRESS, 0)
+    window.input.on_key(window._window, glfw.KEY_SPACE, 0, glfw.REPEAT, 0)  # held it does not flicker
     assert window.transport.playing
-    press(window, glfw.KEY_SPACE)
-    assert window.update()
+    press(window, glfw.KEY_S)
+    assert not window.transport.playing
     press(window, glfw.KEY_ESCAPE)
     assert not window.update()
 
 
 def test_playing_draws_pictures_and_moves_on(window: Window) -> None:
     window.transport.play()
-    before, begun = window.pictures, time.monotonic()
-    while window.pictures < before + 3 and time.monotonic() - begun < 30:
-        assert window.update()
-    assert window.pictures >= before + 3
+    before = window.pictures
+    until(window, lambda: window.pictures >= before + 3)
     assert window.transport.playing
 
 
 def test_paused_it_draws_only_what_changed(window: Window) -> None:
-    window.update()
     before = window.pictures
     for _ in range(3):
         window.update()
     assert window.pictures == before
     press(window, glfw.KEY_RIGHT)
-    window.update()
-    assert window.pictures == before + 1
+    assert window.pictures > before
 
 
-def test_help_covers_the_middle(window: Window) -> None:
-    window.update()
-    plain = shown(window)
-    press(window, glfw.KEY_F1)
-    window.update()
-    window._stale = True
-    window.update()
-    assert shown(window)[60:180, 60:260].mean() < plain[60:180, 60:260].mean() - 20
-
-
-def test_p_shows_feature_points_and_the_figure_again(window: Window) -> None:
-    window._stale = True
-    window.update()
-    figure = shown(window)
-    press(window, glfw.KEY_P)
-    window.update()
-    points = shown(window)
-    assert window.scene.view == "points"
+def test_p_shows_feature_points_and_the_figure_again(plain: Window) -> None:
+    figure = shown(plain)
+    press(plain, glfw.KEY_P)
+    points = shown(plain)
+    assert plain.session.scene.view == "points"
     skin = (slice(80, 120), slice(140, 180))
     red = [(p[skin][..., 0] - p[skin][..., 2]).mean() for p in (figure, points)]
     assert red[0] > 25
     assert red[1] < 15
-    press(window, glfw.KEY_P)
-    press(window, glfw.KEY_P, glfw.REPEAT)  # held it does not flicker
-    window.update()
-    np.testing.assert_array_equal(shown(window), figure)
+    press(plain, glfw.KEY_P)
+    np.testing.assert_array_equal(shown(plain)[:180], figure[:180])
 
 
-def test_mouse_seeks_and_orbits(window: Window) -> None:
-    controls = window.controls
-    controls.press("left", controls.bar()[1], 235)
-    assert window.transport.frame == 9
-    controls.release()
-    yaw = controls.camera.yaw
-    window._on_move(window._window, 100, 100)
-    controls.press("left", 100, 100)
-    window._on_move(window._window, 140, 100)
-    assert controls.camera.yaw == pytest.approx(yaw - 14)
-    window._on_button(window._window, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
-
-
-def test_resizing_while_playing(window: Window) -> None:
-    window.transport.play()
-    glfw.set_window_size(window._window, 401, 207)
-    begun = time.monotonic()
-    while window.controls.size != (401, 207) and time.monotonic() - begun < 20:
-        assert window.update()
-    assert window.controls.size == (401, 207)
-    picture = shown(window)
-    assert picture.shape == (207, 401, 3)
+def test_resizing_while_playing(plain: Window) -> None:
+    plain.transport.play()
+    glfw.set_window_size(plain._window, 401, 207)
+    until(plain, lambda: plain.session.size == (401, 207))
+    picture = shown(plain)
     assert (
         picture[60:100, 190:210, 0] - picture[60:100, 190:210, 2]
     ).mean() > 25  # the face in the new middle
     assert picture[170:].mean() < picture[:30].mean()  # the timeline at the new bottom
 
 
-@pytest.mark.skipif(shutil.which("xdotool") is None, reason="xdotool is not installed")
-def test_real_key_presses_reach_it(display: str) -> None:
-    code = (
-        "import numpy as np, player\n"
-        "from fba.animation import Animation, FaceTrack\n"
-        "track = FaceTrack(np.zeros((10, 68), int), np.ones((10, 68), bool))\n"
-        "animation = Animation(25, np.arange(10), face=track, name='keys')\n"
-        "player.play(animation, size=(200, 150), paused=True)\n"
-        "print('closed')\n"
-    )
-    environment = {**os.environ, "DISPLAY": display}
-    environment.pop("WAYLAND_DISPLAY", None)
-    child = subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)
+@pytest.mark.parametrize("size", [(1, 1), (40, 400), (400, 30), (200, 150)])
+def test_any_size_is_drawn_with_all_panels_open(
+    on_display: str, talking: Animation, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    with opened(talking, tmp_path, panels=True, size=size) as window:
+        window.session.open |= {"file", "view", "camera", "help"}
+        window.session.say("a word")
+        window._heard()
+        settle(window)
+        assert window.pictures >= 4
+        assert window._gl.error == "GL_NO_ERROR"
 
-    def xdotool(*words: str) -> str:
-        run = subprocess.run(
-            ["xdotool", *words], env=environment, capture_output=True, text=True, check=False
-        )
-        return run.stdout.strip()
 
+def test_minimised_it_waits_and_goes_on(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    window.transport.play()
+    before = window.pictures
+    with monkeypatch.context() as minimised:
+        minimised.setattr(window, "_framebuffer", lambda: (0, 0))
+        for _ in range(3):
+            assert window.update()
+        assert window.pictures == before
+    assert window.update()
+    assert window.pictures == before + 1
+
+
+def test_a_lost_context_ends_with_a_word(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Lost:
+        error = "GL_UNKNOWN_ERROR"
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(held, name)
+
+    held = window._gl
+    with monkeypatch.context() as lost:
+        lost.setattr(window, "_gl", Lost())
+        window._heard()
+        with pytest.raises(DisplayError, match="driver was reset"):
+            window.update()
+
+
+def test_without_imgui_it_plays_and_says_so(
+    on_display: str, talking: Animation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in sys.modules if name.startswith(("imgui_bundle", "player.ui.gui"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "imgui_bundle", None)
     try:
-        begun, found = time.monotonic(), ""
-        while not found and time.monotonic() - begun < 60 and child.poll() is None:
-            time.sleep(0.2)
-            found = xdotool("search", "--name", "^keys")
-        if child.poll() is not None:
-            pytest.skip("no OpenGL on the virtual display")
-        name = found.split()[0]
-        xdotool("windowfocus", "--sync", name)
-        titles = []
-        for key, expected in (("Right", "frame 2 / 10"), ("End", "frame 10 / 10"), ("Home", "frame 1 / 10")):
-            xdotool("key", "--window", "0", key)
-            begun = time.monotonic()
-            while expected not in xdotool("getwindowname", name) and time.monotonic() - begun < 20:
-                time.sleep(0.05)
-            titles.append(xdotool("getwindowname", name))
-            assert expected in titles[-1]
-        xdotool("key", "q")
-        assert child.communicate(timeout=30)[0].strip() == "closed"
-        assert child.returncode == 0
-    finally:
-        if child.poll() is None:
-            child.kill()
-            child.wait()
+        with pytest.warns(FbaWarning, match="pip install imgui-bundle"):
+            one = Window(Scene(talking), size=(320, 240))
+    except DisplayError as error:
+        pytest.skip(f"no OpenGL on the virtual display: {error}")
+    with one:
+        settle(one)
+        assert (shown(one)[190:].min(axis=2) > 200).sum() > 20
+        press(one, glfw.KEY_RIGHT)
+        assert one.transport.frame == 1
 
 
 def test_no_display_says_what_to_do(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:

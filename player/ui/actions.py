@@ -1,0 +1,131 @@
+"""What can be done in a window, by name: keys, buttons and menus all come here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from player.ui.session import Session
+
+
+def act(session: Session, name: str) -> bool:
+    """Do what a name of the table of keys says ("toggle", "camera front", "panel file").
+
+    Returns whether there is such a thing.
+    """
+    word, _, rest = name.partition(" ")
+    if rest and word in _WITH:
+        _WITH[word](session, rest)
+    elif not rest and word in _PLAIN:
+        _PLAIN[word](session)
+    else:
+        return False
+    return True
+
+
+def _toggle(session: Session) -> None:
+    session.transport.toggle()
+
+
+def _stop(session: Session) -> None:
+    session.transport.stop()
+
+
+def _first(session: Session) -> None:
+    session.transport.first()
+
+
+def _last(session: Session) -> None:
+    session.transport.last()
+
+
+def _mark_in(session: Session) -> None:
+    session.transport.mark_in = session.transport.time
+
+
+def _mark_out(session: Session) -> None:
+    session.transport.mark_out = session.transport.time
+
+
+def _clear_marks(session: Session) -> None:
+    session.transport.clear_marks()
+
+
+def _loop(session: Session) -> None:
+    session.transport.toggle_loop()
+
+
+def _faster(session: Session) -> None:
+    session.transport.faster()
+
+
+def _slower(session: Session) -> None:
+    session.transport.slower()
+
+
+def _normal_speed(session: Session) -> None:
+    session.transport.set_speed(1.0)
+
+
+def _interpolate(session: Session) -> None:
+    transport = session.transport
+    transport.interpolate = not transport.interpolate
+    session.say("smooth between frames" if transport.interpolate else "frame by frame")
+
+
+def _reset_view(session: Session) -> None:
+    session.viewpoint.reset()
+
+
+def _follow(session: Session) -> None:
+    session.viewpoint.toggle_follow(session.transport.time)
+    session.say("the camera follows" if session.viewpoint.follow else "the camera stays")
+
+
+def _points(session: Session) -> None:
+    session.toggle_view()
+
+
+def _bare(session: Session) -> None:
+    session.bare = not session.bare
+
+
+def _close(session: Session) -> None:
+    session.closing = True
+
+
+def _step(frames: int) -> Callable[[Session], None]:
+    return lambda session: session.transport.step(frames)
+
+
+def _wish(what: str) -> Callable[[Session], None]:
+    return lambda session: session.wish(what)
+
+
+_PLAIN: dict[str, Callable[[Session], None]] = {
+    "toggle": _toggle,
+    "stop": _stop,
+    "back": _step(-1),
+    "on": _step(1),
+    "back10": _step(-10),
+    "on10": _step(10),
+    "first": _first,
+    "last": _last,
+    "mark_in": _mark_in,
+    "mark_out": _mark_out,
+    "clear_marks": _clear_marks,
+    "loop": _loop,
+    "faster": _faster,
+    "slower": _slower,
+    "normal_speed": _normal_speed,
+    "interpolate": _interpolate,
+    "reset_view": _reset_view,
+    "follow": _follow,
+    "points": _points,
+    "bare": _bare,
+    "close": _close,
+    **{name: _wish(name) for name in ("screenshot", "transparent", "record", "fullscreen")},
+}
+_WITH: dict[str, Callable[[Session, str], None]] = {
+    "camera": lambda session, name: session.viewpoint.preset(name),
+    "panel": lambda session, name: session.toggle_panel(name),
+}

@@ -1,0 +1,330 @@
+"""The timeline and the buttons at the bottom of the picture."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from imgui_bundle import imgui
+
+from player.times import clock_text
+from player.transport import SPEEDS
+from player.ui import icons, theme
+from player.ui.actions import act
+from player.ui.imgui_renderer import ImguiRenderer
+from player.ui.keys import key_of
+from player.ui.panel import icon_button, tooltip
+from player.ui.ruler import Ruler, label
+from player.ui.session import Session
+from player.ui.trace import trace_picture
+
+HEIGHT = 124.0
+"""Points at the bottom that it covers."""
+LOW_HEIGHT = 60.0
+"""The same where the window is too low for more than the timeline."""
+MARGIN = 18.0
+TOP = 24.0
+TRACK = 40.0
+BUTTONS = TOP + TRACK + 13.0
+GRIP = 7.0
+"""Points beside a mark at which it is taken hold of."""
+APART = 86.0
+"""Least points between the labels of the ruler."""
+
+
+class Bar:
+    """Draws the transport of a session and lets the mouse move it. One object for each window."""
+
+    def __init__(self, renderer: ImguiRenderer) -> None:
+        self._renderer = renderer
+        self._held = ""
+        self._from = 0.0
+        self._trace: tuple[object, ...] = ()
+        self.place = (0.0, 0.0, 0.0, 0.0)
+        """Where the timeline is: left, top, right, bottom in points; for tests and pictures."""
+
+    @property
+    def held(self) -> bool:
+        """Whether the mouse has hold of the timeline."""
+        return bool(self._held)
+
+    def height(self, display: tuple[float, float]) -> float:
+        """Points that it covers in a display of that size."""
+        return HEIGHT if display[1] >= 260 and display[0] >= 330 else LOW_HEIGHT
+
+    def draw(self, session: Session, display: tuple[float, float]) -> None:
+        """Draw it along the bottom of a display of that size in points."""
+        wide, high = display
+        tall = self.height(display)
+        imgui.set_next_window_pos((0, high - tall))
+        imgui.set_next_window_size((wide, tall))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
+        imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+        imgui.push_style_var(imgui.StyleVar_.window_min_size, (1, 1))
+        flags = imgui.WindowFlags_
+        imgui.begin(
+            "##bar",
+            None,
+            flags.no_decoration | flags.no_move | flags.no_saved_settings | flags.no_bring_to_front_on_focus
+            | flags.no_nav | flags.no_focus_on_appearing,
+        )  # fmt: skip
+        imgui.pop_style_var(4)
+        margin = min(MARGIN, wide * 0.05)
+        self._timeline(session, Ruler(*_span(session), margin, wide - margin), high - tall)
+        if tall == HEIGHT:
+            self._buttons(session, wide, high - tall + BUTTONS)
+        imgui.end()
+
+    def _timeline(self, session: Session, ruler: Ruler, y: float) -> None:
+        transport = session.transport
+        to = imgui.get_window_draw_list()
+        top, bottom = y + TOP, y + TOP + TRACK
+        self.place = (ruler.left, top, ruler.right, bottom)
+        if ruler.right - ruler.left < 8:
+            return
+        imgui.set_cursor_screen_pos((ruler.left - GRIP, y + 4))
+        imgui.invisible_button(
+            "timeline",
+            (ruler.right - ruler.left + 2 * GRIP, TOP - 4 + TRACK),
+            imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right,
+        )
+        hovered = imgui.is_item_hovered()
+        self._drag(session, ruler)
+        to.add_rect_filled((ruler.left, top), (ruler.right, bottom), theme.packed(theme.LINE), rounding=4.0)
+        self._draw_trace(session, ruler, top)
+        at = ruler.x(transport.time)
+        to.add_rect_filled((ruler.left, top), (at, bottom), theme.packed(theme.ACCENT, 0.16), rounding=4.0)
+        self._scale(to, ruler, y, bottom)
+        self._marks(session, to, ruler, top, bottom)
+        colour = theme.packed(theme.TEXT)
+        to.add_rect_filled((at - 1, top - 5), (at + 1, bottom + 3), colour)
+        to.add_triangle_filled((at - 6, top - 9), (at + 6, top - 9), (at, top - 1), colour)
+        if hovered or self._held:
+            self._word(session, ruler, to, top, bottom)
+
+    def _drag(self, session: Session, ruler: Ruler) -> None:
+        transport = session.transport
+        x = imgui.get_io().mouse_pos.x
+        time = ruler.time(x)
+        if imgui.is_item_activated():
+            self._held = self._taken(session, ruler, x)
+            self._from = time
+        if not imgui.is_item_active():
+            self._held = ""
+            return
+        session.touched()
+        if self._held == "head":
+            transport.seek(min(time, ruler.high))
+        elif self._held == "in":
+            transport.mark_in = min(time, _before(transport.mark_out))
+        elif self._held == "out":
+            transport.mark_out = max(time, _after(transport.mark_in))
+        elif self._held == "range" and abs(ruler.x(self._from) - x) > 3:
+            transport.clear_marks()
+            transport.mark_in, transport.mark_out = min(self._from, time), max(self._from, time)
+
+    def _taken(self, session: Session, ruler: Ruler, x: float) -> str:
+        if imgui.is_mouse_down(1):
+            return "range"
+        marks = {"in": session.transport.mark_in, "out": session.transport.mark_out}
+        near = {name: abs(ruler.x(time) - x) for name, time in marks.items() if time is not None}
+        if near:
+            name = min(near, key=lambda one: near[one])
+            if near[name] <= GRIP and abs(ruler.x(session.transport.time) - x) >= near[name]:
+                return name
+        return "head"
+
+    def _draw_trace(self, session: Session, ruler: Ruler, top: float) -> None:
+        amounts = session.source.trace()
+        if amounts is None:
+            return
+        scale = session.scale
+        size = (max(round((ruler.right - ruler.left) * scale), 1), max(round((TRACK - 4) * scale), 1))
+        key = (id(session.source.info), size, ruler.low, ruler.high)
+        if self._trace[:-1] != key:
+            info = session.source.info
+            assert info.frame_index is not None
+            times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
+            shares = (times - ruler.low) / max(ruler.high - ruler.low, 1e-9)
+            picture = trace_picture(amounts, info.plane_intra, np.clip(shares, 0, 1), size)
+            self._trace = (*key, self._renderer.keep("trace", picture))
+        image: Any = self._trace[-1]
+        to = imgui.get_window_draw_list()
+        to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK))
+
+    def _scale(self, to: imgui.ImDrawList, ruler: Ruler, y: float, bottom: float) -> None:
+        step = ruler.step(APART)
+        font, colour = imgui.get_font(), theme.packed(theme.FAINT)
+        faint = theme.packed(theme.FAINT, 0.35)
+        for time in ruler.ticks(step / 5):
+            x = ruler.x(time)
+            to.add_line((x, bottom - 3), (x, bottom), faint)
+        for time in ruler.ticks(step):
+            x, text = ruler.x(time), label(time, step)
+            to.add_line((x, y + TOP), (x, bottom), theme.packed(theme.LINE))
+            wide = 6.2 * len(text)
+            to.add_text(
+                font, 12.0, (min(max(x - wide / 2, ruler.left), ruler.right - wide), y + 5), colour, text
+            )
+
+    def _marks(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, top: float, bottom: float) -> None:
+        dark = theme.packed((0.05, 0.055, 0.06, 0.62))
+        for time, way, edge in (
+            (session.transport.mark_in, 1.0, ruler.left),
+            (session.transport.mark_out, -1.0, ruler.right),
+        ):
+            if time is None:
+                continue
+            x = ruler.x(time)
+            to.add_rect_filled((min(x, edge), top), (max(x, edge), bottom), dark)
+            colour = theme.packed(theme.WARM)
+            to.path_clear()
+            for at_x, at_y in (
+                (x + 6 * way, top - 4),
+                (x, top - 4),
+                (x, bottom + 3),
+                (x + 6 * way, bottom + 3),
+            ):
+                to.path_line_to((at_x, at_y))
+            to.path_stroke(colour, thickness=2.5)
+
+    def _word(self, session: Session, ruler: Ruler, to: imgui.ImDrawList, top: float, bottom: float) -> None:
+        """What is under the mouse: time, frame, and the plane's kind and bits."""
+        x = min(max(imgui.get_io().mouse_pos.x, ruler.left), ruler.right)
+        time = ruler.time(x)
+        frame = session.scene.timeline.position(time)[0]
+        if not self._held:
+            to.add_line((x, top), (x, bottom), theme.packed(theme.TEXT, 0.45))
+        text = f"{clock_text(time)}   frame {frame + 1}"
+        info = session.source.info
+        if info.plane_bits is not None and info.plane_intra is not None and frame < len(info.plane_bits):
+            kind = "I" if info.plane_intra[frame] else "P"
+            text += f"   {kind} plane, {int(info.plane_bits[frame])} bits"
+        size = imgui.calc_text_size(text)
+        left = min(max(x - size.x / 2, ruler.left), max(ruler.right - size.x, ruler.left))
+        over = imgui.get_foreground_draw_list()
+        box = (left - 9, top - 54), (left + size.x + 9, top - 54 + size.y + 10)
+        over.add_rect_filled(*box, theme.packed((0.105, 0.112, 0.124, 0.98)), rounding=6.0)
+        over.add_rect(*box, theme.packed(theme.LINE), rounding=6.0)
+        over.add_text((left, top - 49), theme.packed(theme.TEXT), text)
+
+    def _buttons(self, session: Session, wide: float, y: float) -> None:
+        transport = session.transport
+        room = wide >= 640
+        if room:
+            self._clock(session, y, full=wide >= 860)
+        centre = wide / 2
+        size, gap, big = 30.0, 4.0, 38.0
+        signs = [
+            ("first", icons.first, "first frame"),
+            ("back", icons.back, "one frame back"),
+            ("toggle", icons.pause if transport.playing else icons.play, "play, pause"),
+            ("on", icons.on, "one frame on"),
+            ("last", icons.last, "last frame"),
+        ]
+        x = centre - (4 * size + big + 4 * gap) / 2
+        for action, sign, text in signs:
+            mine = big if action == "toggle" else size
+            imgui.set_cursor_screen_pos((x, y - (mine - size) / 2))
+            if icon_button(action, sign, mine, filled=action == "toggle"):
+                act(session, action)
+            tooltip(text, key_of(action))
+            x += mine + gap
+        if wide >= 460:
+            x += 10
+            for action, sign, text, lit in (
+                ("mark_in", icons.mark_in, "begin of the loop here", transport.mark_in is not None),
+                ("mark_out", icons.mark_out, "end of the loop here", transport.mark_out is not None),
+                ("loop", icons.loop, "loop", transport.loop),
+            ):
+                imgui.set_cursor_screen_pos((x, y))
+                colour = theme.WARM if lit and action != "loop" else None
+                if icon_button(action, sign, size, lit=lit, colour=colour):
+                    act(session, action)
+                tooltip(text, key_of(action))
+                x += size + gap
+        if room:
+            self._right(session, wide, y, x)
+
+    def _clock(self, session: Session, y: float, *, full: bool) -> None:
+        transport = session.transport
+        imgui.set_cursor_screen_pos((MARGIN, y + 3))
+        imgui.push_font(None, theme.LARGE)
+        imgui.text_unformatted(transport.timecode())
+        imgui.pop_font()
+        if full:
+            imgui.same_line(0, 16)
+            imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + 4)
+            imgui.text_colored(theme.FAINT, f"frame {transport.frame + 1} / {session.scene.timeline.frames}")
+
+    def _right(self, session: Session, wide: float, y: float, taken: float) -> None:
+        transport = session.transport
+        size, gap = 30.0, 4.0
+        signs = [
+            ("fullscreen", icons.whole, "full screen", False),
+            ("record", icons.record, "record to an MP4 file", session.recording is not None),
+            ("screenshot", icons.camera, "picture of the view", False),
+            (
+                "interpolate",
+                icons.smooth if transport.interpolate else icons.stepped,
+                "smooth between frames" if transport.interpolate else "frame by frame",
+                False,
+            ),
+        ]
+        x = wide - MARGIN + gap
+        for action, sign, text, lit in signs:
+            x -= size + gap
+            if x < taken + 8:
+                return
+            imgui.set_cursor_screen_pos((x, y))
+            if icon_button(action, sign, size, colour=theme.ALERT if lit else None):
+                act(session, action)
+            tooltip(text, key_of(action))
+        slider = min(118.0, x - taken - 26)
+        if slider < 70:
+            return
+        text = f"{transport.speed:g}x"
+        wide_text = imgui.calc_text_size(text).x
+        if x - slider - 12 - wide_text - 10 > taken:
+            imgui.set_cursor_screen_pos((x - slider - 20 - wide_text, y + 7))
+            imgui.text_colored(theme.FAINT if transport.speed == 1.0 else theme.ACCENT, text)
+            text = ""
+        imgui.set_cursor_screen_pos((x - slider - 12, y + 2))
+        imgui.set_next_item_width(slider)
+        changed, speed = imgui.slider_float(
+            "##speed",
+            transport.speed,
+            SPEEDS[0],
+            SPEEDS[-1],
+            text,
+            imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp,
+        )
+        if changed:
+            transport.set_speed(snapped(speed))
+        if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
+            transport.set_speed(1.0)
+        tooltip("speed; double click for normal", f"{key_of('slower')} {key_of('faster')}")
+
+
+def snapped(speed: float) -> float:
+    """A speed of the slider: one of the steps where it is near one, else with two digits."""
+    speed = min(max(speed, SPEEDS[0]), SPEEDS[-1])
+    near = min(SPEEDS, key=lambda step: abs(math.log(step / speed)))
+    return near if abs(math.log(near / speed)) < 0.045 else round(speed, 2)
+
+
+def _span(session: Session) -> tuple[float, float]:
+    """Times of the first and the last frame."""
+    timeline = session.scene.timeline
+    start = float(timeline.start)
+    return start, max(float(timeline.time_of(timeline.frames - 1)), start)
+
+
+def _before(mark: float | None) -> float:
+    return math.inf if mark is None else mark - 1e-3
+
+
+def _after(mark: float | None) -> float:
+    return -math.inf if mark is None else mark + 1e-3

@@ -1,0 +1,98 @@
+"""F2: what the file holds."""
+
+from __future__ import annotations
+
+import os
+
+from imgui_bundle import imgui
+
+from fba.codec import PartInfo, StreamInfo
+from player.times import clock_text
+from player.ui import theme
+from player.ui.panel import Panel, facts, heading
+from player.ui.session import Session
+
+
+class FilePanel(Panel):
+    """Name, kind, frames, rate, bits, planes, masks, and what was wrong with it."""
+
+    name, title, label = "file", "File", "File"
+    side = "left"
+    width = 330.0
+
+    def draw(self, session: Session) -> None:
+        source, info = session.source, session.source.info
+        facts("file", _about(session, info))
+        if info.plane_bits is not None:
+            heading("Stream")
+            facts("stream", _stream(info))
+        for title, name, part in (("Face", "FAPs", info.face), ("Body", "BAPs", info.body)):
+            if part is not None:
+                heading(title)
+                facts(title, _part(part, name, info.frames))
+        troubles = [*source.warnings, *(str(one.error) for one in info.damage)]
+        if troubles:
+            heading("Warnings")
+            imgui.push_style_color(imgui.Col_.text, theme.WARM)
+            imgui.push_text_wrap_pos(0.0)
+            for text in troubles[:20]:
+                imgui.text_unformatted(text)
+            if len(troubles) > 20:
+                imgui.text_unformatted(f"and {len(troubles) - 20} more")
+            imgui.pop_text_wrap_pos()
+            imgui.pop_style_color()
+
+
+def _about(session: Session, info: StreamInfo) -> list[tuple[str, str]]:
+    rows = [("name", session.source.name or "untitled")]
+    if session.source.path is not None:
+        folder = os.path.dirname(os.path.abspath(session.source.path))
+        rows += [("folder", folder), ("kind", info.format.upper()), ("size", _bytes(info.size))]
+    rows.append(("frames", f"{info.frames}" + (f", {info.skipped} skipped" if info.skipped else "")))
+    rows.append(("rate", f"{float(info.rate):g} frames/s"))
+    rows.append(("duration", clock_text(info.duration)))
+    if info.start:
+        rows.append(("starts at", clock_text(info.start)))
+    return rows
+
+
+def _stream(info: StreamInfo) -> list[tuple[str, str]]:
+    assert info.plane_bits is not None
+    assert info.plane_intra is not None
+    bits, intra = info.plane_bits, info.plane_intra
+    rows = [("bit rate", f"{info.bits_per_second / 1000:.2f} kbit/s")]
+    for kind, chosen in (("I planes", intra), ("P planes", ~intra)):
+        count = int(chosen.sum())
+        rows.append((kind, f"{count}, on average {bits[chosen].mean():.0f} bits" if count else "none"))
+    rows.append(("largest", f"{int(bits.max())} bits"))
+    if info.start_codes:
+        rows.append(("start codes", f"{info.start_codes}"))
+    return rows
+
+
+def _part(part: PartInfo, name: str, frames: int) -> list[tuple[str, str]]:
+    rows = [(name, f"{len(part.parameters)}: {_ranges(part.parameters)}")]
+    if part.frames != frames:
+        rows.append(("frames", f"{part.frames} of {frames}"))
+    if part.quants:
+        rows.append(("quantiser", ", ".join(str(one) for one in part.quants)))
+    if part.mask_types:
+        rows.append(("masks", ", ".join(part.mask_types)))
+    return rows
+
+
+def _ranges(numbers: tuple[int, ...]) -> str:
+    """ "3..42, 48": runs of numbers in short."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][1] + 1:
+            runs[-1][1] = number
+        else:
+            runs.append([number, number])
+    return ", ".join(f"{a}" if a == b else f"{a}..{b}" for a, b in runs)
+
+
+def _bytes(size: int) -> str:
+    if size < 10_000:
+        return f"{size} bytes"
+    return f"{size / 1000:.1f} kB" if size < 1_000_000 else f"{size / 1e6:.1f} MB"

@@ -1,0 +1,195 @@
+"""What is always over the picture: name and panel buttons above, words that come and go, open panels."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from player.times import clock_text
+from player.ui import theme
+from player.ui.panel import Panel, tooltip
+from player.ui.session import Session
+
+EDGE = 14.0
+GAP = 10.0
+TOP = 56.0
+"""Where panels begin below the buttons."""
+FADE = 0.4
+"""Seconds in which a word goes."""
+NARROW = 560.0
+"""Below so many points of width the name is left out; below 300 the buttons too."""
+
+
+def draw_name(session: Session, display: tuple[float, float], room: float) -> None:
+    """The file's name and rate in the upper left corner, within `room` points, and whether it records."""
+    if display[0] < NARROW or display[1] < 200:
+        return
+    to = imgui.get_background_draw_list()
+    x, y = EDGE + 4, EDGE + 7
+    if session.recording is not None:
+        text = f"REC {clock_text(session.recording)[:-2]}"
+        to.add_circle_filled((x + 6, y + 9), 6.0, theme.packed(theme.ALERT))
+        _shaded(to, (x + 20, y), theme.packed(theme.TEXT), text)
+        x += 40 + imgui.calc_text_size(text).x
+    name = session.source.name or session.scene.title
+    facts = _facts(session)
+    if imgui.calc_text_size(name + facts).x + x > room:
+        facts = ""
+    while name and imgui.calc_text_size(name).x + x > room:
+        name = name[: max(len(name) - 8, 0)]
+    _shaded(to, (x, y), theme.packed(theme.TEXT), name)
+    _shaded(to, (x + imgui.calc_text_size(name).x + 14, y), theme.packed(theme.TEXT, 0.72), facts)
+
+
+def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
+    """A button for each panel in the upper right corner; returns where they begin."""
+    if display[0] < 300 or display[1] < 200:
+        return display[0]
+    wide = sum(imgui.calc_text_size(panel.label).x + 22 for panel in panels) + 4 * (len(panels) - 1) + 10
+    left = display[0] - EDGE - wide
+    if left < EDGE:
+        return display[0]
+    flags = imgui.WindowFlags_
+    imgui.set_next_window_pos((left, EDGE))
+    imgui.set_next_window_size((wide, 34))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, (5, 4))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, (4, 4))
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, (11, (26 - imgui.get_font_size()) / 2))
+    imgui.begin(
+        "##buttons",
+        None,
+        flags.no_decoration | flags.no_move | flags.no_saved_settings | flags.no_bring_to_front_on_focus
+        | flags.no_nav | flags.no_focus_on_appearing,
+    )  # fmt: skip
+    for panel in panels:
+        lit = panel.name in session.open
+        imgui.push_style_color(imgui.Col_.button, (0.36, 0.68, 0.90, 0.22) if lit else (0, 0, 0, 0))
+        imgui.push_style_color(imgui.Col_.text, theme.TEXT if lit else theme.FAINT)
+        if imgui.button(panel.label):
+            session.toggle_panel(panel.name)
+        imgui.pop_style_color(2)
+        tooltip(panel.title, panel.key)
+        imgui.same_line()
+    imgui.end()
+    imgui.pop_style_var(3)
+    return left
+
+
+def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
+    """Words to the user, in the middle above the bar."""
+    to = imgui.get_foreground_draw_list()
+    y = display[1] - above - 20
+    for notice in reversed(session.notices()):
+        alpha = min((notice.until - session.clock()) / FADE, 1.0)
+        colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)
+        size = imgui.calc_text_size(notice.text, False, max(display[0] - 80, 60))
+        left = (display[0] - size.x) / 2
+        y -= size.y + 16
+        corner = (left - 20, y), (left + size.x + 14, y + size.y + 16)
+        to.add_rect_filled(*corner, theme.packed((0.105, 0.112, 0.124, 0.96), alpha), rounding=8.0)
+        to.add_rect_filled(
+            (left - 13, y + 8), (left - 10, y + size.y + 8), theme.packed(colour, alpha), rounding=1.5
+        )
+        to.add_text(
+            imgui.get_font(), imgui.get_font_size(), (left, y + 8), theme.packed(theme.TEXT, alpha),
+            notice.text, max(display[0] - 80, 60),
+        )  # fmt: skip
+        y -= 8
+
+
+class Places:
+    """Where panels are: one below the other at their side, until the user moves them."""
+
+    def __init__(self) -> None:
+        self._sizes: dict[str, tuple[float, float]] = {}
+        self._moved: set[str] = set()
+
+    def draw(self, panels: list[Panel], session: Session, display: tuple[float, float], below: float) -> None:
+        """Draw open panels, in this order; `below`: points at the bottom that are taken."""
+        room = display[1] - TOP - below - GAP
+        if room < 60 or display[0] < 120:
+            return
+        next_free: dict[tuple[str, int], float] = {}
+        for panel in panels:
+            wide = min(panel.width, display[0] - 2 * EDGE)
+            place = self._place(panel, wide, room, display, next_free)
+            self._draw_one(panel, session, (wide, room), place, display)
+
+    def forget(self, names: set[str]) -> None:
+        """These have been closed, and open where they belong again."""
+        self._moved -= names
+
+    def _place(
+        self,
+        panel: Panel,
+        wide: float,
+        room: float,
+        display: tuple[float, float],
+        next_free: dict[tuple[str, int], float],
+    ) -> tuple[float, float]:
+        """The first place in the columns of its side with room for it, else over the last column."""
+        high = min(self._sizes.get(panel.name, (wide, panel.height or 120.0))[1], room)
+        if panel.name in self._moved:
+            return 0.0, 0.0
+        for column in range(4):
+            away = EDGE + column * (wide + GAP)
+            y = next_free.get((panel.side, column), TOP)
+            last = away + 2 * (wide + GAP) > display[0]
+            if y + high <= TOP + room + 1 or last:
+                y = min(y, TOP + room - high)
+                next_free[panel.side, column] = y + high + GAP
+                return (display[0] - away - wide if panel.side == "right" else away), y
+        return EDGE, TOP
+
+    def _draw_one(
+        self,
+        panel: Panel,
+        session: Session,
+        room: tuple[float, float],
+        place: tuple[float, float],
+        display: tuple[float, float],
+    ) -> None:
+        free = panel.name in self._moved
+        if not free:
+            imgui.set_next_window_pos(place)
+        wide, high = room
+        flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_collapse
+        if panel.height:
+            imgui.set_next_window_size((wide, min(panel.height, high)), imgui.Cond_.appearing)
+            imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], high))
+        else:
+            flags |= imgui.WindowFlags_.always_auto_resize
+            imgui.set_next_window_size_constraints((wide, 40), (wide, high))
+        expanded, kept = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
+        if expanded:
+            panel.draw(session)
+        if not free and imgui.is_mouse_dragging(0) and self._taken():
+            self._moved.add(panel.name)
+        width, height = imgui.get_window_size()
+        self._sizes[panel.name] = (width, height)
+        imgui.end()
+        if not kept:
+            session.open.discard(panel.name)
+
+    @staticmethod
+    def _taken() -> bool:
+        """Whether the mouse has hold of the title of the window that is being drawn."""
+        x, y = imgui.get_window_pos()
+        start_x, start_y = imgui.get_mouse_pos() - imgui.get_mouse_drag_delta(0)
+        on_title = y <= start_y <= y + imgui.get_frame_height()
+        focused = imgui.is_window_focused(imgui.FocusedFlags_.root_window)
+        return bool(focused and on_title and x <= start_x <= x + imgui.get_window_width())
+
+
+def _facts(session: Session) -> str:
+    info = session.source.info
+    parts = [f"{session.scene.timeline.frames} frames", f"{float(session.scene.timeline.rate):g} frames/s"]
+    if info.size and info.plane_bits is not None:
+        parts.append(f"{info.bits_per_second / 1000:.1f} kbit/s")
+    return "   ".join(parts)
+
+
+def _shaded(to: imgui.ImDrawList, place: tuple[float, float], colour: int, text: str) -> None:
+    """Text that is read over light and dark."""
+    x, y = place
+    to.add_text((x + 1, y + 1), theme.packed((0, 0, 0, 0.55), (colour >> 24) / 255), text)
+    to.add_text((x, y), colour, text)

@@ -1,0 +1,187 @@
+"""Draws what Dear ImGui asks for with moderngl: OpenGL 3.3, into whatever framebuffer is bound.
+
+Follows the protocol of Dear ImGui 1.92 for textures that grow while they are used: the library asks for
+textures to be created, updated in part and destroyed, and this does so before it draws.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from imgui_bundle import imgui
+
+VERTEX = np.dtype([("place", "<f4", 2), ("texture", "<f4", 2), ("colour", "u1", 4)])
+"""One vertex as Dear ImGui lays it out (ImDrawVert)."""
+INDEX = np.dtype("<u4")
+
+
+class ImguiRenderer:
+    """Draws the lists of the current imgui context on a moderngl context; `close` gives all back.
+
+    Raises RuntimeError where imgui was built with another layout of vertices or indices.
+    """
+
+    def __init__(self, context: Any) -> None:
+        if (VERTEX.itemsize, INDEX.itemsize) != (imgui.VERTEX_SIZE, imgui.INDEX_SIZE):
+            raise RuntimeError(
+                f"this build of imgui has vertices of {imgui.VERTEX_SIZE} bytes and indices of "
+                f"{imgui.INDEX_SIZE}; expected {VERTEX.itemsize} and {INDEX.itemsize}: install another "
+                "version of imgui-bundle"
+            )
+        self._gl = context
+        folder = files("player") / "shaders"
+        self._program = context.program(
+            vertex_shader=(folder / "panels.vert").read_text(encoding="utf-8"),
+            fragment_shader=(folder / "panels.frag").read_text(encoding="utf-8"),
+        )
+        self._textures: dict[int, Any] = {}
+        self._kept: dict[str, int] = {}
+        self._vertices: Any = None
+        self._indices: Any = None
+        self._array: Any = None
+        self._reserve(1 << 16, 1 << 16)
+        io = imgui.get_io()
+        io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
+        io.backend_flags |= imgui.BackendFlags_.renderer_has_vtx_offset
+        largest = int(context.info["GL_MAX_TEXTURE_SIZE"])
+        platform = imgui.get_platform_io()
+        platform.renderer_texture_max_width = platform.renderer_texture_max_height = largest
+
+    def draw(self, data: imgui.ImDrawData) -> None:
+        """Draw; the viewport is set to the whole of the bound framebuffer."""
+        for texture in data.textures:
+            if texture.status != imgui.ImTextureStatus.ok:
+                self._update(texture)
+        scale_x, scale_y = data.framebuffer_scale
+        wide, high = round(data.display_size.x * scale_x), round(data.display_size.y * scale_y)
+        if wide < 1 or high < 1 or not data.total_idx_count:
+            return
+        commands = self._upload(data)
+        gl = self._gl
+        gl.viewport = (0, 0, wide, high)
+        gl.enable_only(gl.BLEND)
+        gl.blend_func = (gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA)
+        self._program["size"].value = (data.display_size.x, data.display_size.y)
+        bound = 0
+        for clip, number, first, count in commands:
+            left, top = max(int(clip[0] * scale_x), 0), max(int(clip[1] * scale_y), 0)
+            right, bottom = min(round(clip[2] * scale_x), wide), min(round(clip[3] * scale_y), high)
+            if right <= left or bottom <= top or number not in self._textures:
+                continue
+            if number != bound:
+                self._textures[number].use(0)
+                bound = number
+            gl.scissor = (left, high - bottom, right - left, bottom - top)
+            self._array.render(gl.TRIANGLES, vertices=count, first=first)
+        gl.scissor = None
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA
+
+    def keep(self, name: str, pixels: npt.NDArray[np.uint8]) -> imgui.ImTextureRef:
+        """A picture, uint8 (H, W, 4), for imgui to draw; it takes the place of the last of that name."""
+        height, width = pixels.shape[:2]
+        made = self._gl.texture((width, height), 4, np.ascontiguousarray(pixels).tobytes())
+        made.filter = (self._gl.LINEAR, self._gl.LINEAR)
+        made.repeat_x = made.repeat_y = False
+        if name in self._kept:
+            self._textures.pop(self._kept[name]).release()
+        self._kept[name] = made.glo
+        self._textures[made.glo] = made
+        return imgui.ImTextureRef(made.glo)
+
+    def close(self) -> None:
+        """Give everything back; imgui is told that its textures are gone."""
+        for texture in imgui.get_platform_io().textures:
+            if texture.tex_id in self._textures:
+                texture.set_tex_id(0)
+                texture.set_status(imgui.ImTextureStatus.destroyed)
+        for part in (*self._textures.values(), self._array, self._vertices, self._indices, self._program):
+            part.release()
+        self._textures.clear()
+
+    def _upload(self, data: imgui.ImDrawData) -> list[tuple[tuple[float, ...], int, int, int]]:
+        """All lists into one pair of buffers: (clip rectangle, texture, first index, indices) to draw.
+
+        Neighbours with one texture and one clip rectangle become one: a call costs more than what it draws.
+        """
+        all_vertices, all_indices = [], []
+        commands: list[tuple[tuple[float, ...], int, int, int]] = []
+        base = before = 0
+        corner_x, corner_y = data.display_pos
+        for drawn in data.cmd_lists:
+            vertices = _view(drawn.vtx_buffer, VERTEX)
+            indices = _view(drawn.idx_buffer, INDEX)
+            for command in drawn.cmd_buffer:
+                count = command.elem_count
+                if not count:
+                    continue
+                first = command.idx_offset
+                all_indices.append(indices[first : first + count] + np.uint32(base + command.vtx_offset))
+                x0, y0, x1, y1 = command.clip_rect
+                clip = (x0 - corner_x, y0 - corner_y, x1 - corner_x, y1 - corner_y)
+                number = command.get_tex_id()
+                if commands and commands[-1][:2] == (clip, number):
+                    commands[-1] = (clip, number, commands[-1][2], commands[-1][3] + count)
+                else:
+                    commands.append((clip, number, before, count))
+                before += count
+            all_vertices.append(vertices)
+            base += len(vertices)
+        self._reserve(base * VERTEX.itemsize, before * INDEX.itemsize)
+        self._vertices.orphan()
+        self._vertices.write(np.concatenate(all_vertices))
+        self._indices.orphan()
+        self._indices.write(np.concatenate(all_indices))
+        return commands
+
+    def _reserve(self, vertex_bytes: int, index_bytes: int) -> None:
+        if (
+            self._array is not None
+            and self._vertices.size >= vertex_bytes
+            and self._indices.size >= index_bytes
+        ):
+            return
+        for part in (self._array, self._vertices, self._indices):
+            if part is not None:
+                part.release()
+        gl = self._gl
+        self._vertices = gl.buffer(reserve=max(2 * vertex_bytes, 1 << 16), dynamic=True)
+        self._indices = gl.buffer(reserve=max(2 * index_bytes, 1 << 16), dynamic=True)
+        self._array = gl.vertex_array(
+            self._program,
+            [(self._vertices, "2f 2f 4f1", "in_place", "in_texture", "in_colour")],
+            index_buffer=self._indices,
+            index_element_size=INDEX.itemsize,
+        )
+
+    def _update(self, texture: imgui.ImTextureData) -> None:
+        status = imgui.ImTextureStatus
+        if texture.status == status.want_create:
+            made = self._gl.texture((texture.width, texture.height), 4, texture.get_pixels_array().tobytes())
+            made.filter = (self._gl.LINEAR, self._gl.LINEAR)
+            made.repeat_x = made.repeat_y = False
+            self._textures[made.glo] = made
+            texture.set_tex_id(made.glo)
+            texture.set_status(status.ok)
+        elif texture.status == status.want_updates:
+            pixels = texture.get_pixels_array().reshape(texture.height, texture.width, 4)
+            for part in texture.updates:
+                block = np.ascontiguousarray(pixels[part.y : part.y + part.h, part.x : part.x + part.w])
+                self._textures[texture.tex_id].write(block, viewport=(part.x, part.y, part.w, part.h))
+            texture.set_status(status.ok)
+        elif texture.status == status.want_destroy and texture.unused_frames > 0:
+            self._textures.pop(texture.tex_id).release()
+            texture.set_tex_id(0)
+            texture.set_status(status.destroyed)
+
+
+def _view(vector: Any, dtype: np.dtype[Any]) -> npt.NDArray[Any]:
+    """An imgui vector's memory as an array, without a copy; valid until the next frame."""
+    count = vector.size()
+    if not count:
+        return np.zeros(0, dtype)
+    memory = (ctypes.c_char * (count * dtype.itemsize)).from_address(vector.data_address())
+    return np.frombuffer(memory, dtype)

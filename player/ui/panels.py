@@ -1,0 +1,16 @@
+"""The panels that there are, in the order of their buttons."""
+
+from __future__ import annotations
+
+from player.ui.camera_panel import CameraPanel
+from player.ui.file_panel import FilePanel
+from player.ui.help_panel import HelpPanel
+from player.ui.panel import Panel
+from player.ui.view_panel import ViewPanel
+
+PANELS: tuple[type[Panel], ...] = (FilePanel, ViewPanel, CameraPanel, HelpPanel)
+
+
+def make_panels() -> list[Panel]:
+    """One object of each."""
+    return [kind() for kind in PANELS]

@@ -1,0 +1,103 @@
+"""Where what is shown comes from, and what its file holds."""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import FbaError
+
+if TYPE_CHECKING:
+    from fba.codec import StreamInfo
+    from player.showable import Showable
+
+
+class Source:
+    """The file behind a scene.
+
+    path: None where there is none. bap_steps: with which it was decoded. warnings: what was said while it
+    was read. `info` is what it holds: at first what the scene itself tells, once `look` is done also
+    planes, bits and damage.
+    """
+
+    def __init__(
+        self,
+        scene: Showable,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        bap_steps: str = "iso",
+        warnings: tuple[str, ...] = (),
+    ) -> None:
+        self.path = path
+        self.bap_steps = bap_steps
+        self.warnings = list(warnings)
+        self._scene = scene
+        self._probed: StreamInfo | None = None
+        self._own: StreamInfo | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def name(self) -> str:
+        """The file's name, or the scene's."""
+        return os.path.basename(os.fspath(self.path)) if self.path is not None else self._scene.title
+
+    @property
+    def info(self) -> StreamInfo:
+        """What it holds; the same object until something changes."""
+        if self._probed is not None:
+            return self._probed
+        frames = self._scene.timeline.frames
+        if self._own is None or self._own.frames != frames:
+            self._own = self._of_scene()
+        return self._own
+
+    def look(self, *, wait: bool = False) -> None:
+        """Read what the file holds, in the background unless `wait`: the window need not wait for it."""
+        if self.path is None or self._thread is not None:
+            return
+        self._thread = threading.Thread(target=self._probe, name="fba source", daemon=True)
+        self._thread.start()
+        if wait:
+            self._thread.join()
+
+    @property
+    def looking(self) -> bool:
+        """Whether that is still going on."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def trace(self) -> npt.NDArray[np.float64] | None:
+        """(T,) bits of each plane, or None where there are no planes."""
+        bits = self.info.plane_bits
+        return None if bits is None else bits.astype(np.float64)
+
+    def _of_scene(self) -> StreamInfo:
+        from fba.animation import Animation
+        from fba.codec import StreamInfo
+
+        animation, times = getattr(self._scene, "animation", None), self._scene.timeline
+        if isinstance(animation, Animation) and len(animation) == times.frames:
+            return StreamInfo.of_animation(animation, "animation", 0)
+        return StreamInfo(
+            format="stream",
+            size=0,
+            rate=times.rate,
+            frames=times.frames,
+            duration=times.duration,
+            start=times.start,
+            skipped=0,
+            face=None,
+            body=None,
+        )
+
+    def _probe(self) -> None:
+        from fba.formats import probe
+
+        assert self.path is not None
+        try:
+            self._probed = probe(self.path, bap_steps=self.bap_steps)
+        except (FbaError, OSError) as error:
+            self.warnings.append(f"what the file holds cannot be read: {error}")
