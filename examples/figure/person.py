@@ -1,4 +1,4 @@
-"""The figure as the built-in person wears it: finer where limbs bend, its proportions those of the standard's body.
+"""The figure that becomes the built-in person: finer where limbs bend, wider in the shoulders.
 
 The standard's default posture lets the arms hang straight down. The figure's own shoulders are so narrow
 that its hands would then hang inside its thighs; here shoulders are set apart, and hips drawn in, both
