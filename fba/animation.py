@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from importlib import import_module
 from typing import Any, overload
 
 import numpy as np
@@ -179,6 +180,14 @@ class Animation:
         )
 
     __hash__ = None  # type: ignore[assignment]
+
+    def _repr_html_(self) -> str | None:
+        """A small film, for notebooks; None where the player is not installed."""
+        try:
+            notebook = import_module("player.notebook")  # by name: the player stands above this module
+        except ImportError:
+            return None
+        return str(notebook.Preview(self)._repr_html_())
 
     @property
     def times(self) -> npt.NDArray[np.float64]:

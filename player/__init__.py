@@ -16,7 +16,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from player.camera import Camera, Subject
     from player.contact_sheet import contact_sheet
+    from player.film_sheet import film_sheet
+    from player.notebook import Preview
     from player.offscreen import Offscreen
+    from player.recorder import Recorder
     from player.recording import record, render
     from player.renderer import Renderer
     from player.scene import Scene, default_camera
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 _PLACES = {
     "Camera": "player.camera",
     "Offscreen": "player.offscreen",
+    "Preview": "player.notebook",
+    "Recorder": "player.recorder",
     "Renderer": "player.renderer",
     "Scene": "player.scene",
     "Subject": "player.camera",
@@ -34,6 +39,7 @@ _PLACES = {
     "Transport": "player.transport",
     "contact_sheet": "player.contact_sheet",
     "default_camera": "player.scene",
+    "film_sheet": "player.film_sheet",
     "play": "player.window",
     "record": "player.recording",
     "render": "player.recording",
@@ -42,6 +48,8 @@ _PLACES = {
 __all__ = [
     "Camera",
     "Offscreen",
+    "Preview",
+    "Recorder",
     "Renderer",
     "Scene",
     "Subject",
@@ -49,6 +57,7 @@ __all__ = [
     "Transport",
     "contact_sheet",
     "default_camera",
+    "film_sheet",
     "play",
     "record",
     "render",
