@@ -95,7 +95,7 @@ class Preview:
         if last < end:
             note = (
                 f"Shown are {float(SECONDS):g} s from {clock_text(begin)} on. "
-                "player.Preview(clip, start=...) shows others, player.render(clip, 'clip.mp4') writes them all."
+                "player.Preview(clip, start=...) shows others, player.render(clip, 'clip.mp4') all."
             )
         with tempfile.TemporaryDirectory(prefix="fba-") as folder:
             path = Path(folder) / "preview.mp4"
@@ -118,7 +118,7 @@ class Preview:
 
     def _still(self, scene: Scene) -> str:
         from player.offscreen import Offscreen
-        from player.pictures import put_picture
+        from player.picture_files import put_picture
 
         width, height = self._size
         with Offscreen(scene, self._size, self._camera) as view:

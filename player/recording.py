@@ -14,7 +14,7 @@ from fba.animation import Animation
 from fba.errors import FbaError, RangeError, UnsupportedError
 from player.camera import Camera
 from player.offscreen import Offscreen
-from player.pictures import PICTURES, check_picture, write_picture
+from player.picture_files import PICTURES, check_picture, write_picture
 from player.recorder import FILMS, Recorder, exact_rate
 from player.scene import Scene
 from player.sequence import Numbered, Sequence, is_sequence

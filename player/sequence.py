@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FormatError, UnsupportedError
-from player.pictures import QUICK, check_picture, write_picture
+from player.picture_files import QUICK, check_picture, write_picture
 from player.whole import PathLike, cannot
 
 UInt8 = npt.NDArray[np.uint8]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -181,7 +179,7 @@ def command(
         return
     if audio is None and file is not None and not no_audio and output.lower().endswith(".mp4"):
         audio = _voice(file)
-    with options.progress("rendering", None) as step, _usage():
+    with options.progress("rendering", None) as step, options.usage_errors():
         written = player.render(
             scene,
             output,
@@ -224,9 +222,9 @@ def _voice(file: Path) -> Path | None:
 
 def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> None:
     from player.contact_sheet import contact_sheet
-    from player.pictures import write_picture
+    from player.picture_files import write_picture
 
-    with _usage():
+    with options.usage_errors():
         pixels = contact_sheet(what, options.read_model(model), tile=size)
     write_picture(output, pixels)
     click.echo(f"{output}: {pixels.shape[1]}x{pixels.shape[0]}")
@@ -234,20 +232,9 @@ def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, i
 
 def _frames_sheet(scene: Scene, count: int, output: Path, **how: Any) -> None:
     from player.film_sheet import film_sheet
-    from player.pictures import write_picture
+    from player.picture_files import write_picture
 
-    with options.progress("rendering", None) as step, _usage():
+    with options.progress("rendering", None) as step, options.usage_errors():
         pixels = film_sheet(scene, count, progress=step.of, **how)
     write_picture(output, pixels)
     click.echo(f"{output}: {pixels.shape[1]}x{pixels.shape[0]}")
-
-
-@contextmanager
-def _usage() -> Iterator[None]:
-    """What is wrong with the options is a usage error."""
-    try:
-        yield
-    except ValueError as error:
-        if type(error) is not ValueError:
-            raise
-        raise click.UsageError(str(error)) from error
