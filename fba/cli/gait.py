@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -88,7 +86,7 @@ def _write(output: Path, character: str, rate: Fraction, bap_steps: str, made: d
     from fba.formats import write, writer_for
 
     writing = writer_for(output)  # refuses what cannot be written before anything is made
-    with _usage():
+    with options.usage_errors("walk: "):
         animation = gait.walk(character=character, rate=rate, **made)
     extra = {}
     if writing.name == "fba":
@@ -136,14 +134,3 @@ def _find(file: Path, bap_steps: str, as_json: bool) -> None:
         return
     for line in found.lines():
         click.echo(line)
-
-
-@contextmanager
-def _usage() -> Iterator[None]:
-    """Numbers that make no sense are a usage error."""
-    try:
-        yield
-    except ValueError as error:
-        if type(error) is not ValueError:
-            raise
-        raise click.UsageError(str(error).removeprefix("walk: ")) from error

@@ -231,6 +231,17 @@ def write_bytes(path: Path, data: bytes) -> None:
         file.write(data)
 
 
+@contextmanager
+def usage_errors(prefix: str = "") -> Iterator[None]:
+    """What is wrong with options, a plain ValueError, is a usage error. prefix: left out of its text."""
+    try:
+        yield
+    except ValueError as error:
+        if type(error) is not ValueError:
+            raise
+        raise click.UsageError(str(error).removeprefix(prefix)) from error
+
+
 def seconds(value: Fraction | float) -> str:
     return f"{float(value):.2f} s"
 

@@ -8,19 +8,14 @@ from fba.animation import Animation, BodyTrack
 from fba.errors import FormatError
 from fba.formats.frames import read_frames
 from fba.formats.layout import bap_layout
-from fba.formats.text import sniff_columns
+from fba.formats.text import sniff_layout
 from fba.formats.writing import write_frames
 from fba.source import Path
 
 
 def sniff_bap(head: bytes, suffix: str) -> bool:
     """Whether a file that begins so is a BAP file: by its mask width, else by its version."""
-    version, width = sniff_columns(head)
-    layout = bap_layout()
-    if width:
-        known = [w for count in layout.widths for w in (count, count + 1)]
-        return width in known or (version in layout.versions and width >= 100)
-    return version in layout.versions
+    return sniff_layout(head, bap_layout())
 
 
 def read_bap(

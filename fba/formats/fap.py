@@ -10,7 +10,7 @@ from fba.animation import Animation, FaceTrack
 from fba.errors import FormatError
 from fba.formats.frames import read_frames
 from fba.formats.layout import fap_layout
-from fba.formats.text import sniff_columns
+from fba.formats.text import sniff_layout
 from fba.formats.writing import write_frames
 from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.source import Path
@@ -21,12 +21,7 @@ _FIELDS = _VISEME + len(EXPRESSION_FIELDS)
 
 def sniff_fap(head: bytes, suffix: str) -> bool:
     """Whether a file that begins so is a FAP file: by its mask width, else by its version."""
-    version, width = sniff_columns(head)
-    layout = fap_layout()
-    if width:
-        known = [w for count in layout.widths for w in (count, count + 1)]
-        return width in known or (version in layout.versions and width < 100)
-    return version in layout.versions
+    return sniff_layout(head, fap_layout())
 
 
 def read_fap(

@@ -11,11 +11,14 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from fba.errors import FormatError
 from fba.formats.rates import parse_rate
 from fba.source import Path
+
+if TYPE_CHECKING:
+    from fba.formats.layout import Layout
 
 BLOCK_BYTES = 1 << 20
 MAX_LINE_BYTES = 1 << 16
@@ -25,6 +28,8 @@ _MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"), (b"\x00\x00\xfe\xff"
 UTF8_MARK = b"\xef\xbb\xbf"
 _VERSION = re.compile(rb"\d{1,3}(\.\d{1,3})?")
 _MASK_BITS = frozenset((b"0", b"1"))
+WIDE = 100
+"""Masks of BAPs have more columns, those of FAPs fewer, whatever their exact number."""
 _MASK_LIKE = 60
 """A line of at least this many 0s and 1s is taken for a mask, not for a header."""
 
@@ -151,6 +156,16 @@ def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Hea
             raise lines.error(f"{reason}; give one with --fps (fps=)", token=tokens[-2]) from None
     name = decoded(b" ".join(tokens[1:-2]))
     return Header(decoded(tokens[0]), name, rate, frames if frames >= 0 else None)
+
+
+def sniff_layout(head: bytes, layout: Layout) -> bool:
+    """Whether a file that begins so has this layout: by its mask width, else by its version."""
+    version, width = sniff_columns(head)
+    if not width:
+        return version in layout.versions
+    known = [w for count in layout.widths for w in (count, count + 1)]
+    wide = [columns >= WIDE for columns in (width, layout.columns)]
+    return width in known or (version in layout.versions and wide[0] == wide[1])
 
 
 def sniff_columns(head: bytes) -> tuple[str, int]:

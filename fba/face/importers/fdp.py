@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from fba.errors import FbaWarning, ModelError
 from fba.face.feature_points import MIRRORED, names, row_of
-from fba.face.importers.files import lines, number, whole, whole_number
+from fba.face.importers.files import number, whole, whole_number, words
 
 Float64 = npt.NDArray[np.float64]
 
@@ -99,20 +99,18 @@ def _load_text(path: str) -> Fdp:
     vertices: dict[str, tuple[str, int]] = {}
     strange: list[str] = []
     header = False
-    for line, text in lines(path):
-        where = f"{path}:{line}"
-        tokens = text.split("#", 1)[0].split()
-        if not tokens:
-            continue
+    for where, tokens in words(path):
         if not header:
             if len(tokens) < 2 or not tokens[0].startswith("1."):
-                raise ModelError(f"{where}: an FDP file begins with '1.0 NAME', not {text.strip()[:40]!r}")
+                raise ModelError(
+                    f"{where}: an FDP file begins with '1.0 NAME', not {' '.join(tokens)[:40]!r}"
+                )
             header = True
         elif tokens[0] in ("NUL", "NLL"):
             continue  # how many points the inner lips have in another player
         elif len(tokens) not in (4, 5):
             raise ModelError(
-                f"{where}: a feature point is 'GROUP.INDEX x y z MESH.VERTEX', not {text.strip()[:60]!r}"
+                f"{where}: a feature point is 'GROUP.INDEX x y z MESH.VERTEX', not {' '.join(tokens)[:60]!r}"
             )
         elif tokens[0] not in row_of():
             strange.append(tokens[0])

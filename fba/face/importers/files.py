@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from fba.errors import FormatError, ModelError
 from fba.source import open_source
@@ -28,10 +29,7 @@ def lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
     no text. Raises ModelError as `open_source` raises FormatError, and for a line beyond `MAX_LINE`.
     """
     name = os.fspath(path)
-    try:
-        file, size = open_source(name)
-    except FormatError as error:
-        raise ModelError(str(error)) from error
+    file, size = _opened(name)
     with file:
         number, left = 0, size
         while left > 0:
@@ -56,16 +54,28 @@ def lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
             yield number, text.rstrip("\r\n")
 
 
-def whole(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
-    """All bytes of a small file; ModelError where it cannot be read or is larger than `limit`."""
-    name = os.fspath(path)
+def words(path: str | os.PathLike[str]) -> Iterator[tuple[str, list[str]]]:
+    """The words of each line that has any before a "#", and its place for messages; errors as `lines`."""
+    for line, text in lines(path):
+        tokens = text.split("#", 1)[0].split()
+        if tokens:
+            yield f"{os.fspath(path)}:{line}", tokens
+
+
+def _opened(name: str) -> tuple[BinaryIO, int]:
     try:
-        file, size = open_source(name)
+        return open_source(name)
     except FormatError as error:
         raise ModelError(str(error)) from error
+
+
+def whole(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
+    """All bytes of a file; ModelError where it cannot be read or is larger than `limit`."""
+    name = os.fspath(path)
+    file, size = _opened(name)
     with file:
         if size > limit:
-            raise ModelError(f"{name}: is {size} bytes long, more than the {limit} expected of such a file")
+            raise ModelError(f"{name}: is {size} bytes long, more than the {limit} that are read")
         try:
             return file.read(size)
         except OSError as error:

@@ -6,7 +6,7 @@ import os
 import warnings
 
 from fba.errors import FbaWarning, ModelError
-from fba.face.importers.files import beside, lines, number, whole
+from fba.face.importers.files import beside, number, whole, words
 from fba.face.model import Material
 
 MAX_PICTURE = 1 << 27
@@ -33,9 +33,7 @@ def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
         if name is not None:
             found[name] = Material(name, (1.0, 1.0, 1.0) if picture else colour, rough, picture or None)
 
-    for line, text in lines(file):
-        where = f"{file}:{line}"
-        tokens = text.split("#", 1)[0].split()
+    for where, tokens in words(file):
         if len(tokens) < 2:
             continue
         if tokens[0] == "newmtl":

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.face.importers.files import beside, lines, number, whole_number
+from fba.face.importers.files import beside, number, whole_number, words
 from fba.face.importers.obj import read_obj
 from fba.face.importers.polygons import Polygons
 
@@ -27,11 +27,7 @@ def fitted(path: Path, base: Float64) -> Polygons:
     mesh = None
     rows: list[Float64] = []
     reading = False
-    for line, text in lines(path):
-        where = f"{path}:{line}"
-        tokens = text.split("#", 1)[0].split()
-        if not tokens:
-            continue
+    for where, tokens in words(path):
         if tokens[0] == "obj_file" and len(tokens) > 1:
             mesh = beside(path, tokens[1])
         elif tokens[0] in ("x_scale", "y_scale", "z_scale") and len(tokens) == 4:

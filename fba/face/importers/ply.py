@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import FormatError, ModelError
-from fba.face.importers.files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, whole_number
+from fba.errors import ModelError
+from fba.face.importers.files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, whole, whole_number
 from fba.face.importers.polygons import Polygons
-from fba.source import open_source
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
@@ -45,18 +44,7 @@ def read_ply(path: str | os.PathLike[str]) -> Polygons:
     `MAX_VERTICES` vertices.
     """
     name = os.fspath(path)
-    try:
-        file, size = open_source(name)
-    except FormatError as error:
-        raise ModelError(str(error)) from error
-    with file:
-        if size > MAX_BYTES:
-            raise ModelError(f"{name}: is {size} bytes long, more than the {MAX_BYTES} that are read")
-        try:
-            data = file.read(size)
-        except OSError as error:
-            raise ModelError(f"{name}: cannot be read: {error.strerror or error}") from error
-    return _Reader(name, data).read()
+    return _Reader(name, whole(name, MAX_BYTES)).read()
 
 
 class _Reader:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.face.importers.files import lines, number, whole_number
+from fba.face.importers.files import number, whole_number, words
 from fba.face.importers.makehuman import EYES, METRES, MakeHumanHead, eye_pieces
 
 Float32 = npt.NDArray[np.float32]
@@ -27,13 +27,11 @@ def read_target(path: str | os.PathLike[str], vertices: int) -> Float64:
     """
     moved = np.zeros((vertices, 3))
     seen = 0
-    for line, text in lines(path):
-        where = f"{os.fspath(path)}:{line}"
-        tokens = text.split("#", 1)[0].split()
-        if not tokens:
-            continue
+    for where, tokens in words(path):
         if len(tokens) != 4:
-            raise ModelError(f"{where}: a vertex and three numbers are expected, not {text.strip()[:60]!r}")
+            raise ModelError(
+                f"{where}: a vertex and three numbers are expected, not {' '.join(tokens)[:60]!r}"
+            )
         vertex = whole_number(tokens[0], where, "a vertex")
         if not 0 <= vertex < vertices:
             raise ModelError(f"{where}: vertex {vertex} does not exist; the base mesh has {vertices}")

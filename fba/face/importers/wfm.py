@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fba.errors import ModelError
-from fba.face.importers.files import MAX_FACES, MAX_VERTICES, lines, number, whole_number
+from fba.face.importers.files import MAX_FACES, MAX_VERTICES, number, whole_number, words
 from fba.face.importers.polygons import Polygons
 
 
@@ -19,7 +19,7 @@ def read_wfm(path: str | os.PathLike[str]) -> Polygons:
     line.
     """
     name = os.fspath(path)
-    rows = _rows(name)
+    rows = words(name)
     vertices = _table(rows, name, "vertices", MAX_VERTICES)
     faces = _table(rows, name, "faces", MAX_FACES)
     positions = np.array([[number(t, where, "a coordinate") for t in tokens] for where, tokens in vertices])
@@ -37,13 +37,6 @@ def read_wfm(path: str | os.PathLike[str]) -> Polygons:
         np.zeros(len(corners), dtype=np.int32),
         (("", ""),),
     )
-
-
-def _rows(path: str) -> Iterator[tuple[str, list[str]]]:
-    for line, text in lines(path):
-        tokens = text.split("#", 1)[0].split()
-        if tokens:
-            yield f"{path}:{line}", tokens
 
 
 def _table(
