@@ -55,4 +55,13 @@ def command(
     scene = player.Scene(animation, options.read_model(model), axes=axes, view=view)
     for switch, state in shows:
         scene.show(switch, state)
-    player.play(scene, size=size, speed=speed, loop=loop, camera=camera, title=file.name)
+    player.play(
+        scene,
+        size=size,
+        speed=speed,
+        loop=loop,
+        camera=camera,
+        title=file.name,
+        file=file,
+        bap_steps=bap_steps,
+    )

@@ -41,6 +41,7 @@ class Bar:
         self._held = ""
         self._from = 0.0
         self._trace: tuple[object, ...] = ()
+        self._ticks: tuple[Ruler | None, list[float], list[tuple[float, float, str]]] = (None, [], [])
         self.place = (0.0, 0.0, 0.0, 0.0)
         """Where the timeline is: left, top, right, bottom in points; for tests and pictures."""
 
@@ -155,19 +156,16 @@ class Bar:
         to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK))
 
     def _scale(self, to: imgui.ImDrawList, ruler: Ruler, y: float, bottom: float) -> None:
-        step = ruler.step(APART)
+        if self._ticks[0] != ruler:
+            self._ticks = (ruler, *_ticks(ruler))
+        _, small, large = self._ticks
         font, colour = imgui.get_font(), theme.packed(theme.FAINT)
-        faint = theme.packed(theme.FAINT, 0.35)
-        for time in ruler.ticks(step / 5):
-            x = ruler.x(time)
+        faint, line = theme.packed(theme.FAINT, 0.35), theme.packed(theme.LINE)
+        for x in small:
             to.add_line((x, bottom - 3), (x, bottom), faint)
-        for time in ruler.ticks(step):
-            x, text = ruler.x(time), label(time, step)
-            to.add_line((x, y + TOP), (x, bottom), theme.packed(theme.LINE))
-            wide = 6.2 * len(text)
-            to.add_text(
-                font, 12.0, (min(max(x - wide / 2, ruler.left), ruler.right - wide), y + 5), colour, text
-            )
+        for x, left, text in large:
+            to.add_line((x, y + TOP), (x, bottom), line)
+            to.add_text(font, 12.0, (left, y + 5), colour, text)
 
     def _marks(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, top: float, bottom: float) -> None:
         dark = theme.packed((0.05, 0.055, 0.06, 0.62))
@@ -313,6 +311,17 @@ def snapped(speed: float) -> float:
     speed = min(max(speed, SPEEDS[0]), SPEEDS[-1])
     near = min(SPEEDS, key=lambda step: abs(math.log(step / speed)))
     return near if abs(math.log(near / speed)) < 0.045 else round(speed, 2)
+
+
+def _ticks(ruler: Ruler) -> tuple[list[float], list[tuple[float, float, str]]]:
+    """Places of the small ticks; and place, left edge of the label and label of the large ones."""
+    step = ruler.step(APART)
+    large = []
+    for time in ruler.ticks(step):
+        x, text = ruler.x(time), label(time, step)
+        wide = 6.2 * len(text)
+        large.append((x, max(min(x - wide / 2, ruler.right - wide), ruler.left), text))
+    return [ruler.x(time) for time in ruler.ticks(step / 5)], large
 
 
 def _span(session: Session) -> tuple[float, float]:

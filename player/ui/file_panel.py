@@ -20,16 +20,18 @@ class FilePanel(Panel):
     side = "left"
     width = 330.0
 
+    def __init__(self) -> None:
+        self._told: tuple[StreamInfo, list[tuple[str, list[tuple[str, str]]]]] | None = None
+
     def draw(self, session: Session) -> None:
+        """Draw it."""
         source, info = session.source, session.source.info
-        facts("file", _about(session, info))
-        if info.plane_bits is not None:
-            heading("Stream")
-            facts("stream", _stream(info))
-        for title, name, part in (("Face", "FAPs", info.face), ("Body", "BAPs", info.body)):
-            if part is not None:
+        if self._told is None or self._told[0] is not info:
+            self._told = (info, _all(session, info))
+        for title, rows in self._told[1]:
+            if title:
                 heading(title)
-                facts(title, _part(part, name, info.frames))
+            facts(title or "file", rows)
         troubles = [*source.warnings, *(str(one.error) for one in info.damage)]
         if troubles:
             heading("Warnings")
@@ -41,6 +43,17 @@ class FilePanel(Panel):
                 imgui.text_unformatted(f"and {len(troubles) - 20} more")
             imgui.pop_text_wrap_pos()
             imgui.pop_style_color()
+
+
+def _all(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
+    """(heading, rows) of the panel."""
+    parts = [("", _about(session, info))]
+    if info.plane_bits is not None:
+        parts.append(("Stream", _stream(info)))
+    for title, name, part in (("Face", "FAPs", info.face), ("Body", "BAPs", info.body)):
+        if part is not None:
+            parts.append((title, _part(part, name, info.frames)))
+    return parts
 
 
 def _about(session: Session, info: StreamInfo) -> list[tuple[str, str]]:

@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 from imgui_bundle import imgui
 
-VERTEX = np.dtype([("place", "<f4", 2), ("texture", "<f4", 2), ("colour", "u1", 4)])
-"""One vertex as Dear ImGui lays it out (ImDrawVert)."""
-INDEX = np.dtype("<u4")
+VERTEX_BYTES = 20
+"""A vertex as Dear ImGui lays it out: place and place in the texture, two float32 each, and four bytes."""
+INDEX = np.dtype(np.uint32)
+BYTE = np.dtype(np.uint8)
 
 
 class ImguiRenderer:
@@ -26,10 +27,10 @@ class ImguiRenderer:
     """
 
     def __init__(self, context: Any) -> None:
-        if (VERTEX.itemsize, INDEX.itemsize) != (imgui.VERTEX_SIZE, imgui.INDEX_SIZE):
+        if (VERTEX_BYTES, INDEX.itemsize) != (imgui.VERTEX_SIZE, imgui.INDEX_SIZE):
             raise RuntimeError(
                 f"this build of imgui has vertices of {imgui.VERTEX_SIZE} bytes and indices of "
-                f"{imgui.INDEX_SIZE}; expected {VERTEX.itemsize} and {INDEX.itemsize}: install another "
+                f"{imgui.INDEX_SIZE}; expected {VERTEX_BYTES} and {INDEX.itemsize}: install another "
                 "version of imgui-bundle"
             )
         self._gl = context
@@ -46,7 +47,6 @@ class ImguiRenderer:
         self._reserve(1 << 16, 1 << 16)
         io = imgui.get_io()
         io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
-        io.backend_flags |= imgui.BackendFlags_.renderer_has_vtx_offset
         largest = int(context.info["GL_MAX_TEXTURE_SIZE"])
         platform = imgui.get_platform_io()
         platform.renderer_texture_max_width = platform.renderer_texture_max_height = largest
@@ -107,34 +107,38 @@ class ImguiRenderer:
 
         Neighbours with one texture and one clip rectangle become one: a call costs more than what it draws.
         """
-        all_vertices, all_indices = [], []
+        vertices, indices = data.total_vtx_count, data.total_idx_count
+        self._reserve(vertices * VERTEX_BYTES, indices * INDEX.itemsize)
         commands: list[tuple[tuple[float, ...], int, int, int]] = []
         base = before = 0
         corner_x, corner_y = data.display_pos
         for drawn in data.cmd_lists:
-            vertices = _view(drawn.vtx_buffer, VERTEX)
-            indices = _view(drawn.idx_buffer, INDEX)
+            count, length = drawn.vtx_buffer.size(), drawn.idx_buffer.size()
+            if not length:
+                continue
+            part = slice(base * VERTEX_BYTES, (base + count) * VERTEX_BYTES)
+            self._vertex_memory[part] = _view(drawn.vtx_buffer, count * VERTEX_BYTES, BYTE)
+            into = self._index_memory[before : before + length]
+            np.add(_view(drawn.idx_buffer, length, INDEX), np.uint32(base), out=into)
             for command in drawn.cmd_buffer:
-                count = command.elem_count
-                if not count:
+                count_here = command.elem_count
+                if not count_here:
                     continue
-                first = command.idx_offset
-                all_indices.append(indices[first : first + count] + np.uint32(base + command.vtx_offset))
                 x0, y0, x1, y1 = command.clip_rect
                 clip = (x0 - corner_x, y0 - corner_y, x1 - corner_x, y1 - corner_y)
-                number = command.get_tex_id()
-                if commands and commands[-1][:2] == (clip, number):
-                    commands[-1] = (clip, number, commands[-1][2], commands[-1][3] + count)
-                else:
-                    commands.append((clip, number, before, count))
-                before += count
-            all_vertices.append(vertices)
-            base += len(vertices)
-        self._reserve(base * VERTEX.itemsize, before * INDEX.itemsize)
+                first, number = before + command.idx_offset, command.get_tex_id()
+                if commands:
+                    last_clip, last_number, last_first, last_count = commands[-1]
+                    if last_clip == clip and last_number == number and last_first + last_count == first:
+                        commands[-1] = (clip, number, last_first, last_count + count_here)
+                        continue
+                commands.append((clip, number, first, count_here))
+            base += count
+            before += length
         self._vertices.orphan()
-        self._vertices.write(np.concatenate(all_vertices))
+        self._vertices.write(self._vertex_memory[: base * VERTEX_BYTES])
         self._indices.orphan()
-        self._indices.write(np.concatenate(all_indices))
+        self._indices.write(self._index_memory[:before])
         return commands
 
     def _reserve(self, vertex_bytes: int, index_bytes: int) -> None:
@@ -150,6 +154,8 @@ class ImguiRenderer:
         gl = self._gl
         self._vertices = gl.buffer(reserve=max(2 * vertex_bytes, 1 << 16), dynamic=True)
         self._indices = gl.buffer(reserve=max(2 * index_bytes, 1 << 16), dynamic=True)
+        self._vertex_memory = np.zeros(self._vertices.size, BYTE)
+        self._index_memory = np.zeros(self._indices.size // INDEX.itemsize, INDEX)
         self._array = gl.vertex_array(
             self._program,
             [(self._vertices, "2f 2f 4f1", "in_place", "in_texture", "in_colour")],
@@ -178,10 +184,7 @@ class ImguiRenderer:
             texture.set_status(status.destroyed)
 
 
-def _view(vector: Any, dtype: np.dtype[Any]) -> npt.NDArray[Any]:
-    """An imgui vector's memory as an array, without a copy; valid until the next frame."""
-    count = vector.size()
-    if not count:
-        return np.zeros(0, dtype)
+def _view(vector: Any, count: int, dtype: np.dtype[Any]) -> npt.NDArray[Any]:
+    """An imgui vector's memory as so many numbers, without a copy; valid until the next frame."""
     memory = (ctypes.c_char * (count * dtype.itemsize)).from_address(vector.data_address())
     return np.frombuffer(memory, dtype)

@@ -13,7 +13,7 @@ class Key:
     """A row of the table.
 
     keys: as shown to people ("F12", "Ctrl+S"); any of them does. action: see `player.ui.actions`. held:
-    whether it goes on while the key is held. group, does: for the help.
+    whether it goes on while the key is held. group, does: for the help. shown: the keys for people, "Esc, Q".
     """
 
     keys: tuple[str, ...]
@@ -21,18 +21,21 @@ class Key:
     held: bool
     group: str
     does: str
-
-    @property
-    def shown(self) -> str:
-        """The keys for people: "Esc, Q"."""
-        return ", ".join(_shown(key) for key in self.keys)
+    shown: str
 
 
 @cache
 def keys() -> tuple[Key, ...]:
     """All rows, in the order of the help."""
     return tuple(
-        Key(tuple(row["keys"].split()), row["action"], bool(row["held"]), row["group"], row["does"])
+        Key(
+            keys=tuple(row["keys"].split()),
+            action=row["action"],
+            held=bool(row["held"]),
+            group=row["group"],
+            does=row["does"],
+            shown=", ".join(_shown(key) for key in row["keys"].split()),
+        )
         for row in _rows("keys.csv")
     )
 
