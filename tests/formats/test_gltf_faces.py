@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -13,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gltf_edits import document, edit
 
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
@@ -59,27 +58,9 @@ def animation(face: FaceTrack, body: bool = False) -> Animation:
     return Animation(Fraction(30000, 1001), index, face, track, "face")
 
 
-def document(path: Path) -> dict[str, Any]:
-    data = path.read_bytes()
-    found: dict[str, Any] = json.loads(data[20 : 20 + struct.unpack_from("<I", data, 12)[0]])
-    return found
-
-
 def note(path: Path) -> dict[str, Any]:
-    found: dict[str, Any] = document(path)["animations"][0]["extras"]["fba"]["face"]
+    found: dict[str, Any] = document(path.read_bytes())["animations"][0]["extras"]["fba"]["face"]
     return found
-
-
-def edit(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
-    """Give a .glb another JSON."""
-    data = path.read_bytes()
-    rest = data[20 + struct.unpack_from("<I", data, 12)[0] :]
-    whole = document(path)
-    change(whole)
-    text = json.dumps(whole).encode()
-    text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON")
-    path.write_bytes(head + text + rest)
 
 
 def edit_note(path: Path, change: Callable[[dict[str, Any]], object]) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import struct
 import warnings
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gltf_edits import edited
 from scipy.spatial.transform import Rotation
 
 import fba
@@ -226,16 +225,8 @@ def test_several_animations(tmp_path: Path) -> None:
 
 def changed(tmp_path: Path, change: Any) -> Path:
     """The file with its JSON changed."""
-    data = glb(second=False)
-    length = struct.unpack_from("<I", data, 12)[0]
-    document = json.loads(data[20 : 20 + length])
-    change(document)
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    body = data[20 + length :]
     path = tmp_path / "changed.glb"
-    head = struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + len(body))
-    path.write_bytes(head + struct.pack("<I4s", len(text), b"JSON") + text + body)
+    path.write_bytes(edited(glb(second=False), change))
     return path
 
 
