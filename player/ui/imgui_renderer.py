@@ -187,4 +187,4 @@ class ImguiRenderer:
 def _view(vector: Any, count: int, dtype: np.dtype[Any]) -> npt.NDArray[Any]:
     """An imgui vector's memory as so many numbers, without a copy; valid until the next frame."""
     memory = (ctypes.c_char * (count * dtype.itemsize)).from_address(vector.data_address())
-    return np.frombuffer(memory, dtype)
+    return np.frombuffer(memoryview(memory).cast("B"), dtype)
