@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from json_places import REMOVED, put
 from scipy.spatial import cKDTree
 from small_bodies import random_pose, rod
 
@@ -250,14 +251,7 @@ def file() -> bytes:
 def changed(place: str, value: Any) -> bytes:
     text, binary = split(file(), "rod.glb")
     root = json.loads(bytes(text))
-    *steps, last = [int(step) if step.isdigit() else step for step in place.split("/")]
-    holder = root
-    for step in steps:
-        holder = holder[step]
-    if value is None:
-        del holder[last]
-    else:
-        holder[last] = value
+    put(root, place, value)
     assert binary is not None
     return join(json.dumps(root).encode(), bytes(binary))
 
@@ -268,10 +262,10 @@ BODY = "extensions/FBA_body"
 @pytest.mark.parametrize(
     ("place", "value", "message"),
     [
-        ("extensions", None, "brings no extension FBA_body"),
+        ("extensions", REMOVED, "brings no extension FBA_body"),
         (f"{BODY}/version", 9, "is version 9; version 1 is read"),
         (f"{BODY}/skin", 3, r"FBA_body.skin: 3 is not within"),
-        (f"{BODY}/skin", None, "'skin' is missing"),
+        (f"{BODY}/skin", REMOVED, "'skin' is missing"),
         (f"{BODY}/parts", [], "a body needs at least one part"),
         (f"{BODY}/parts/0/node", 0, r"parts\[0\].node: must have a mesh"),
         (f"{BODY}/parts/0/kind", "nose", r"parts\[0\].kind: 'nose' is none of"),
@@ -287,8 +281,8 @@ BODY = "extensions/FBA_body"
         ("nodes/1/name", "root", "two joints are called 'root'"),
         ("skins/0/joints", [0, 2], "names joint 2, but skin 0 has 2"),
         ("nodes/0/children", [], "the first joint|must be the root|no child|parent"),
-        ("nodes/3/skin", None, r"parts\[0\].node: must be carried by skin 0"),
-        ("meshes/0/primitives/0/attributes/WEIGHTS_0", None, "sets of JOINTS"),
+        ("nodes/3/skin", REMOVED, r"parts\[0\].node: must be carried by skin 0"),
+        ("meshes/0/primitives/0/attributes/WEIGHTS_0", REMOVED, "sets of JOINTS"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_named(place: str, value: Any, message: str) -> None:

@@ -9,6 +9,7 @@ import tempfile
 import textwrap
 import threading
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -248,16 +249,21 @@ def test_the_zero_frame_is_the_neutral_face() -> None:
     np.testing.assert_array_equal(deformer.head_matrices(np.zeros(68)), np.eye(4))
 
 
-@pytest.mark.parametrize("shape", [(67,), (2, 69), (1, 1, 68), (), (68, 1)])
-def test_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
-    deformer = lively()
-    for method in (
+def methods(deformer: Deformer) -> tuple[Callable[[object], object], ...]:
+    """All that take FAPs."""
+    return (
         deformer,
         deformer.local,
         deformer.head_matrices,
         deformer.part_matrices,
         deformer.feature_points,
-    ):
+    )
+
+
+@pytest.mark.parametrize("shape", [(67,), (2, 69), (1, 1, 68), (), (68, 1)])
+def test_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
+    deformer = lively()
+    for method in methods(deformer):
         with pytest.raises(ValueError, match="68"):
             method(np.zeros(shape))
 
@@ -275,13 +281,7 @@ def test_values_that_no_stream_can_carry_are_refused(value: float) -> None:
     frames = np.zeros((3, 68))
     frames[2, 30] = value
     deformer = lively()
-    for method in (
-        deformer,
-        deformer.local,
-        deformer.head_matrices,
-        deformer.part_matrices,
-        deformer.feature_points,
-    ):
+    for method in methods(deformer):
         with pytest.raises(RangeError, match=r"frame 2, FAP 31 raise_l_i_eyebrow") as caught:
             method(frames)
         assert caught.value.frame == 2

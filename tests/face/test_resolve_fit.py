@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hand_tracks
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -33,17 +34,8 @@ def track(
     expression: list[tuple[int, ...] | None] | None = None,
 ) -> FaceTrack:
     """Frames as {name: value}; None where no viseme or expression is sent."""
-    count = len(frames)
-    values, mask = np.zeros((count, 68), dtype=int), np.zeros((count, 68), dtype=bool)
-    fields = [np.zeros((count, n), dtype=int) for n in (4, 6)]
-    for t, frame in enumerate(frames):
-        for name, value in frame.items():
-            values[t, fap_numbers()[name] - 1], mask[t, fap_numbers()[name] - 1] = value, True
-    for column, (sent, into) in enumerate(zip((viseme, expression), fields, strict=True)):
-        for t, entry in enumerate(sent or []):
-            if entry is not None:
-                into[t], mask[t, column] = entry, True
-    return FaceTrack(values, mask, *fields)
+    numbered = [{fap_numbers()[name]: value for name, value in frame.items()} for frame in frames]
+    return hand_tracks.track(numbered, viseme, expression)
 
 
 def shown(name: str, faps: np.ndarray) -> list[float]:

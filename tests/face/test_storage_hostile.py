@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from json_places import REMOVED, put
 from stored_models import assert_same, face
 
 from fba.errors import FbaWarning, FormatError, ModelError
@@ -43,18 +44,10 @@ def read(data: bytes) -> FaceModel:
 def changed(place: str, value: Any) -> bytes:
     """The good file with one value of its JSON replaced, or removed where `value` is `REMOVED`."""
     root, binary = document()
-    *steps, last = [int(step) if step.isdigit() else step for step in place.split("/")]
-    holder = root
-    for step in steps:
-        holder = holder[step]
-    if value is REMOVED:
-        del holder[last]
-    else:
-        holder[last] = value
+    put(root, place, value)
     return join(json.dumps(root).encode(), binary)
 
 
-REMOVED = object()
 FACE = "extensions/FBA_face"
 LID = f"{FACE}/tables/1/meshes/0"
 LOOP = {"source": ["raise_nose"], "destination": {"raise_nose": {}}}

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_documents import Sheet, container
+from json_places import REMOVED, put
 
 from fba.errors import FbaError, FbaWarning, FormatError, ModelError
 from fba.gltf import read_gltf
@@ -64,18 +65,10 @@ def read(data: bytes) -> None:
 def changed(place: str, value: Any) -> bytes:
     """The good document with one value replaced, or removed where `value` is `REMOVED`."""
     sheet = good()
-    *steps, last = [int(step) if step.isdigit() else step for step in place.split("/")]
-    holder: Any = sheet.json
-    for step in steps:
-        holder = holder[step]
-    if value is REMOVED:
-        del holder[last]
-    else:
-        holder[last] = value
+    put(sheet.json, place, value)
     return sheet.glb()
 
 
-REMOVED = object()
 PRIMITIVE = "meshes/0/primitives/0"
 CASES: list[tuple[str, Any, str]] = [
     ("asset", REMOVED, "'asset' is missing"),
