@@ -12,8 +12,6 @@ WINDOW = 10
 """Calls of which the most punctual tells: a busy machine answers late, never early."""
 JUMP = 0.05
 """Seconds of difference, in the most punctual call, beyond which the device has stopped for a while."""
-DRY = 2.0
-"""A device that waits for longer than its latency times this has run dry."""
 
 
 class SoundClock:
@@ -55,17 +53,15 @@ class SoundClock:
         elif self._filling:
             self._filling = now - self._called < 0.5 * samples / self.rate
         if not self._filling:
-            if now - self._called > DRY * self.latency:
-                self._recent.clear()
             here = self._samples / self.rate + self._lost - self.latency
             self._recent.append(here - now)
             off = max(self._recent) - self._ahead
-            if off < -JUMP:
+            if off < -JUMP and len(self._recent) == WINDOW:
                 self._lost -= off
                 self._recent.clear()
             elif off > JUMP:
                 self._ahead += off
-            else:
+            elif off > -JUMP:
                 self._ahead += GAIN * off
         self._called = now
         first = self._samples / self.rate + self._lost

@@ -34,26 +34,45 @@ FRAME_ROUNDING = 1e-6
 class Timeline:
     """What an animation shows at any time.
 
-    start: time of the first frame, seconds, exact. duration: from there to one frame period after the
-    last, exact. A time before or after shows the first or last frame; between two frames, values are
-    interpolated, over skipped frames too, unless `interpolate` is False: then the frame last passed is shown.
-    growing: whether frames still arrive (`player.live`); arrived: changes whenever some did.
+    animation: may grow where `growing` says so. model: gives the definitions of visemes and expressions, and
+    the interpolation table; by default the built-in ones. A time before or after shows the first or last
+    frame; between two frames, values are interpolated, over skipped frames too, unless `interpolate` is
+    False: then the frame last passed is shown. growing: whether frames still arrive (`player.live`);
+    arrived: changes whenever some did.
     """
 
     growing = False
     arrived = 0
+    block = BLOCK
+    """Frames worked out at once."""
 
     def __init__(self, animation: Animation, model: object = None) -> None:
         self.animation = animation
         self.interpolate = True
-        self.rate: Fraction = animation.rate
-        self.frames = len(animation)
-        self.start = Fraction(int(animation.index[0])) / self.rate if self.frames else Fraction(0)
-        self.duration: Fraction = animation.duration
         self._resolvers: list[Resolver] = [Resolver(model)]
         self._bodies: list[npt.NDArray[np.int32]] = [np.zeros(BAP_COUNT, dtype=np.int32)]
         self._faces_shown: OrderedDict[int, npt.NDArray[np.float32]] = OrderedDict()
         self._bodies_shown: OrderedDict[int, npt.NDArray[np.int32]] = OrderedDict()
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames a second."""
+        return self.animation.rate
+
+    @property
+    def frames(self) -> int:
+        """How many frames there are."""
+        return len(self.animation)
+
+    @property
+    def start(self) -> Fraction:
+        """Time of the first frame, seconds, exact."""
+        return Fraction(int(self.animation.index[0])) / self.rate if self.frames else Fraction(0)
+
+    @property
+    def duration(self) -> Fraction:
+        """Seconds from there to one frame period after the last, exact."""
+        return self.animation.duration
 
     @property
     def end(self) -> Fraction:
@@ -118,39 +137,42 @@ class Timeline:
         return shown
 
     def _face(self, frame: int) -> npt.NDArray[np.float32]:
-        block, row = divmod(frame, BLOCK)
-        track = self.animation.face
-        assert track is not None
-        if block not in self._faces_shown:
+        block, row = divmod(frame, self.block)
+        shown = self._faces_shown.get(block)
+        if shown is None or row >= len(shown):
+            track = self.animation.face
+            assert track is not None
             while len(self._resolvers) <= block:
                 resolver = self._resolvers[-1].copy()
-                number = len(self._resolvers) - 1
-                resolver.push(track[number * BLOCK : (number + 1) * BLOCK])
+                resolver.push(track[self._rows(len(self._resolvers) - 1)])
                 self._resolvers.append(resolver)
-            shown = self._resolvers[block].copy().push(track[block * BLOCK : (block + 1) * BLOCK])
+            shown = self._resolvers[block].copy().push(track[self._rows(block)])
             _keep(self._faces_shown, block, shown)
-        face: npt.NDArray[np.float32] = self._faces_shown[block][row]
+        face: npt.NDArray[np.float32] = shown[row]
         return face
 
     def _body(self, frame: int) -> npt.NDArray[np.int32]:
-        block, row = divmod(frame, BLOCK)
-        track = self.animation.body
-        assert track is not None
-        if block not in self._bodies_shown:
+        block, row = divmod(frame, self.block)
+        shown = self._bodies_shown.get(block)
+        if shown is None or row >= len(shown):
             while len(self._bodies) <= block:
                 self._bodies.append(self._held_body(len(self._bodies) - 1)[-1].copy())
-            _keep(self._bodies_shown, block, self._held_body(block))
-        body: npt.NDArray[np.int32] = self._bodies_shown[block][row]
+            shown = self._held_body(block)
+            _keep(self._bodies_shown, block, shown)
+        body: npt.NDArray[np.int32] = shown[row]
         return body
 
     def _held_body(self, block: int) -> npt.NDArray[np.int32]:
         track = self.animation.body
         assert track is not None
-        rows = slice(block * BLOCK, (block + 1) * BLOCK)
-        if track.mask[rows].all():
-            return track.values[rows]
-        held: npt.NDArray[np.int32] = hold(track.values[rows], track.mask[rows], self._bodies[block])
+        part = track[self._rows(block)]
+        if part.mask.all():
+            return part.values
+        held: npt.NDArray[np.int32] = hold(part.values, part.mask, self._bodies[block])
         return held
+
+    def _rows(self, block: int) -> slice:
+        return slice(block * self.block, (block + 1) * self.block)
 
 
 def _keep(shown: OrderedDict[int, npt.NDArray[Any]], block: int, values: npt.NDArray[Any]) -> None:
