@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
+from fba.parameters import FAP_COUNT
 from player.camera import Subject
 from player.eyeball import Eyeball, find_eyeball
-from player.face_light import FaceLight
-from player.face_parts import known_middle, part_shape, sway
+from player.face_light import MOUTH_OPEN, FaceLight
+from player.face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
 from player.shapes import Eye, FaceMesh, FaceShape, rotation_vector
 
 Float32 = npt.NDArray[np.float32]
@@ -23,6 +24,9 @@ Float64 = npt.NDArray[np.float64]
 CUT = 0.45
 """On a body, what sways less than this is left out: the body has a neck of its own."""
 
+GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
+           6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip
+"""FAPs that close the eyes, raise the brows and draw the mouth wide: what they move keeps its detail."""
 EYES_APART = 0.062
 """Metres between an adult's pupils."""
 
@@ -54,17 +58,37 @@ class FaceFigure:
         }
         self._eyeballs: list[tuple[Part, Eyeball]] = []
         self._shapes: dict[str, FaceShape] = {}
+        self._extremes: dict[tuple[int, ...], Float32] = {}
         sways = sway(model)
         for part in model.parts:
             ball = find_eyeball(part, model) if part.kind == "eye" else None
             if ball is None:
-                self._shapes[part.name] = part_shape(part, sways[self._ranges[part.name]])
+                self._shapes[part.name] = self._shape(part, sways[self._ranges[part.name]])
             else:
                 self._eyeballs.append((part, ball))
+        self._extremes.clear()
         self._cut: dict[str, FaceShape] = {}
         self.sway = sways
         self.centre = _head_centre(model)
         self._light = FaceLight(model, self.deformer, sways)
+
+    def _shape(self, part: Part, sways: Float32) -> FaceShape:
+        shape = part_shape(part, sways)
+        if shape.across is not None:  # single hairs are not made of fewer triangles
+            return shape
+        rows = self._ranges[part.name]
+        poses = [self._extreme(faps)[rows] for faps in ({}, MOUTH_OPEN, GRIMACE)]
+        return replace(shape, coarser=coarser_part(part, poses))
+
+    def _extreme(self, faps: dict[int, int]) -> Float32:
+        """(V, 3) the face, for FAPs by their numbers; its head not turned."""
+        key = tuple(faps)
+        if key not in self._extremes:
+            values = np.zeros(FAP_COUNT, dtype=np.float32)
+            for number, value in faps.items():
+                values[number - 1] = value
+            self._extremes[key] = self.deformer.local(values)
+        return self._extremes[key]
 
     @property
     def scale(self) -> float:
@@ -114,7 +138,7 @@ class FaceFigure:
         axis = rotation_vector(pose.turn[:3, :3])
         found = []
         for name, shape in (self._on_body() if on_body else self._shapes).items():
-            if self.model.part(name).kind in without:
+            if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
             rows = self._ranges[name]
             arrays = pose.positions[rows], pose.normals[rows], light[rows]
@@ -157,7 +181,7 @@ class FaceFigure:
             for name, shape in self._shapes.items():
                 kept = (shape.sway[shape.triangles] > CUT).all(axis=1)
                 if kept.any():
-                    self._cut[name] = replace(shape, triangles=np.ascontiguousarray(shape.triangles[kept]))
+                    self._cut[name] = with_triangles(shape, shape.triangles[kept])
         return self._cut
 
 

@@ -5,13 +5,21 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
+from player.coarse import Coarser
+from player.pictures import breadth
+from player.relief import RELIEF
 from player.shapes import FaceShape
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyPart
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -24,10 +32,15 @@ THICKEST_HAIR = 0.0012
 LARGEST_PICTURE = 4096
 """Textures of more pixels across are made smaller."""
 ROUGH = 0.36
-RELIEF = 0.022
-"""Strength of the skin's relief, and metres until it repeats."""
+"""Strength of the skin's relief."""
 NECK = 2.3
 """Length over which a neck bends, in distances from eyes to nose (ENS)."""
+MOST_BENT, BENT = 0.1, 0.8
+"""Where more than this share of a part's edges bend by more than the angle of this cosine, light is worked
+out pixel by pixel."""
+NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
+"""How a coarser part keeps these: what a normal that is off by its own length, a texture off by a metre, and
+a colour off by all its light count in metres."""
 
 
 def sway(model: FaceModel) -> Float32:
@@ -72,7 +85,31 @@ def part_shape(part: Part, sways: Float32) -> FaceShape:
         hairs(part) if part.kind in HAIRY and picture is None else None,
         name=part.name,
         kind=part.kind,
+        smooth=_is_smooth(part),
     )
+
+
+def coarser_part(part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None) -> Coarser:
+    """Levels of detail of a part that takes these poses, (V, 3) each. more: (V, N), what is to be kept
+    besides its normals, colours and texture, scaled to metres."""
+    columns = list(poses)
+    if part.normals is not None:
+        columns.append(part.normals * NORMAL_WEIGHT)
+    if part.texcoords is not None and len(part.triangles):
+        metres = breadth(part.vertices, part.texcoords, part.triangles)
+        columns.append(part.texcoords * (TEXTURE_WEIGHT * metres))
+    if part.colours is not None:
+        columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
+    if more is not None:
+        columns.append(more)
+    return Coarser(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
+
+
+def with_triangles(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> FaceShape:
+    """The same with some of its triangles only."""
+    left = np.ascontiguousarray(triangles, dtype=np.int32)
+    coarser = None if shape.coarser is None else replace(shape.coarser, triangles=left)
+    return replace(shape, triangles=left, coarser=coarser)
 
 
 def hairs(part: Part) -> Float32 | None:
@@ -122,15 +159,17 @@ def _relief(part: Part) -> tuple[float, float]:
     """Strength of the skin's relief and its repeats, so that a repeat is `RELIEF` metres wide."""
     if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
         return (0.0, 1.0)
-    corners, flat = part.vertices[part.triangles], part.texcoords[part.triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    spread = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    laid = spread > 1e-9
-    if not laid.any():
-        return (0.0, 1.0)
-    metres = float(np.sqrt(np.median(area[laid] / spread[laid])))  # across the whole picture
-    return (ROUGH, min(metres / RELIEF, 200.0))
+    metres = breadth(part.vertices, part.texcoords, part.triangles)
+    return (ROUGH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
+
+
+def _is_smooth(part: Part) -> bool:
+    """Whether most edges bend so little that light may be worked out at their ends."""
+    if part.normals is None or not len(part.triangles):
+        return True
+    corners = part.normals[part.triangles]
+    cosines = np.einsum("tkn,tkn->tk", corners, np.roll(corners, 1, axis=1))
+    return bool(np.quantile(cosines, MOST_BENT) > BENT)
 
 
 def _picture(part: Part) -> npt.NDArray[np.uint8] | None:

@@ -1,39 +1,54 @@
-"""Draws the parts of faces: their buffers and textures on the graphics card."""
+"""Draws the parts of faces and bodies: their buffers and textures on the graphics card."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from player.programs import matrix_bytes, set_uniform
-from player.relief import relief
+from player.detail import distance, same
+from player.pictures import Pictures, halved
+from player.programs import load_program, matrix_bytes, set_uniform
+from player.relief import RELIEF, relief
 from player.shapes import FaceMesh, FaceShape
+
+Float64 = npt.NDArray[np.float64]
 
 MOST_SHAPES = 64
 """Parts remembered on the graphics card; the longest unused goes first."""
+FAINTEST = 0.25
+"""Where a repeat of the skin's relief is this share of its size in pixels or less, it is not seen."""
 
 
 class FaceRenderer:
-    """Draws face meshes with the program "face", whose uniforms of camera and eye are already set.
+    """Draws face meshes. Owns what it allocates on the context; `close` gives it back."""
 
-    Owns what it allocates on the context; `close` gives it back.
-    """
-
-    def __init__(self, context: Any, program: Any) -> None:
+    def __init__(self, context: Any) -> None:
         self._gl = context
-        self._program = program
+        self._programs: dict[bool, Any] = {}
         self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
-        self._relief: Any = None
+        self._reliefs: dict[int, Any] = {}
+        self._pixels: npt.NDArray[np.uint8] | None = None
         self._white = context.texture((1, 1), 4, bytes([255] * 4))
+        self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
+
+    def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
+        """From where the next meshes are seen: eye (3,), (4, 4) world to clip space, size of a pixel at a
+        distance of 1."""
+        self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
+        for program in self._programs.values():
+            self._place(program)
 
     def draw(self, meshes: list[FaceMesh]) -> None:
         """Draw parts; those that can be seen through last."""
         gl = self._gl
-        solid = [mesh for mesh in meshes if not self._parts(mesh)["see_through"]]
-        for mesh in solid:
-            self._draw(mesh)
-        rest = [mesh for mesh in meshes if self._parts(mesh)["see_through"]]
+        rest = []
+        for mesh in meshes:
+            if self._parts(mesh)["see_through"]:
+                rest.append(mesh)
+            else:
+                self._draw(mesh)
         if rest:
             gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
             gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
@@ -48,31 +63,49 @@ class FaceRenderer:
         for _, parts in self._kept.values():
             _release(parts)
         self._kept.clear()
-        self._white.release()
-        if self._relief is not None:
-            self._relief.release()
+        for part in (self._white, *self._reliefs.values(), *self._programs.values()):
+            part.release()
+        self._reliefs.clear()
+        self._programs.clear()
+
+    def _program(self, smooth: bool) -> Any:
+        if smooth not in self._programs:
+            self._programs[smooth] = load_program(self._gl, "face", *(["SMOOTH"] if smooth else []))
+            self._place(self._programs[smooth])
+        return self._programs[smooth]
+
+    def _place(self, program: Any) -> None:
+        eye, matrix, pixel = self._camera
+        set_uniform(program, "eye", tuple(float(v) for v in eye))
+        if matrix:
+            set_uniform(program, "camera", matrix)
+        set_uniform(program, "pixel", pixel)
 
     def _draw(self, mesh: FaceMesh) -> None:
-        parts, shape, program = self._parts(mesh), mesh.shape, self._program
+        parts, shape, program = self._parts(mesh), mesh.shape, self._program(mesh.shape.smooth)
         for name, array in (("positions", mesh.positions), ("normals", mesh.normals), ("light", mesh.light)):
-            data = np.ascontiguousarray(array, dtype="f4")
             if name == "light":
-                if parts["lit"] is array:
+                if parts["lit"] is not None and same(parts["lit"], array):
                     continue
                 parts["lit"] = array
             parts[name].orphan()
-            parts[name].write(data)
-        set_uniform(program, "world", matrix_bytes(mesh.matrix))
-        set_uniform(program, "turn", tuple(float(v) for v in mesh.turn))
-        set_uniform(program, "centre", tuple(float(v) for v in mesh.centre))
-        set_uniform(program, "textured", 0.0 if shape.picture is None else 1.0)
-        set_uniform(program, "scatter", shape.scatter)
-        set_uniform(program, "fine", shape.fine)
-        if shape.fine[0] > 0:
-            self._relief_texture().use(1)
-            set_uniform(program, "relief", 1)
-        set_uniform(program, "two_sided", 1.0 if shape.two_sided else 0.0)
-        (parts["picture"] or self._white).use(0)
+            parts[name].write(np.ascontiguousarray(array, dtype="f4"))
+        wide = self._camera[2] * distance(mesh, self._camera[0])
+        picture = parts["pictures"].suited(wide)
+        repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
+        for name, value in (
+            ("world", matrix_bytes(mesh.matrix)),
+            ("turn", tuple(float(v) for v in mesh.turn)),
+            ("centre", tuple(float(v) for v in mesh.centre)),
+            ("textured", 0.0 if picture is None else 1.0),
+            ("scatter", shape.scatter),
+            ("fine", shape.fine if repeats is not None else (0.0, 1.0)),
+            ("two_sided", 1.0 if shape.two_sided else 0.0),
+            ("relief", 1),
+        ):
+            set_uniform(program, name, value)
+        (picture or self._white).use(0)
+        (repeats or self._white).use(1)
         if shape.closed:
             self._gl.enable(self._gl.CULL_FACE)
         parts["array"].render()
@@ -86,12 +119,12 @@ class FaceRenderer:
             return self._kept[key][1]
         while len(self._kept) >= MOST_SHAPES:
             _release(self._kept.pop(next(iter(self._kept)))[1])
-        parts = self._uploaded(mesh.shape, len(mesh.positions))
+        parts = self._uploaded(mesh)
         self._kept[key] = (mesh.shape, parts)
         return parts
 
-    def _uploaded(self, shape: FaceShape, count: int) -> dict[str, Any]:
-        gl = self._gl
+    def _uploaded(self, mesh: FaceMesh) -> dict[str, Any]:
+        gl, shape, count = self._gl, mesh.shape, len(mesh.positions)
         texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
         still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
         parts: dict[str, Any] = {
@@ -111,32 +144,33 @@ class FaceRenderer:
         if shape.across is not None:
             parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
             attributes.append((parts["across"], "4f 4f", "in_across", "in_along"))
-        parts["array"] = gl.vertex_array(self._program, attributes, index_buffer=parts["triangles"])
-        parts["picture"] = self._texture(shape)
+        program = self._program(shape.smooth)
+        parts["array"] = gl.vertex_array(program, attributes, index_buffer=parts["triangles"])
+        parts["pictures"] = Pictures(gl, shape, mesh.positions)
         parts["see_through"] = shape.see_through
         parts["lit"] = None
         return parts
 
-    def _relief_texture(self) -> Any:
-        if self._relief is None:
-            pixels = relief()
-            height, width = pixels.shape[:2]
-            self._relief = self._gl.texture((width, height), 3, pixels.tobytes())
-            self._relief.build_mipmaps()
-            self._relief.filter = (self._gl.LINEAR_MIPMAP_LINEAR, self._gl.LINEAR)
-        return self._relief
-
-    def _texture(self, shape: FaceShape) -> Any:
-        if shape.picture is None:
+    def _relief_texture(self, wide: float) -> Any:
+        """The relief for pixels as wide as this (m), or None where it is not seen."""
+        if self._pixels is None:
+            self._pixels = relief()
+        size = self._pixels.shape[0]
+        halvings = halved(RELIEF / size, wide, size)
+        if size / 2**halvings < FAINTEST * size:
             return None
-        height, width = shape.picture.shape[:2]
-        texture = self._gl.texture((width, height), 4, np.ascontiguousarray(shape.picture).tobytes())
-        texture.build_mipmaps()
-        texture.filter = (self._gl.LINEAR_MIPMAP_LINEAR, self._gl.LINEAR)
-        return texture
+        if halvings not in self._reliefs:
+            from PIL import Image
+
+            smaller = np.asarray(Image.fromarray(self._pixels).reduce(2**halvings))
+            texture = self._gl.texture(smaller.shape[1::-1], 3, smaller.tobytes())
+            texture.filter = (self._gl.LINEAR, self._gl.LINEAR)
+            self._reliefs[halvings] = texture
+        return self._reliefs[halvings]
 
 
 def _release(parts: dict[str, Any]) -> None:
-    for name in ("array", "positions", "normals", "light", "still", "triangles", "picture", "across"):
+    for name in ("array", "positions", "normals", "light", "still", "triangles", "across"):
         if parts[name] is not None:
             parts[name].release()
+    parts["pictures"].close()

@@ -81,7 +81,7 @@ class Influence:
             colours = np.full((len(mesh.positions), 4), GLOSS, dtype=np.float32)
             colours[:, :3] = self._colours(self._of(shape, len(mesh.positions)))
             self._shapes[shape] = replace(
-                shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None
+                shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None, coarser=None
             )
         return self._shapes[shape]
 

@@ -8,18 +8,21 @@ import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-Float16 = npt.NDArray[np.float16]
+Kept = TypeVar("Kept", bound=npt.NDArray[Any])
 
-MOST_FILES = 12
+MOST_FILES = 48
 """So many are kept; the longest unused goes first."""
 
 
-def kept(key: str, shapes: tuple[tuple[int, ...], ...], make: Callable[[], list[Float16]]) -> list[Float16]:
-    """The arrays of `shapes`, float16, that `make` gave for this key, now or some time before.
+def kept(
+    key: str, shapes: tuple[tuple[int, ...], ...], make: Callable[[], list[Kept]], kind: Any = np.float16
+) -> list[Kept]:
+    """The arrays of `shapes`, numbers of one kind, that `make` gave for this key, now or some time before.
 
     key: names everything that they depend on; letters and digits. Where nothing can be kept (no home, no
     room, a file that somebody damaged) they are made anew, silently.
@@ -27,7 +30,7 @@ def kept(key: str, shapes: tuple[tuple[int, ...], ...], make: Callable[[], list[
     folder = _folder()
     path = None if folder is None else folder / f"{key}.npz"
     if path is not None:
-        found = _read(path, shapes)
+        found: list[Kept] | None = _read(path, shapes, np.dtype(kind))
         if found is not None:
             return found
     made = make()
@@ -53,8 +56,8 @@ def _folder() -> Path | None:
     return base / "fba"
 
 
-def _read(path: Path, shapes: tuple[tuple[int, ...], ...]) -> list[Float16] | None:
-    most = sum(2 * int(np.prod(shape)) + 1024 for shape in shapes) + 4096
+def _read(path: Path, shapes: tuple[tuple[int, ...], ...], kind: np.dtype[Any]) -> list[Any] | None:
+    most = sum(kind.itemsize * int(np.prod(shape)) + 1024 for shape in shapes) + 4096
     try:
         if path.stat().st_size > most:
             return None
@@ -64,12 +67,12 @@ def _read(path: Path, shapes: tuple[tuple[int, ...], ...]) -> list[Float16] | No
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
     for array, shape in zip(found, shapes, strict=True):
-        if array.dtype != np.float16 or array.shape != shape or not np.isfinite(array).all():
+        if array.dtype != kind or array.shape != shape or not np.isfinite(array).all():
             return None
     return found
 
 
-def _write(path: Path, arrays: list[Float16]) -> None:
+def _write(path: Path, arrays: list[Kept]) -> None:
     from fba.atomic import atomic
     from fba.errors import FormatError
 

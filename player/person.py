@@ -12,7 +12,7 @@ from fba.body.heads import HeadOnBody
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
 from player.face import FaceFigure
-from player.face_parts import part_shape
+from player.face_parts import coarser_part, part_shape, with_triangles
 from player.shapes import Eye, FaceMesh, FaceShape
 
 Float32 = npt.NDArray[np.float32]
@@ -21,6 +21,8 @@ Float64 = npt.NDArray[np.float64]
 SCATTER = {"skin": 1.0, "neck": 1.0}
 REACH = (1.0, 0.9, 0.0, 0.25)
 """What light reaches a body: it shades itself most from behind."""
+SEEN_WEIGHTS, BEND = 6, 0.02
+"""How a coarser body keeps its joints: what a vertex carried by the wrong one counts in metres."""
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of parts of a face that the neck may bend; eyes, teeth and tongue go with the skull."""
 
@@ -46,7 +48,7 @@ class Person:
             part.name: slice(start, start + len(part.vertices))
             for part, start in zip(body.parts, body.starts.values(), strict=True)
         }
-        self._shapes = {part.name: _shape(part) for part in self._parts}
+        self._shapes = {part.name: _shape(part, len(body.skeleton)) for part in self._parts}
         free = np.array(REACH, dtype=np.float32)
         self._light = {name: np.tile(free, (len(shape.colours), 1)) for name, shape in self._shapes.items()}
         self._places, self._normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
@@ -95,13 +97,18 @@ class Person:
             hidden = self.head.hidden[self.figure.rows(name)]
             kept = ~hidden[shape.triangles].all(axis=1)
             if kept.any():
-                found[name] = replace(shape, triangles=np.ascontiguousarray(shape.triangles[kept]))
+                found[name] = with_triangles(shape, shape.triangles[kept])
         return found
 
 
-def _shape(part: BodyPart) -> FaceShape:
+def _shape(part: BodyPart, joints: int) -> FaceShape:
     shape = part_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
-    return replace(shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True, name="")
+    # Where joints bend it there is to be something to bend: weights, seen from a few fixed sides.
+    random = np.random.default_rng(7).standard_normal((joints, SEEN_WEIGHTS)) / SEEN_WEIGHTS**0.5
+    carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * BEND
+    coarser = coarser_part(part, [part.vertices], carried.astype(np.float32))
+    kept = replace(shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True, name="")
+    return replace(kept, coarser=coarser)
 
 
 def _placed(shape: FaceShape, places: Float32, normals: Float32, light: Float32) -> FaceMesh:

@@ -9,14 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 
-def load_program(context: Any, name: str) -> Any:
-    """The program of shaders/NAME.vert and NAME.frag on a moderngl context."""
+def load_program(context: Any, name: str, *defined: str) -> Any:
+    """The program of shaders/NAME.vert and NAME.frag on a moderngl context. defined: names that the
+    preprocessor is to know."""
     folder = files(__package__) / "shaders"
     lighting = (folder / "lighting.glsl").read_text(encoding="utf-8")
     sources = {
         stage: (folder / f"{name}.{suffix}")
         .read_text(encoding="utf-8")
-        .replace("//include lighting.glsl", lighting)
+        .replace("//include lighting.glsl", "".join(f"#define {word}\n" for word in defined) + lighting)
         for stage, suffix in (("vertex_shader", "vert"), ("fragment_shader", "frag"))
     }
     return context.program(**sources)

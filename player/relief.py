@@ -6,6 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 SIZE = 256
+RELIEF = 0.022
+"""Metres until it repeats."""
 SHARES = ((3.0, 0.35), (9.0, 0.7), (26.0, 1.0), (60.0, 0.6))
 """Bands of the noise: grains across the picture, and how much they count."""
 SPREAD = 0.17

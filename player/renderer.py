@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from player.camera import Camera
+from player.detail import Details
 from player.extent import Steps, steps
 from player.extras_renderer import ExtrasRenderer
 from player.face_renderer import FaceRenderer
@@ -39,10 +40,9 @@ class Renderer:
     def __init__(self, context: Any) -> None:
         self._gl = context
         self._programs = {
-            name: load_program(context, name)
-            for name in ("mesh", "capsule", "eye", "studio", "shadow", "face")
+            name: load_program(context, name) for name in ("mesh", "capsule", "eye", "studio", "shadow")
         }
-        self._faces = FaceRenderer(context, self._programs["face"])
+        self._faces = FaceRenderer(context)
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
         square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
         self._studio_buffer = context.buffer(corners.tobytes())
@@ -65,6 +65,7 @@ class Renderer:
             index_buffer=self._eye_parts[1],
         )
         self._outliner = Outliner()
+        self._details = Details()
         self._extras = ExtrasRenderer(context)
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
         set_uniform(self._programs["capsule"], "opacity", 1.0)
@@ -93,11 +94,13 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        self._faces.draw(view.faces)
+        drawn = replace(view, faces=self._details.suited(view.faces, eye, pixel))
+        self._faces.begin(camera.eye, matrix, pixel)
+        self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
-            view = replace(view, faces=[*view.faces, *view.extras.shells])
-        return steps(view, matrix, size, self._outliner)
+            drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
+        return steps(drawn, matrix, size, self._outliner)
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""

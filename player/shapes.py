@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from player.coarse import Coarser
     from player.extras import Extras
 
 Float32 = npt.NDArray[np.float32]
@@ -60,7 +61,9 @@ class FaceShape:
     the inside is to look dark. across: float32 (V, 8), of single hairs: from the vertex opposite to each,
     half the hair's width there (m), direction to the tip, and 1 or -1 on its two sides; hairs are never
     drawn thinner than a pixel, but fainter. closed: nobody sees into it, so its inside is not drawn.
-    name, kind: of the part that it was made from, "" where there is none.
+    name, kind: of the part that it was made from, "" where there is none. coarser: the same with fewer
+    triangles, for when it is small on the screen; None where it is always drawn as it is. smooth: False where
+    its triangles are so large that their light changes visibly within them.
     """
 
     triangles: npt.NDArray[np.int32]
@@ -75,6 +78,8 @@ class FaceShape:
     closed: bool = False
     name: str = ""
     kind: str = ""
+    coarser: Coarser | None = None
+    smooth: bool = True
 
     @property
     def see_through(self) -> bool:

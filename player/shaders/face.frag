@@ -1,43 +1,60 @@
 #version 330 core
 //include lighting.glsl
-uniform sampler2D picture;
+uniform sampler2D picture; // square roots of linear light
 uniform float textured;    // 1: the picture times the colour
 uniform sampler2D relief;  // noise of three channels
 uniform vec2 fine;         // strength of the skin's relief, 0 for none, and how often it repeats
 uniform float scatter;     // how far light goes below the surface: 1 skin, 0 cloth
 uniform float two_sided;   // 0: what is seen from inside is a dark hollow
+in vec4 upright;
+in vec4 coordinates;
+#ifdef SMOOTH
+in vec4 shade;
+in vec4 halfway;
+#else
 in vec3 place;
-in vec3 normal;
 in vec4 colour;
-in vec2 texture_at;
 in vec4 light;
-in float cover;
+#endif
 out vec4 pixel;
 
 void main() {
-    vec3 view = normalize(eye - place);
-    vec3 n = normalize(normal);
-    if (!gl_FrontFacing) {
-        if (two_sided > 0.5) {
-            n = -n;
-        } else if (dot(n, view) < -0.25) {  // less: a silhouette, where the inside shows by less than a pixel
-            pixel = vec4(encode(vec3(0.020, 0.0045, 0.004)), 1.0);
-            return;
-        }
+    if (two_sided < 0.5 && !gl_FrontFacing && upright.w < -0.25) {
+        pixel = vec4(encode(vec3(0.020, 0.0045, 0.004)), 1.0);
+        return;
     }
-    vec3 albedo = colour.rgb;
-    float opaque = cover;
+    float opaque = coordinates.z;
+    vec3 albedo = vec3(1.0);
     if (textured > 0.5) {
-        vec4 texel = texture(picture, texture_at);
-        albedo *= decode(texel.rgb);
+        vec4 texel = texture(picture, coordinates.xy);
+        albedo = texel.rgb * texel.rgb;
         opaque *= texel.a;
     }
+#ifdef SMOOTH
+    vec3 n = upright.xyz;
+    vec3 base = shade.rgb * albedo;
+    if (fine.x > 0.0) {
+        vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
+        base *= 1.0 + 0.40 * dot(grain, KEY_DIRECTION);
+        n += grain;
+    }
+    float cosine = dot(n, halfway.xyz);
+    float nh2 = min(cosine * cosine / (dot(n, n) * dot(halfway.xyz, halfway.xyz)), 1.0);
+    vec3 shown = base + KEY * (shade.a * lobes(nh2, coordinates.w)) + AROUND * halfway.w;
+#else
+    vec3 n = normalize(upright.xyz);
+    vec3 view = normalize(eye - place);
+    albedo *= colour.rgb;
     vec3 rough = n;
     if (fine.x > 0.0) {
-        vec3 grain = texture(relief, texture_at * fine.y).rgb - 0.5;
-        rough = normalize(n + grain * fine.x);
-        n += grain * (fine.x * 0.45);
+        vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
+        rough = normalize(n + grain);
+        n = normalize(n + grain * 0.45);
     }
-    vec3 shown = surface(view, n, rough, albedo, colour.a, light, scatter);
+    float cosine = dot(rough, normalize(view + KEY_DIRECTION));
+    vec3 shown = albedo * diffuse(n, albedo, light, scatter)
+        + KEY * (mirrored_key(view, n, light) * lobes(cosine * cosine, coordinates.w))
+        + AROUND * mirrored_around(view, n, colour.a, light);
+#endif
     pixel = vec4(encode(shown), opaque);
 }

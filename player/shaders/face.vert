@@ -1,11 +1,14 @@
 #version 330 core
-// Parts of a face. The head turns as a whole; the neck bends along, and where it stands it stays.
+// Parts of faces and bodies. The head turns as a whole; the neck bends along, and where it stands it stays.
+//include lighting.glsl
 uniform mat4 world;
 uniform mat4 camera;
-uniform vec3 turn;      // axis of the head's rotation times its angle
-uniform vec3 centre;    // and the point it turns about
-uniform vec3 eye;
-uniform float pixel;    // size of a pixel at a distance of 1
+uniform vec3 turn;       // axis of the head's rotation times its angle
+uniform vec3 centre;     // and the point it turns about
+uniform float pixel;     // size of a pixel at a distance of 1
+uniform float scatter;   // how far light goes below the surface: 1 skin, 0 cloth
+uniform float two_sided; // 0: what is seen from inside is a dark hollow
+uniform float textured;  // 1: the colour is multiplied by a picture
 in vec3 in_position;
 in vec3 in_normal;
 in vec4 in_colour;
@@ -14,12 +17,18 @@ in vec4 in_light;       // what reaches the vertex: key light, open sky, through
 in float in_sway;       // how far it goes with the head
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
+out vec4 upright;       // normal, and its cosine with the direction to the eye
+out vec4 coordinates;   // in the picture; how much of its pixels a hair covers; width of the mirrored light
+#ifdef SMOOTH
+out vec4 shade;         // diffuse light times the colour, and what is mirrored of the key light
+out vec4 halfway;       // between the directions to the eye and to the key light; what else is mirrored
+#else
 out vec3 place;
-out vec3 normal;
 out vec4 colour;
-out vec2 texture_at;
 out vec4 light;
-out float cover;        // how much of its pixels a hair covers
+#endif
+
+const vec3 SKIN = vec3(0.60, 0.36, 0.28);   // about what a picture of skin holds
 
 vec3 turned(vec3 at, vec3 axis, float sine, float cosine) {
     return at * cosine + cross(axis, at) * sine + axis * (dot(axis, at) * (1.0 - cosine));
@@ -28,7 +37,7 @@ vec3 turned(vec3 at, vec3 axis, float sine, float cosine) {
 void main() {
     vec3 at = in_position;
     vec3 out_ = in_normal;
-    cover = 1.0;
+    float cover = 1.0;
     if (in_across.w < 0.9) {
         // No hair is thinner than a pixel, however it is turned; it is fainter instead.
         vec3 look = eye - (world * vec4(at, 1.0)).xyz;
@@ -48,10 +57,25 @@ void main() {
         out_ = turned(out_, axis, sine, cosine);
     }
     vec4 stands = world * vec4(at, 1.0);
-    place = stands.xyz;
-    normal = mat3(world) * out_;
-    colour = in_colour;
-    texture_at = in_texture;
-    light = in_light;
+    vec3 n = normalize(mat3(world) * out_);
+    vec3 view = normalize(eye - stands.xyz);
+    float facing = dot(n, view);
+    if (two_sided > 0.5 && facing < -0.35) {  // less: a silhouette, whose other side is seen
+        n = -n;
+        facing = -facing;
+    }
+    upright = vec4(n, facing);
+    coordinates = vec4(in_texture, cover, widths(in_colour.a));
     gl_Position = camera * stands;
+#ifdef SMOOTH
+    vec3 albedo = textured > 0.5 ? SKIN * in_colour.rgb : in_colour.rgb;
+    shade.rgb = in_colour.rgb * diffuse(n, albedo, in_light, scatter);
+    shade.a = mirrored_key(view, n, in_light);
+    halfway.xyz = normalize(view + KEY_DIRECTION);
+    halfway.w = mirrored_around(view, n, in_colour.a, in_light);
+#else
+    place = stands.xyz;
+    colour = in_colour;
+    light = in_light;
+#endif
 }

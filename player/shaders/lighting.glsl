@@ -41,30 +41,57 @@ vec3 lit(vec3 place, vec3 normal, vec4 colour) {
     return colour.rgb * diffuse + KEY * gloss * step(0.0, key) + rim * (0.25 + colour.rgb);
 }
 
-// sRGB to linear light, by a cubic: within 1/200 of the curve.
-vec3 decode(vec3 code) {
-    return code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
+// Square of the width of a surface's mirrored light; gloss: 0 dull .. 1 sharp.
+float widths(float gloss) {
+    float rough = clamp(1.0 - gloss, 0.12, 1.0);
+    rough *= rough;
+    return rough * rough;
 }
 
-// What a surface that mirrors (GGX, Kelemen's visibility) sends of a light. nv, nl, vl: cosines between
-// normal, view and light; sharp, soft: squares of the two lobes' widths.
-float mirrored(float nv, float nl, float vl, float sharp, float soft) {
+// How much a surface mirrors (GGX), by the square of the cosine between its normal and the direction halfway
+// between eye and light: the skin, and an oily film on it.
+float lobes(float nh2, float soft) {
+    float sharp = soft * 0.16 + 0.0004;
+    float a = nh2 * (soft - 1.0) + 1.0;
+    float b = nh2 * (sharp - 1.0) + 1.0;
+    return 0.75 * soft / (a * a) + 0.25 * sharp / (b * b);
+}
+
+// What of a light is mirrored at all: Schlick's Fresnel term and Kelemen's visibility.
+float mirrored(float nl, float vl) {
     float hh = 2.0 + 2.0 * vl;                      // square of view + light
-    float nh2 = min((nv + nl) * (nv + nl) / max(hh, 0.1), 1.0);
-    float a = nh2 * (sharp - 1.0) + 1.0;
-    float b = nh2 * (soft - 1.0) + 1.0;
-    a *= a;
-    b *= b;
-    float off = 1.0 - hh * 0.25;                    // Schlick's Fresnel term, by the square of its cosine
+    float off = max(1.0 - hh * 0.25, 0.0);
     off *= off;
     off *= off;
-    float fresnel = 0.028 + 0.95 * off * off;
-    return fresnel * nl * (0.75 * soft * a + 0.25 * sharp * b) / (a * b * max(hh, 0.9));
+    return (0.028 + 0.95 * off * off) * nl / max(hh, 0.9);
 }
 
-// What a surface shows of the studio. n: normal; fine: with the relief of pores, for what is mirrored;
-// reach: what reaches it of the key light, the open sky, through it from behind, of the rim light.
-vec3 surface(vec3 view, vec3 n, vec3 fine, vec3 albedo, float gloss, vec4 reach, float scatter) {
+float mirrored_key(vec3 view, vec3 n, vec4 reach) {
+    return mirrored(max(dot(n, KEY_DIRECTION), 0.0), dot(view, KEY_DIRECTION)) * reach.x;
+}
+
+const vec3 AROUND = vec3(0.44, 0.45, 0.48);
+
+// The rim light and the studio around, mirrored; in parts of AROUND.
+float mirrored_around(vec3 view, vec3 n, float gloss, vec4 reach) {
+    float nv = max(dot(n, view), 0.02);
+    float rl = max(dot(n, RIM_DIRECTION), 0.0);
+    float vl = dot(view, RIM_DIRECTION);
+    float nh2 = min((nv + rl) * (nv + rl) / max(2.0 + 2.0 * vl, 0.1), 1.0);
+    float soft = widths(gloss);
+    float a = nh2 * (soft - 1.0) + 1.0;
+    float rim = mirrored(rl, vl) * soft / (a * a) * reach.w * 1.1;
+    float rough = clamp(1.0 - gloss, 0.12, 1.0);
+    float graze = 1.0 - nv;
+    graze *= graze;
+    float up = 2.0 * nv * n.y - view.y;
+    float sky = mix(0.41, 1.05, clamp(up * 0.5 + 0.5, 0.0, 1.0));
+    return rim + sky * (0.028 + 0.8 * graze * graze) * (1.0 - 0.6 * rough) * reach.y * reach.y;
+}
+
+// Light that a surface sends back of the studio, but for its colour. n: normal; reach: what reaches it of the
+// key light, the open sky, through it from behind, of the rim light; scatter: 1 skin, 0 cloth.
+vec3 diffuse(vec3 n, vec3 albedo, vec4 reach, float scatter) {
     // Light that wanders below the surface softens the edge of the shade, the red most.
     vec3 wander = vec3(0.24, 0.12, 0.08) * scatter;
     vec3 key = clamp((dot(n, KEY_DIRECTION) + wander) / (1.0 + wander), 0.0, 1.0);
@@ -75,19 +102,5 @@ vec3 surface(vec3 view, vec3 n, vec3 fine, vec3 albedo, float gloss, vec4 reach,
     open += (1.0 - reach.y) * vec3(0.24, 0.10, 0.085) * scatter;
     vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) + mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;
     float rim = max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
-    vec3 diffuse = KEY * key + dome * open + RIM * (rim + vec3(1.5, 0.32, 0.16) * (reach.z * scatter));
-    // Mirrored: the skin, and an oily film on it.
-    float nv = max(dot(fine, view), 0.02);
-    float rough = clamp(1.0 - gloss, 0.12, 1.0);
-    float soft = rough * rough * rough * rough;
-    float sharp = soft * 0.16 + 0.0004;
-    float nl = max(dot(fine, KEY_DIRECTION), 0.0);
-    float bl = max(dot(n, RIM_DIRECTION), 0.0);
-    vec3 shine = KEY * (mirrored(nv, nl, dot(view, KEY_DIRECTION), sharp, soft) * reach.x);
-    shine += RIM * (mirrored(nv, bl, dot(view, RIM_DIRECTION), soft, soft) * reach.w * 0.6);
-    float graze = 1.0 - nv;
-    graze *= graze;
-    float around = (0.028 + 0.8 * graze * graze) * (1.0 - 0.6 * rough) * reach.y * reach.y;
-    float up = 2.0 * dot(fine, view) * fine.y - view.y;
-    return albedo * diffuse + shine + mix(FLOOR, SKY, clamp(up * 0.5 + 0.5, 0.0, 1.0)) * around;
+    return KEY * key + dome * open + RIM * (rim + vec3(1.5, 0.32, 0.16) * (reach.z * scatter));
 }
