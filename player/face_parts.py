@@ -14,9 +14,9 @@ import numpy.typing as npt
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
 from player.coarse import Coarser
-from player.pictures import breadth
 from player.relief import RELIEF
 from player.shapes import FaceShape
+from player.textures import breadth
 
 if TYPE_CHECKING:
     from fba.body.model import BodyPart

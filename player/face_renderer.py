@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from player.detail import distance, same
-from player.pictures import Pictures, halved
 from player.programs import load_program, matrix_bytes, set_uniform
 from player.relief import RELIEF, relief
 from player.shapes import FaceMesh, FaceShape
+from player.textures import Pictures, halved
 
 Float64 = npt.NDArray[np.float64]
 
