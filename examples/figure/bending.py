@@ -20,15 +20,19 @@ HINGES = (
 skin changes from one to the other, on the side that folds and on that which stretches."""
 LIMB = 0.06
 """Metres from the bone to the skin, about."""
-ARMHOLE = (0.055, 0.060)
+ARMHOLE = (0.050, 0.060)
 """Metres to both sides of where a sleeve is set in, over which skin changes from trunk to arm: at the armpit,
 and at the top."""
 SET = (-0.005, 0.030)
 """Metres out from the shoulder where that is."""
 BEHIND = 0.022
 """How much further out it is at the back of the armpit, which an arm in front would carry downwards."""
-ARMPIT = (-0.18, -0.09)
+ARMPIT = (-0.24, -0.12)
 """Heights from the shoulder between which the side of the trunk comes to go with the arm at all."""
+BLADE = (-0.20, -0.06)
+"""Heights from the shoulder between which the trunk comes to go with the blade."""
+LEAST = 0.012
+"""Taken from every weight: what is less does not count, and takes no place."""
 EASED = 10
 """How often the weights of trunk, arms and legs are drawn to those of their neighbours."""
 
@@ -69,12 +73,17 @@ def _shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> 
         reach = ARMHOLE[0] + (ARMHOLE[1] - ARMHOLE[0]) * top
         behind = _smooth(-away[:, 2] / 0.05) * (1 - top)
         out = away[:, 0] - SET[0] - (SET[1] - SET[0]) * top - BEHIND * behind
-        share = _smooth(out / (2 * reach) + 0.5) * np.maximum(high, _smooth(person.arms))
+        share = _smooth(out / (2 * reach) + 0.5) * np.maximum(high, _smooth((person.arms - 0.15) / 0.5))
         arm = names.index(f"{side}_shoulder")
         rest = [n for n, name in enumerate(names) if not _of_arm(name, side)]
         near = (away[:, 1] > ARMPIT[0]) & (away[:, 0] < 0.12) & (away[:, 0] > -0.12)
-        trunk = weights[:, rest].sum(axis=1)
         girdle = names.index(f"{side}_acromioclavicular")
+        spine = [n for n, name in enumerate(names) if name.startswith("v")]
+        low = weights[:, girdle] * (1 - _smooth((away[:, 1] - BLADE[0]) / (BLADE[1] - BLADE[0])))
+        low *= _smooth(weights[:, spine].sum(axis=1) / 0.2)
+        weights[:, spine] *= 1 + (low / np.maximum(weights[:, spine].sum(axis=1), 1e-9))[:, None]
+        weights[:, girdle] -= low
+        trunk = weights[:, rest].sum(axis=1)
         lone = near & (trunk < 1e-3)
         weights[lone, girdle] = trunk[lone] = 1.0
         others = weights[:, [n for n, name in enumerate(names) if _of_arm(name, side) and n != arm]].sum(
@@ -84,6 +93,25 @@ def _shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> 
         keep = np.where(near, (1 - share - others) / np.maximum(trunk, 1e-9), 1.0)
         weights[:, rest] *= keep[:, None]
         weights[near, arm] = share[near]
+
+
+def few(weights: Float64, most: int) -> Float64:
+    """(V, J) weights with the vertebrae thinned out, so that a vertex has no more than `most` joints.
+
+    Neighbouring vertebrae move alike: what the least of them carry, the others take over.
+    """
+    spine = np.array([name[0] == "v" or name == "sacroiliac" for name in Skeleton.default().names])
+    weights = np.maximum(weights - LEAST, 0.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    rooms = np.clip(most - (weights[:, ~spine] > 0).sum(axis=1), 1, most)
+    column = weights[:, spine]
+    total = column.sum(axis=1, keepdims=True)
+    ranked = -np.sort(-column, axis=1)
+    column = np.maximum(column - np.take_along_axis(ranked, rooms[:, None], axis=1), 0.0)
+    column *= total / np.maximum(column.sum(axis=1, keepdims=True), 1e-12)
+    thin = weights.copy()
+    thin[:, spine] = np.where(total > 1e-9, column, weights[:, spine])
+    return thin
 
 
 def _of_arm(name: str, side: str) -> bool:

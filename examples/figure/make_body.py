@@ -12,6 +12,7 @@ import io
 from dataclasses import dataclass
 from pathlib import Path
 
+import bending
 import clothes
 import figure
 import numpy as np
@@ -24,7 +25,7 @@ from sculpt import ORIGIN
 
 from fba.body import Skeleton
 from fba.body.heads import strongest
-from fba.body.model import BodyModel, BodyPart, Material
+from fba.body.model import INFLUENCES, BodyModel, BodyPart, Material
 from fba.body.posture import FINGERS
 from fba.face.model import FaceModel, point_row
 from fba.mesh import vertex_normals
@@ -183,7 +184,7 @@ def model() -> BodyModel:
     found, bones = pieces()
     parts = []
     for name, piece in found.items():
-        joints, weights = strongest(piece.weights)
+        joints, weights = strongest(bending.few(piece.weights, INFLUENCES))
         roughness = {"skin": 0.55, "neck": 0.55, "cloth": 0.95, "shoe": 0.6}[piece.kind]
         parts.append(
             BodyPart(
