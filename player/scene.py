@@ -37,7 +37,8 @@ LOOKS = ("figure", "points")
 class Scene:
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
-    animation: at least one frame, else ValueError. model: the face, by default the built-in head. body:
+    animation: at least one frame, else ValueError. model: the face, by default the built-in head; one that is
+    not in metres is shown as large as a person, with an FbaWarning, and what it lacks is told likewise. body:
     what BAPs move, by default the built-in person; ModelError where it has no place for a face. axes: name
     of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or "points",
     the face as its feature points with lines through them and the body as its bones; it may be set at any
@@ -60,7 +61,7 @@ class Scene:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
         self.animation = animation
-        self.model = model or _default_model()
+        self.model = _default_model() if model is None else _usable(model)
         self.timeline = timeline or Timeline(animation, self.model)
         self.switches = Switches()
         self.view = view
@@ -264,6 +265,12 @@ class Scene:
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in chosen])
             self._extent = body_extent(self._solver.pose(baps)[:, :, :3, 3], self._skeleton.names)
         return self._extent
+
+
+def _usable(model: FaceModel) -> FaceModel:
+    from player.usable import usable
+
+    return usable(model)
 
 
 def _default_model() -> FaceModel:

@@ -1,0 +1,69 @@
+"""A face model as the player can show it: of a person's size, and a word about what it lacks."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from fba.errors import FbaWarning
+from fba.face.model import FaceModel
+from fba.face.tables import FaceDefTables
+from fba.parameters import faps
+
+SIZES = (0.01, 1.0)
+"""Metres between the eyes of faces that are shown as large as they are: from dolls to giants."""
+EYES_APART = 0.062
+KINDS = {"eye": "eyes", "teeth": "teeth"}
+
+
+def usable(model: FaceModel) -> FaceModel:
+    """The model, or a copy of a person's size where its numbers cannot be metres.
+
+    FbaWarning for such a size, for eyes or teeth that it has not got, and where no FAP moves it.
+    """
+    named = f"the face {model.name!r}" if model.name else "the face"
+    missing = [words for kind, words in KINDS.items() if not model.of_kind(kind)]
+    if missing:
+        _warn(f"{named} has no {' and no '.join(missing)}: it is shown without")
+    if not model.tables:
+        _warn(f"{named} has no FaceDefTables: no FAP moves it (fba.face.authoring makes them)")
+    apart = model.fapu.ES * 1024
+    if SIZES[0] <= apart <= SIZES[1]:
+        return model
+    _warn(
+        f"{named} is in other units than metres: {apart:.3g} between its eyes; shown as large as a person"
+    )
+    return resized(model, EYES_APART / apart)
+
+
+def resized(model: FaceModel, factor: float) -> FaceModel:
+    """The same face, so many times as large."""
+    return replace(
+        model,
+        parts=tuple(
+            replace(part, vertices=(part.vertices * np.float64(factor)).astype(np.float32))
+            for part in model.parts
+        ),
+        points=model.points * factor,
+        tables=tuple(_resized(table, factor) for table in model.tables),
+    )
+
+
+def _resized(table: FaceDefTables, factor: float) -> FaceDefTables:
+    # Displacements count in units of the face itself; so do angles only where their unit is no length.
+    angle = 1.0 if faps()[table.fap - 1].unit == "AU" else 1.0 / factor
+    shift = factor if faps()[table.fap - 1].unit == "AU" else 1.0
+    transforms = []
+    for transform in table.transforms:
+        by = shift if transform.kind == "translation" else angle
+        x, y, z = (float(v) * by for v in transform.amount)
+        a, b, c = (float(v) * factor for v in transform.centre)
+        transforms.append(replace(transform, amount=(x, y, z), centre=(a, b, c)))
+    moves = [replace(mesh, displacements=mesh.displacements * np.float32(shift)) for mesh in table.meshes]
+    return replace(table, transforms=tuple(transforms), meshes=tuple(moves))
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, FbaWarning, stacklevel=4)  # whoever made the scene
