@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-REMOVED = object()
-"""As a value: the member is taken out."""
+
+class REMOVED:
+    """As a value: the member is taken out. A class, as its name makes the same test name in every process."""
 
 
 def put(root: Any, place: str, value: Any) -> Any:
