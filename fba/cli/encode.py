@@ -6,12 +6,16 @@ import warnings
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import click
 
 from fba.animation import Animation
 from fba.cli import capture_report, options
 from fba.errors import FbaWarning, FormatError
+
+CAPTURE = ("spine", "ground", "origin")
+"""Options that say how motion capture becomes BAPs."""
 
 
 @click.command(
@@ -30,7 +34,12 @@ from fba.errors import FbaWarning, FormatError
 @options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
 @click.option("--name", help="Name of the sequence, for input without a header.")
 @click.option(
-    "--quant", type=click.IntRange(0, 31), default=1, show_default=True, help="fap_quant; 0: unquantised."
+    "--quant",
+    "fap_quant",
+    type=click.IntRange(0, 31),
+    default=1,
+    show_default=True,
+    help="fap_quant; 0: unquantised.",
 )
 @click.option(
     "--bap-quant", type=click.IntRange(0, 31), default=1, show_default=True, help="bap_quant; 0: unquantised."
@@ -55,6 +64,7 @@ from fba.errors import FbaWarning, FormatError
     type=click.Choice(["female", "male"]),
     default="female",
     show_default=True,
+    callback=lambda _, __, gender: int(gender == "male"),
     help="suggested_gender.",
 )
 @click.option(
@@ -102,97 +112,114 @@ def command(
     output: Path,
     fps: Fraction | None,
     name: str | None,
-    quant: int,
-    bap_quant: int,
-    intra_period: Fraction | None,
-    start_codes: bool,
-    bap_steps: str,
-    preset: str,
-    unsent: str,
-    gender: str,
-    clamp: bool | None,
     epf: Path | None,
-    spine: str,
-    ground: str,
-    origin: str,
     limits: str,
     report: bool,
     salvage: bool,
     as_json: bool,
+    **settings: Any,
 ) -> None:
     """Encode FAP, BAP or motion-capture files as an FBA stream.
 
     A face file and a body file together become one stream. Ranges fit the data. A value that no range
     can carry is an error, or with --clamp comes as near as it can.
     """
-    from fba.codec import EncoderOptions, encode_planes, encode_with_statistics
-
+    if epf is not None:
+        _refuse_beside_epf()
+    capture = {option: settings.pop(option) for option in CAPTURE}
     with options.progress("reading", len(inputs)) as step:
         animation = _joined(
-            inputs, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, step=step,
-            capture={"spine": spine, "ground": ground, "origin": origin},
+            inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
+            capture=capture,
         )  # fmt: skip
+    captures = [path for path in inputs if _captured(path)]
     animation, said = capture_report.limited(animation, limits)
     if report:
-        said = capture_report.compared([path for path in inputs if _captured(path)], animation) | said
-    if clamp is None:
-        clamp = any(_captured(path) for path in inputs)
-        if clamp and bap_steps == "iso" and bap_quant > 0:
-            warnings.warn(
-                "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
-                "--bap-steps visage has 2 mm and 3.16 rad (decode, play and render need the same option)",
-                FbaWarning,
-                stacklevel=1,
-            )
-    if epf is not None:
-        from fba.formats.epf import read_epf
-
-        planes = read_epf(epf)
-        data = encode_planes(animation, planes, bap_steps=bap_steps)
-        frames, intra, clamped = len(planes), sum(plane.intra for plane in planes), 0
-    else:
-        data, statistics = encode_with_statistics(
-            animation,
-            EncoderOptions(
-                fap_quant=quant,
-                bap_quant=bap_quant,
-                intra_period=intra_period,
-                start_codes=start_codes,
-                bap_steps=bap_steps,
-                preset=preset,
-                unsent=unsent,
-                gender=int(gender == "male"),
-                clamp=clamp,
-            ),
-        )
-        frames, intra, clamped = statistics.planes, statistics.intra_planes, statistics.clamped
-    options.write_bytes(output, data)
-    rate = 8 * len(data) / float(animation.duration)
+        said = capture_report.compared(captures, animation) | said
+    if settings["clamp"] is None:
+        settings["clamp"] = bool(captures)
+        if captures and animation.body is not None:
+            _warn_of_steps(settings)
+    coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, settings["bap_steps"])
+    options.write_bytes(output, coded.data)
     if as_json:
-        options.print_json(
-            {
-                "output": str(output),
-                "size": len(data),
-                "frames": frames,
-                "intra_planes": intra,
-                "rate": str(animation.rate),
-                "duration": float(animation.duration),
-                "bits_per_second": round(rate, 3),
-                "clamped": clamped,
-                **said,
-            }
-        )
+        options.print_json({"output": str(output), **_figures(coded, animation), **said})
         return
-    text = (
-        f"{output}: {frames} frames, {options.seconds(animation.duration)} at "
-        f"{options.rate_text(animation.rate)} frames/s, {len(data)} bytes, {rate / 1000:.2f} kbit/s, "
-        f"{intra} I plane{'s' if intra != 1 else ''}"
-    )
-    if clamped:
-        text += f"; {clamped} values clamped"
-    click.echo(text, err=str(output) == "-")
-    for line in capture_report.lines(said):
+    for line in (_summary(output, coded, animation), *capture_report.lines(said)):
         click.echo(line, err=str(output) == "-")
+
+
+class _Coded(NamedTuple):
+    data: bytes
+    planes: int
+    intra_planes: int
+    clamped: int
+
+
+def _coded(animation: Animation, settings: Mapping[str, Any]) -> _Coded:
+    """settings: fields of EncoderOptions."""
+    from fba.codec import EncoderOptions, encode_with_statistics
+
+    data, statistics = encode_with_statistics(animation, EncoderOptions(**settings))
+    return _Coded(data, statistics.planes, statistics.intra_planes, statistics.clamped)
+
+
+def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
+    """Plane by plane as an EPF file says."""
+    from fba.codec import encode_planes
+    from fba.formats.epf import read_epf
+
+    planes = read_epf(epf)
+    data = encode_planes(animation, planes, bap_steps=bap_steps)
+    return _Coded(data, len(planes), sum(plane.intra for plane in planes), 0)
+
+
+def _refuse_beside_epf() -> None:
+    """click.UsageError for an option that says what the EPF file says already."""
+    context = click.get_current_context()
+    said = ("fap_quant", "bap_quant", "intra_period", "start_codes", "preset", "unsent", "gender", "clamp")
+    for parameter in context.command.params:
+        given = context.get_parameter_source(parameter.name or "")
+        if parameter.name in said and given is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"{parameter.opts[0]} and --epf contradict each other: the EPF file says how planes are coded"
+            )
+
+
+def _warn_of_steps(settings: Mapping[str, Any]) -> None:
+    if settings["bap_steps"] == "iso" and settings["bap_quant"] > 0:
+        warnings.warn(
+            "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
+            "--bap-steps visage has 2 mm and 3.16 rad (decode, play and render need the same option)",
+            FbaWarning,
+            stacklevel=1,
+        )
+
+
+def _bits_per_second(coded: _Coded, animation: Animation) -> float:
+    return 8 * len(coded.data) / float(animation.duration)
+
+
+def _figures(coded: _Coded, animation: Animation) -> dict[str, Any]:
+    return {
+        "size": len(coded.data),
+        "frames": coded.planes,
+        "intra_planes": coded.intra_planes,
+        "rate": str(animation.rate),
+        "duration": float(animation.duration),
+        "bits_per_second": round(_bits_per_second(coded, animation), 3),
+        "clamped": coded.clamped,
+    }
+
+
+def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
+    text = (
+        f"{output}: {coded.planes} frames, {options.seconds(animation.duration)} at "
+        f"{options.rate_text(animation.rate)} frames/s, {len(coded.data)} bytes, "
+        f"{_bits_per_second(coded, animation) / 1000:.2f} kbit/s, "
+        f"{coded.intra_planes} I plane{'s' if coded.intra_planes != 1 else ''}"
+    )
+    return f"{text}; {coded.clamped} values clamped" if coded.clamped else text
 
 
 def _captured(path: Path) -> bool:

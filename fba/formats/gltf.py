@@ -49,20 +49,21 @@ def read(
 ) -> Animation:
     """A glTF skeleton's animation as BAPs (see `fba.capture.from_skeleton`, and `read_motion` for clip).
 
-    Files that this project wrote are taken as they are, BAPs and FAPs with their own frames, where only clip
-    is given.
+    Files that this project wrote are taken as they are, BAPs and FAPs with their own frames, unless they are
+    to be retargeted by another option than clip and rate.
 
     Raises FormatError for anything that is not glTF, or whose skeleton is not a body; warns (FbaWarning)
     of what is left out.
     """
     try:
         gltf = read_gltf(path)
-        plain = (rate, scale, origin, ground, spine) == (None, None, "source", "floor", "spread")
+        plain = (scale, origin, ground, spine) == (None, "source", "floor", "spread")
         if plain and gltf.animations:
             own = gltf.animations[0] if clip is None else _clip(gltf, clip, set(range(len(gltf.nodes))))
             note = note_of(gltf, own)
             if note is not None:
-                return read_note(gltf, own, note)
+                animation = read_note(gltf, own, note)
+                return animation if rate is None else animation.resample(Fraction(rate))
         motion = motion_of(gltf, clip=clip, rate=rate)
         return from_skeleton(motion, scale=scale, origin=origin, ground=ground, spine=spine)
     except ModelError as error:

@@ -290,3 +290,28 @@ def test_an_interrupted_write_leaves_the_old_file(
     assert run("encode", face_file, "-o", stream)[0] == 130
     assert stream.read_bytes() == b"old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["face.fap", "x.fba"]
+
+
+def test_what_an_epf_file_says_is_not_said_twice(run: Run, tmp_path: Path, face_file: Path) -> None:
+    stream = tmp_path / "a.fba"
+    run("encode", face_file, "-o", stream)
+    run("decode", stream, "--epf", tmp_path / "a.epf")
+    epf = ("--epf", tmp_path / "a.epf")
+    for option in (("--quant", 1), ("--intra-period", 2), ("--start-codes",), ("--no-clamp",)):
+        code, _, err = run("encode", face_file, "-o", tmp_path / "b.fba", *epf, *option)
+        assert code == 2
+        assert "and --epf contradict each other" in " ".join(err.split())
+    assert run("encode", face_file, "-o", tmp_path / "b.fba", *epf, "--bap-steps", "visage")[0] == 0
+
+
+def test_a_face_from_gltf(run: Run, tmp_path: Path, face: Animation) -> None:
+    """Nothing is said of BAPs where there are none, and another rate keeps the FAPs."""
+    fba.write(tmp_path / "face.glb", face)
+    code, _, err = run("encode", tmp_path / "face.glb", "-o", tmp_path / "a.fba")
+    assert (code, err) == (0, "")
+    assert fba.read(tmp_path / "a.fba").face == face.face
+    code, _, err = run("encode", tmp_path / "face.glb", "-o", tmp_path / "b.fba", "--fps", 50)
+    assert (code, err) == (0, "")
+    back = fba.read(tmp_path / "b.fba")
+    assert back.rate == 50
+    assert np.array_equal(back.face.values[::2, 2], face.face.values[:, 2])  # type: ignore[union-attr]
