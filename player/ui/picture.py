@@ -45,18 +45,17 @@ class Studio:
             raise
 
     def draw(self, pictures: int = 1, delta: float = 1 / 60) -> UInt8:
-        """Draw so many pictures, `delta` seconds apart; the last as uint8 (H, W, 4), top row first."""
+        """Draw so many pictures, `delta` seconds apart; the last as uint8 (H, W, 4), top row first.
+
+        Those before the last are only for the panels to settle: the scene is not drawn in them.
+        """
         session = self.session
         with self._gl:
             if self._target is None or self._target.size != session.size:
                 self._resize()
-            assert self._target is not None
-            assert self._renderer is not None
-            for _ in range(pictures):
-                time = session.transport.time
-                self._target.begin()
-                within = self._renderer.draw(session.view(time), session.camera(time), session.size)
-                self._target.finish(self._screen, within)
+            for number in range(pictures):
+                if number == pictures - 1:
+                    self._draw_scene()
                 self._screen.use()
                 self.gui.draw(delta)
             data = self._screen.read(components=4)
@@ -81,6 +80,15 @@ class Studio:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _draw_scene(self) -> None:
+        assert self._target is not None
+        assert self._renderer is not None
+        session = self.session
+        time = session.transport.time
+        self._target.begin()
+        within = self._renderer.draw(session.view(time), session.camera(time), session.size)
+        self._target.finish(self._screen, within)
 
     def _resize(self) -> None:
         if self._target is not None:
