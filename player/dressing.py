@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,7 @@ from player.extras import Colour, Dots, Extras, Grid
 from player.face import FaceFigure
 from player.ground import body_grid, face_grid, no_shadows
 from player.influence import Influence
-from player.shapes import View
+from player.shapes import FaceMesh, FaceShape, View
 from player.switches import Switches
 from player.wireframe import Wireframe
 
@@ -52,6 +53,7 @@ class Dressing:
         self._bones = bones
         self._wires = Wireframe()
         self._influence: Influence | None = None
+        self._full: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
         self._pivots = face_pivots(figure.model, figure.scale)
         model = figure.model
         self._known: npt.NDArray[np.bool_] = np.asarray(np.isfinite(model.points).all(axis=1))
@@ -71,6 +73,8 @@ class Dressing:
             view = replace(view, faces=faces, meshes=[*view.meshes, *paint.eyes(view.eyes)], eyes=[])
             extras = replace(extras, legend=paint.legend)
         lines = []
+        if switches["wireframe"] or switches["normals"]:
+            view = replace(view, faces=[self._in_full(mesh) for mesh in view.faces])
         if switches["wireframe"]:
             lines.append(self._wires.edges(view.faces, view.meshes, view.eyes, self._scale))
         if switches["normals"]:
@@ -108,6 +112,14 @@ class Dressing:
     def _bust_grid(self) -> Grid:
         lowest = float(self._figure.model.vertices[:, 1].min())
         return face_grid(self._figure.subject, lowest, self._scale)
+
+    def _in_full(self, mesh: FaceMesh) -> FaceMesh:
+        """With all its triangles, however small it is: lines lie on them."""
+        if mesh.shape.coarser is None:
+            return mesh
+        if mesh.shape not in self._full:
+            self._full[mesh.shape] = replace(mesh.shape, coarser=None)
+        return replace(mesh, shape=self._full[mesh.shape])
 
     def _painter(self, number: int) -> Influence:
         if self._influence is None or self._influence.fap.number != number:
