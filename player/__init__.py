@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from player.film_sheet import film_sheet
     from player.notebook import Preview
     from player.offscreen import Offscreen
+    from player.pyrender_bridge import to_pyrender
     from player.recorder import Recorder
     from player.recording import record, render
     from player.renderer import Renderer
@@ -43,6 +44,7 @@ _PLACES = {
     "play": "player.window",
     "record": "player.recording",
     "render": "player.recording",
+    "to_pyrender": "player.pyrender_bridge",
 }
 
 __all__ = [
@@ -61,6 +63,7 @@ __all__ = [
     "play",
     "record",
     "render",
+    "to_pyrender",
 ]
 
 
