@@ -31,8 +31,6 @@ ARMPIT = (-0.24, -0.12)
 """Heights from the shoulder between which the side of the trunk comes to go with the arm at all."""
 BLADE = (-0.20, -0.06)
 """Heights from the shoulder between which the trunk comes to go with the blade."""
-LEAST = 0.012
-"""Taken from every weight: what is less does not count, and takes no place."""
 EASED = 10
 """How often the weights of trunk, arms and legs are drawn to those of their neighbours."""
 
@@ -93,25 +91,6 @@ def _shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> 
         keep = np.where(near, (1 - share - others) / np.maximum(trunk, 1e-9), 1.0)
         weights[:, rest] *= keep[:, None]
         weights[near, arm] = share[near]
-
-
-def few(weights: Float64, most: int) -> Float64:
-    """(V, J) weights with the vertebrae thinned out, so that a vertex has no more than `most` joints.
-
-    Neighbouring vertebrae move alike: what the least of them carry, the others take over.
-    """
-    spine = np.array([name[0] == "v" or name == "sacroiliac" for name in Skeleton.default().names])
-    weights = np.maximum(weights - LEAST, 0.0)
-    weights /= weights.sum(axis=1, keepdims=True)
-    rooms = np.clip(most - (weights[:, ~spine] > 0).sum(axis=1), 1, most)
-    column = weights[:, spine]
-    total = column.sum(axis=1, keepdims=True)
-    ranked = -np.sort(-column, axis=1)
-    column = np.maximum(column - np.take_along_axis(ranked, rooms[:, None], axis=1), 0.0)
-    column *= total / np.maximum(column.sum(axis=1, keepdims=True), 1e-12)
-    thin = weights.copy()
-    thin[:, spine] = np.where(total > 1e-9, column, weights[:, spine])
-    return thin
 
 
 def _of_arm(name: str, side: str) -> bool:

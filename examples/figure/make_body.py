@@ -12,7 +12,6 @@ import io
 from dataclasses import dataclass
 from pathlib import Path
 
-import bending
 import clothes
 import figure
 import numpy as np
@@ -24,8 +23,8 @@ from person import Person
 from sculpt import ORIGIN
 
 from fba.body import Skeleton
-from fba.body.heads import strongest
-from fba.body.model import INFLUENCES, BodyModel, BodyPart, Material
+from fba.body.influences import strongest
+from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.posture import FINGERS
 from fba.face.model import FaceModel, point_row
 from fba.mesh import vertex_normals
@@ -182,9 +181,10 @@ def _welded_normals(garment: clothes.Garment) -> Float64:
 def model() -> BodyModel:
     """The whole person without the head."""
     found, bones = pieces()
+    spine = [name[0] == "v" or name == "sacroiliac" for name in bones.names]
     parts = []
     for name, piece in found.items():
-        joints, weights = strongest(bending.few(piece.weights, INFLUENCES))
+        joints, weights = strongest(piece.weights, spine)
         roughness = {"skin": 0.55, "neck": 0.55, "cloth": 0.95, "shoe": 0.6}[piece.kind]
         parts.append(
             BodyPart(

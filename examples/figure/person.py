@@ -30,8 +30,10 @@ SLIMMER = 0.012
 """Metres that the outside of each thigh is drawn in."""
 THIGH, THIGH_HIGH = 0.84, 0.15
 """Where, and over how much height."""
-BENDS = ((("?_knee", (0.0, 0.0, 1.0)), 0.062), (("?_elbow", (0.0, 0.0, -1.0)), 0.064))
-"""Joints about which the surface is cut finer, the side that stretches when they bend, and how far."""
+BENDS = (("?_knee", (0.0, 0.0, 1.0), 0.090), ("?_elbow", (0.0, 0.0, -1.0), 0.064))
+"""Joints about which the surface is cut finer: the side that stretches when they bend, and how far."""
+PAST = 0.02
+"""How far this reaches round to the other side, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +60,11 @@ def person(surface: figure.Surface, places: dict[str, Float64], arms: Float64) -
     """The person on a figure. places: its joints by name. arms (V,): how far the arms carry each vertex."""
     middle = surface.vertices[surface.quads].mean(axis=1)
     chosen = np.zeros(len(middle), dtype=bool)
-    for (joint, side), reach in BENDS:
+    for joint, side, reach in BENDS:
         for letter in "lr":
             away = middle - places[joint.replace("?", letter)]
             chosen |= (np.linalg.norm(away * (0.6, 1.0, 0.6), axis=1) < reach) & (
-                away @ np.array(side) > -0.02
+                away @ np.array(side) > -PAST
             )
     refined = refine(surface, chosen)
     arms = refined.blend @ arms  # type: ignore[operator]

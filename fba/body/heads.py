@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fba.body.influences import strongest
 from fba.body.model import INFLUENCES, BodyModel, BodyPart, checked_weights
 from fba.body.skinning import Skinner
 from fba.errors import ModelError
@@ -186,26 +187,6 @@ def _nearest(
     found *= 1 - alone
     found[:, skull] += alone[:, 0]
     return strongest(found)
-
-
-def strongest(dense: Float64) -> tuple[Int32, Float32]:
-    """Joints and weights (V, 4) of dense weights (V, J).
-
-    Of more than four joints, what the fifth has is taken from all, so that weights fade in and out over the
-    surface without a step.
-    """
-    joints = dense.shape[1]
-    if joints < INFLUENCES:
-        dense = np.pad(dense, ((0, 0), (0, INFLUENCES - joints)))
-    order = np.argsort(-dense, axis=1, kind="stable")[:, : INFLUENCES + 1]
-    ranked = np.take_along_axis(dense, order, axis=1)
-    fifth = ranked[:, INFLUENCES:] if ranked.shape[1] > INFLUENCES else 0.0
-    share = np.clip(ranked[:, :INFLUENCES] - fifth, 0.0, None)
-    share[:, 0] = np.where(share.sum(axis=1) > 1e-9, share[:, 0], 1.0)
-    share /= share.sum(axis=1, keepdims=True)
-    share[share < 1e-4] = 0.0
-    share /= share.sum(axis=1, keepdims=True)
-    return order[:, :INFLUENCES].astype(np.int32), share.astype(np.float32)
 
 
 def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]:

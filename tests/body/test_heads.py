@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from small_bodies import Float64, rod
 
 from fba.body import BapSolver
-from fba.body.heads import HeadOnBody, placement, strongest
+from fba.body.heads import HeadOnBody, placement
+from fba.body.influences import strongest
 from fba.body.model import BodyModel
 from fba.errors import ModelError
 from fba.face.deformer import Deformer

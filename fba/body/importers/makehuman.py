@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.heads import strongest
 from fba.body.importers.obj_mesh import ObjMesh, read_obj_mesh, read_text
+from fba.body.influences import strongest
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.posture import bind_matrices, chain, shares, unposed, vertebrae
 from fba.body.skeleton import Skeleton
@@ -223,7 +223,8 @@ def _parts(mesh: ObjMesh, vertices: Float64, weights: Float64) -> tuple[BodyPart
     body = mesh.of("body")
     head = (skull[body] > WHOLE).all(axis=1)
     throat = ~head & (upper[body] > 0.02).all(axis=1)
-    joints, strong = strongest(weights)
+    spine = [name[0] == "v" or name == "sacroiliac" for name in default.names]
+    joints, strong = strongest(weights, spine)
     normals = vertex_normals(vertices, body)
     eyes = mesh.of("helper-l-eye", "helper-r-eye")
     chosen = (
