@@ -21,9 +21,10 @@ from player.screen import FullScreen
 from player.target import Target
 from player.transport import Transport
 from player.ui.glfw_input import GlfwInput
-from player.ui.keeper import Keeper, pixels_of
+from player.ui.keeper import Keeper
 from player.ui.session import Session
 from player.ui.source import Source
+from player.ui.stills import pixels_of, still
 
 if TYPE_CHECKING:
     from player.showable import Showable
@@ -44,8 +45,6 @@ FASTEST = 1 / 250
 """Least seconds a picture takes, where the display does not set the pace."""
 SETTLES = 4
 """Pictures drawn after an input, until panels have settled."""
-SAMPLES = 4
-"""Samples a pixel of a screenshot, which may take its time."""
 
 
 def play(
@@ -305,7 +304,11 @@ class Window:
             if self._target is not None:
                 self._target.close()
             self._target = Target(self._gl, size, samples=0)
-        self._render(self._target, self._gl.screen)
+        assert self._renderer is not None
+        time = self.transport.time
+        self._target.begin()
+        within = self._renderer.draw(session.view(time), session.camera(time), size)
+        self._target.finish(self._gl.screen, within)
         self.keeper.picture(lambda: pixels_of(self._gl.screen, size))
         self._fulfil()
         self._gl.screen.use()
@@ -317,14 +320,6 @@ class Window:
             self._overlay.draw(self.controls)
         self._last = now
         self._show_title()
-
-    def _render(self, target: Target, into: Any = None) -> Any:
-        """The scene as it is now, without panels; returns the framebuffer that has it."""
-        assert self._renderer is not None
-        time = self.transport.time
-        target.begin()
-        within = self._renderer.draw(self.session.view(time), self.session.camera(time), target.size)
-        return target.finish(into, within)
 
     def _fulfil(self) -> None:
         """What the user asked for, which needs the picture or the window."""
@@ -340,18 +335,13 @@ class Window:
             self._heard()
 
     def _screenshot(self, *, transparent: bool) -> None:
-        session = self.session
-        scene = session.scene
-        before = scene.switches["background"]
-        target = Target(self._gl, session.size, SAMPLES)
+        assert self._renderer is not None
         try:
-            if transparent:
-                scene.show("background", "transparent")
-            pixels = pixels_of(self._render(target), session.size)
-        finally:
-            scene.show("background", before)
-            target.close()
-        self.keeper.screenshot(pixels if transparent else pixels[..., :3])
+            pixels = still(self._gl, self._renderer, self.session, transparent=transparent)
+        except DisplayError as error:
+            self.session.say(f"No picture could be drawn: {error}", "error", 8.0)
+            return
+        self.keeper.screenshot(pixels, transparent=transparent)
 
     def _show_title(self) -> None:
         text = f"{self._title} - frame {self.transport.frame + 1} / {self.session.scene.timeline.frames}"

@@ -44,6 +44,8 @@ class Bar:
         self._ticks: tuple[Ruler | None, list[float], list[tuple[float, float, str]]] = (None, [], [])
         self.place = (0.0, 0.0, 0.0, 0.0)
         """Where the timeline is: left, top, right, bottom in points; for tests and pictures."""
+        self.slider = (0.0, 0.0)
+        """Where the slider of speed begins and ends, in points."""
 
     @property
     def held(self) -> bool:
@@ -289,6 +291,7 @@ class Bar:
             imgui.set_cursor_screen_pos((x - slider - 20 - wide_text, y + 7))
             imgui.text_colored(theme.FAINT if transport.speed == 1.0 else theme.ACCENT, text)
             text = ""
+        self.slider = (x - slider - 12, x - 12)
         imgui.set_cursor_screen_pos((x - slider - 12, y + 2))
         imgui.set_next_item_width(slider)
         changed, speed = imgui.slider_float(

@@ -6,12 +6,12 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FbaError
+from player.pictures import write_picture
 from player.recorder import Recorder
 from player.ui.session import Session
 
@@ -39,16 +39,11 @@ class Keeper:
         """Whether a film is being made."""
         return self._recorder is not None
 
-    def screenshot(self, pixels: UInt8) -> Path | None:
+    def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
         """Keep a picture, uint8 (H, W, 4), as a PNG file; None where it failed, which the user is told."""
-        from PIL import Image
-
-        from fba.atomic import atomic
-
         path = self._name(f"-{self.session.transport.frame + 1:04d}", ".png")
         try:
-            with atomic(path) as file:
-                Image.fromarray(np.ascontiguousarray(pixels)).save(file, "PNG")
+            write_picture(path, pixels, transparent=transparent)
         except (OSError, FbaError) as error:
             self.session.say(f"The picture could not be kept: {error}", "error", 8.0)
             return None
@@ -108,10 +103,3 @@ class Keeper:
         while path.exists():
             path, number = self.folder / f"{stem}{what}-{number}{suffix}", number + 1
         return path
-
-
-def pixels_of(framebuffer: Any, size: tuple[int, int]) -> UInt8:
-    """What a framebuffer holds: uint8 (H, W, 4), top row first."""
-    width, height = size
-    data = framebuffer.read((0, 0, width, height), components=4, alignment=1)
-    return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from open_windows import opened, settle, shown, until
 
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
@@ -17,17 +16,6 @@ from player.scene import Scene
 from player.window import Window, play
 
 glfw = pytest.importorskip("glfw")
-
-
-def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int, int] = (640, 480)) -> Window:
-    if panels:
-        pytest.importorskip("imgui_bundle")
-    try:
-        return Window(Scene(animation), size=size, panels=panels, folder=folder)
-    except DisplayError as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(f"no OpenGL on the virtual display: {error}")
 
 
 @pytest.fixture
@@ -44,26 +32,6 @@ def plain(on_display: str, talking: Animation, tmp_path: Path) -> Iterator[Windo
     with opened(talking, tmp_path, panels=False, size=(320, 240)) as one:
         settle(one)
         yield one
-
-
-def settle(window: Window) -> None:
-    """Draw what is due."""
-    while window._due and window.update():
-        pass
-
-
-def until(window: Window, reached: Callable[[], bool], seconds: float = 30.0) -> None:
-    """Draw until something holds."""
-    begun = time.monotonic()
-    while not reached():
-        assert time.monotonic() - begun < seconds
-        assert window.update()
-
-
-def shown(window: Window) -> np.ndarray:
-    width, height = window.session.size
-    pixels = np.frombuffer(window._gl.screen.read((0, 0, width, height), components=3, alignment=1), np.uint8)
-    return pixels.reshape(height, width, 3)[::-1].astype(int)
 
 
 def press(window: Window, key: int, modifiers: int = 0, action: int | None = None) -> None:

@@ -1,0 +1,47 @@
+"""Windows on a virtual display, for tests."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fba.animation import Animation
+from fba.errors import DisplayError
+from player.scene import Scene
+from player.window import Window
+
+
+def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int, int] = (640, 480)) -> Window:
+    if panels:
+        pytest.importorskip("imgui_bundle")
+    try:
+        return Window(Scene(animation), size=size, panels=panels, folder=folder)
+    except DisplayError as error:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(f"no OpenGL on the virtual display: {error}")
+
+
+def settle(window: Window) -> None:
+    """Draw what is due."""
+    while window._due and window.update():
+        pass
+
+
+def until(window: Window, reached: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Draw until something holds."""
+    begun = time.monotonic()
+    while not reached():
+        assert time.monotonic() - begun < seconds
+        assert window.update()
+
+
+def shown(window: Window) -> np.ndarray:
+    width, height = window.session.size
+    pixels = np.frombuffer(window._gl.screen.read((0, 0, width, height), components=3, alignment=1), np.uint8)
+    return pixels.reshape(height, width, 3)[::-1].astype(int)
