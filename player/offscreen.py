@@ -16,6 +16,7 @@ from player.context import offscreen_context
 from player.renderer import Renderer
 from player.scene import Scene
 from player.shapes import View
+from player.showable import Showable
 from player.target import Target
 
 UInt8 = npt.NDArray[np.uint8]
@@ -40,7 +41,7 @@ class Offscreen:
 
     def __init__(
         self,
-        subject: Animation | Scene,
+        subject: Animation | Showable,
         size: tuple[int, int] = (1280, 720),
         camera: Camera | str | None = None,
         *,
@@ -49,7 +50,7 @@ class Offscreen:
         width, height = (int(v) for v in size)
         if width < 1 or height < 1:
             raise ValueError(f"a picture must have at least 1x1 pixels, not {width}x{height}")
-        self.scene = subject if isinstance(subject, Scene) else Scene(subject)
+        self.scene: Any = Scene(subject) if isinstance(subject, Animation) else subject
         self.size = (width, height)
         aspect = width / height
         self.camera = camera if isinstance(camera, Camera) else self.scene.camera(camera, aspect)
