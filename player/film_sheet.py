@@ -13,7 +13,8 @@ from fba.errors import RangeError
 from player.camera import Camera
 from player.lettering import label_font, shortened
 from player.offscreen import Offscreen
-from player.scene import Scene
+from player.recording import as_scene
+from player.showable import Showable
 from player.times import timecode
 
 Progress = Callable[[int, int], None]
@@ -32,7 +33,7 @@ SPACE = 4
 
 
 def film_sheet(
-    subject: Animation | Scene,
+    subject: Animation | Showable,
     count: int,
     *,
     tile: tuple[int, int] | None = None,
@@ -50,7 +51,7 @@ def film_sheet(
     Raises ValueError for a count below 1, pictures below 16x16 or a sheet too large to be one, RangeError
     where nothing lies between start and end, DisplayError where there is no OpenGL.
     """
-    scene = subject if isinstance(subject, Scene) else Scene(subject)
+    scene = as_scene(subject)
     size = tile or TILE
     if count < 1:
         raise ValueError(f"a contact sheet has at least one picture, not {count}")
@@ -71,9 +72,10 @@ def film_sheet(
     return _drawn(scene, frames, size, camera, (columns, *whole, letters), progress)
 
 
-def chosen(scene: Scene, count: int, start: float | None, end: float | None) -> list[int]:
+def chosen(scene: Showable, count: int, start: float | None, end: float | None) -> list[int]:
     """Positions of frames in the animation, at even distances in time; each once, in order."""
-    times = scene.animation.times
+    timeline = scene.timeline
+    times = np.array([float(timeline.time_of(frame)) for frame in range(timeline.frames)])
     low = -math.inf if start is None else start
     high = math.inf if end is None else end
     if math.isnan(low) or math.isnan(high):
@@ -99,7 +101,7 @@ def columns_of(count: int, step: tuple[int, int]) -> int:
 
 
 def _drawn(
-    scene: Scene,
+    scene: Showable,
     frames: list[int],
     size: tuple[int, int],
     camera: Camera | str | None,
@@ -119,7 +121,7 @@ def _drawn(
             y = SPACE + number // columns * (size[1] + line + SPACE)
             time = scene.timeline.time_of(frame)
             sheet.paste(Image.fromarray(view.frame(float(time))[..., :3]), (x, y))
-            code, where = timecode(float(time), scene.rate), f"frame {frame}"
+            code, where = timecode(float(time), scene.timeline.rate), f"frame {frame}"
             below = y + size[1] + 1
             draw.text((x + 2, below), shortened(draw, code, font, size[0]), font=font, fill=TEXT)
             room = size[0] - draw.textlength(code, font=font) - draw.textlength(where, font=font)

@@ -13,11 +13,12 @@ import math
 import tempfile
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaError
 from player.camera import Camera
-from player.scene import Scene
+from player.showable import Showable
 from player.times import clock_text
 
 WIDTH, SHAPE = 480, 4 / 3
@@ -42,7 +43,7 @@ class Preview:
 
     def __init__(
         self,
-        subject: Animation | Scene,
+        subject: Animation | Showable,
         *,
         width: int = WIDTH,
         camera: Camera | str | None = None,
@@ -55,7 +56,8 @@ class Preview:
             if value is not None and not math.isfinite(value):
                 raise ValueError(f"{name} must be a finite number of seconds, not {value}")
         self._subject = subject
-        self._animation = subject.animation if isinstance(subject, Scene) else subject
+        shown: Any = subject
+        self._animation: Animation = subject if isinstance(subject, Animation) else shown.animation
         self._size = (width // 2 * 2, round(width / SHAPE) // 2 * 2)
         self._camera, self._start, self._end = camera, start, end
         self._html: str | None = None
@@ -73,8 +75,10 @@ class Preview:
         caption = described(self._animation)
         if not len(self._animation):
             return _figure("", caption)
+        from player.recording import as_scene
+
         try:
-            scene = self._subject if isinstance(self._subject, Scene) else Scene(self._subject)
+            scene = as_scene(self._subject)
             try:
                 shown, note = self._film(scene)
             except DisplayError as error:
@@ -83,13 +87,14 @@ class Preview:
             shown, note = "", f"No picture: {error}"
         return _figure(shown, caption, note)
 
-    def _film(self, scene: Scene) -> tuple[str, str]:
+    def _film(self, scene: Showable) -> tuple[str, str]:
         from player.recording import film_rate, record
 
-        rate = film_rate(scene.rate)
+        rate = film_rate(scene.timeline.rate)
         rate /= -(-rate // RATE)  # whole frames are left out
-        begin = scene.start if self._start is None else max(Fraction(self._start), scene.start)
-        end = scene.timeline.end if self._end is None else min(Fraction(self._end), scene.timeline.end)
+        begin, end = scene.timeline.start, scene.timeline.end
+        begin = begin if self._start is None else max(Fraction(self._start), begin)
+        end = end if self._end is None else min(Fraction(self._end), end)
         last = min(end, begin + SECONDS)
         note = ""
         if last < end:
@@ -116,13 +121,13 @@ class Preview:
             f'src="data:video/mp4;base64,{base64.b64encode(data).decode()}"></video>'
         ), note
 
-    def _still(self, scene: Scene) -> str:
+    def _still(self, scene: Showable) -> str:
         from player.offscreen import Offscreen
         from player.picture_files import put_picture
 
         width, height = self._size
         with Offscreen(scene, self._size, self._camera) as view:
-            pixels = view.frame(float(scene.start) if self._start is None else self._start)
+            pixels = view.frame(float(scene.timeline.start) if self._start is None else self._start)
         file = io.BytesIO()
         put_picture(file, pixels, ".png")
         data = base64.b64encode(file.getvalue()).decode()

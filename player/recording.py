@@ -18,6 +18,7 @@ from player.picture_files import PICTURES, check_picture, write_picture
 from player.recorder import FILMS, Recorder, exact_rate
 from player.scene import Scene
 from player.sequence import Numbered, Sequence, is_sequence
+from player.showable import Showable
 from player.whole import PathLike
 
 Progress = Callable[[int, int], None]
@@ -35,7 +36,7 @@ SIZE, GIF_SIZE = (1280, 720), (480, 270)
 
 
 def render(
-    animation: Animation | Scene,
+    animation: Animation | Showable,
     path: PathLike,
     *,
     size: tuple[int, int] | None = None,
@@ -70,7 +71,7 @@ def render(
     """
     _check_name(path)
     target = Path(path)
-    scene = animation if isinstance(animation, Scene) else Scene(animation)
+    scene = as_scene(animation)
     if is_film(path):
         if frame is not None or time is not None:
             raise ValueError(
@@ -98,7 +99,7 @@ def render(
 
 
 def record(
-    scene: Scene | Animation,
+    scene: Showable | Animation,
     path: PathLike,
     *,
     fps: Fraction | int | str | None = None,
@@ -115,7 +116,7 @@ def record(
 
     MP4: H.264, yuv420p, and AAC; it needs even sizes: odd ones lose their last column or row.
     """
-    shown = scene if isinstance(scene, Scene) else Scene(scene)
+    shown = as_scene(scene)
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     gif, numbered = suffix == ".gif", is_sequence(path)
     transparent = transparent or (numbered and _clear(shown, path))
@@ -127,7 +128,7 @@ def record(
     if numbered and audio is not None:
         raise ValueError("pictures have no sound; leave the audio out, or write an .mp4")
     if fps is None:
-        rate = film_rate(shown.rate)
+        rate = film_rate(shown.timeline.rate)
         if gif:
             from player.gif import gif_rate
 
@@ -146,7 +147,7 @@ def record(
             recorder = Recorder.into(sink, path, (width, height), rate)
         else:
             recorder = Recorder(
-                path, (width, height), rate=rate, audio=audio, audio_start=first - shown.start
+                path, (width, height), rate=rate, audio=audio, audio_start=first - shown.timeline.start
             )
         stack.enter_context(recorder)
         stack.enter_context(_background(shown, clear=transparent))
@@ -166,6 +167,11 @@ def picture_size(size: tuple[int, int] | None, path: PathLike) -> tuple[int, int
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     width, height = size or (GIF_SIZE if suffix == ".gif" else SIZE)
     return (width // 2 * 2, height // 2 * 2) if suffix == ".mp4" else (width, height)
+
+
+def as_scene(subject: Animation | Showable) -> Showable:
+    """A scene of an animation; what is a scene already stays."""
+    return Scene(subject) if isinstance(subject, Animation) else subject
 
 
 def film_rate(rate: Fraction) -> Fraction:
@@ -210,7 +216,7 @@ def _background(scene: Any, *, clear: bool) -> Iterator[None]:
             scene.show("background", before)
 
 
-def _moment(scene: Scene, frame: int | None, time: float | None) -> float:
+def _moment(scene: Showable, frame: int | None, time: float | None) -> float:
     if frame is not None and time is not None:
         raise ValueError("give frame or time, not both")
     if frame is not None:
@@ -222,15 +228,15 @@ def _moment(scene: Scene, frame: int | None, time: float | None) -> float:
                 limits=(0, frames - 1),
             )
         return float(scene.timeline.time_of(range(frames)[frame]))
-    return float(scene.start) if time is None else float(time)
+    return float(scene.timeline.start) if time is None else float(time)
 
 
-def _stretch(scene: Scene, rate: Fraction, start: float | None, end: float | None) -> tuple[Fraction, int]:
+def _stretch(scene: Showable, rate: Fraction, start: float | None, end: float | None) -> tuple[Fraction, int]:
     """Time of the first picture and how many there are."""
     for name, value in (("start", start), ("end", end)):
         if value is not None and not math.isfinite(value):
             raise ValueError(f"{name} must be a finite number of seconds, not {value}")
-    begin, stop = scene.start, scene.timeline.end
+    begin, stop = scene.timeline.start, scene.timeline.end
     first = begin if start is None else max(Fraction(start).limit_denominator(10**6), begin)
     last = stop if end is None else min(Fraction(end).limit_denominator(10**6), stop)
     if last <= first:
