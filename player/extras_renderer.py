@@ -16,12 +16,13 @@ from player.words import MOST_NAMES, SMALLEST, legend_picture, names_picture, pl
 
 Float64 = npt.NDArray[np.float64]
 
-REFERENCE_HEIGHT = 720
+REFERENCE_HEIGHT, LEAST_SCALE = 720, 0.35
 CROWDED = 7.0
 """Lines shorter than this (pixels) are fainter: a fine mesh is a tint, not a black spot."""
 HIDDEN = 0.2
 """How much of a dot is seen through what hides it."""
 NAME_SIZE, SMALLEST_NAME = 13, 10
+LEAST_LEGEND = 0.65
 MARGIN = 14
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
 
@@ -64,7 +65,7 @@ class ExtrasRenderer:
             set_uniform(program, "camera", matrix_bytes(matrix))
             set_uniform(program, "eye", tuple(float(v) for v in camera.eye))
             set_uniform(program, "size", (float(size[0]), float(size[1])))
-        scale = max(size[1] / REFERENCE_HEIGHT, 0.5)
+        scale = max(size[1] / REFERENCE_HEIGHT, LEAST_SCALE)
         gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
         self._draw_shells(extras.shells)
         gl.fbo.depth_mask = False
@@ -83,9 +84,10 @@ class ExtrasRenderer:
                 self._draw_names(dots, matrix, camera.eye, size, scale)
             if extras.legend is not None:
                 legend = extras.legend
-                words = self._words("legend", (legend, scale), lambda: (legend_picture(legend, scale), None))
+                large = max(scale, LEAST_LEGEND)
+                words = self._words("legend", (legend, large), lambda: (legend_picture(legend, large), None))
                 wide, high = words[1].size
-                edge = round(MARGIN * scale)
+                edge = round(MARGIN * large)
                 if wide + 2 * edge <= size[0]:
                     self._draw_label("legend", np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
         gl.fbo.depth_mask = True

@@ -20,7 +20,7 @@ Bool = npt.NDArray[np.bool_]
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
 SHADE = (18, 21, 26, 190)
-SMALLEST = 96
+SMALLEST = 240
 """In pictures lower than this (pixels) there are no words."""
 MOST_NAMES = 45
 """Where more points are in view, none is named."""
