@@ -135,6 +135,8 @@ def command(
     captures = [path for path in inputs if _captured(path)]
     animation, said = capture_report.limited(animation, limits)
     if report:
+        if animation.body is None:
+            raise click.UsageError("--report compares bones of motion capture, and there is no body")
         said = capture_report.compared(captures, animation) | said
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)

@@ -17,11 +17,16 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.source import read_whole
 
 MAX_JOINTS = 4096
 MAX_RATE = 10_000
+MAX_LINES = 4 * MOST_FRAMES
+LARGEST = 1e12
+"""Lengths and angles beyond this are damage."""
+BATCH_LINES = 4096
 NOMINAL_RATES = tuple(
     sorted({Fraction(n) for n in range(1, 241)} | {Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120)}
            | {Fraction(n) for n in (250, 300, 480, 500, 1000)})
@@ -75,6 +80,8 @@ def read_motion(path: str | Path) -> SkeletonMotion:
 
 def parse(text: str, *, name: str = "", path: str | Path | None = None) -> SkeletonMotion:
     """As `read_motion`, from text. path: named in errors."""
+    if max(text.count("\n"), text.count("\r")) > MAX_LINES:
+        raise FormatError(f"more than {MAX_LINES} lines; cut the motion into pieces", path=path)
     lines = text.splitlines()
     tree, after = _hierarchy(lines, path)
     count, frame_time, first = _motion_header(lines, after, path)
@@ -204,31 +211,42 @@ def _numbers(
     """float64 (T, channels). Only what is there is read: the claimed count allocates nothing."""
     if not channels:
         raise FormatError("no joint has channels, so nothing can move", path=path)
-    rows: list[tuple[int, list[str]]] = []
+    read: list[npt.NDArray[np.float64]] = []
+    at: list[int] = []  # the line of each row, and how many numbers it has
+    counts: list[int] = []
+    batch: list[str] = []
     total = 0
-    even = True
     for number in range(first, len(lines)):
         words = lines[number].split()
         if not words:
             continue
-        even = even and len(words) == channels
+        at.append(number)
+        counts.append(len(words))
         total += len(words)
-        rows.append((number, words))
+        batch += words
+        if total // channels > MOST_FRAMES:
+            raise FormatError(
+                f"more than {MOST_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
+            )
+        if len(at) % BATCH_LINES == 0:
+            read.append(_floats(batch, lines, at, path))
+            batch = []
+    read.append(_floats(batch, lines, at, path))
     frames, lost = divmod(total, channels)
     if not frames:
         raise FormatError("there is no frame of motion after 'Frame Time'", path=path, line=first + 1)
-    if not even:
-        bad = next(n for n, (_, words) in enumerate(rows) if len(words) != channels)
+    bad = next((row for row, count in enumerate(counts) if count != channels), None)
+    if bad is not None:
         wrapped = claimed is not None and total == claimed * channels
-        cut = bad == len(rows) - 1 and len(rows[bad][1]) < channels
+        cut = bad == len(counts) - 1 and counts[bad] < channels
         if not (wrapped or cut):
             raise FormatError(
-                f"expected {channels} numbers, one for each channel, found {len(rows[bad][1])}",
-                path=path, line=rows[bad][0] + 1,
+                f"expected {channels} numbers, one for each channel, found {counts[bad]}",
+                path=path, line=at[bad] + 1,
             )  # fmt: skip
         if cut and not wrapped:
             warnings.warn(
-                f"{path or 'BVH'}:{rows[bad][0] + 1}: the last frame is cut short "
+                f"{path or 'BVH'}:{at[bad] + 1}: the last frame is cut short "
                 f"({lost} of {channels} numbers); left out",
                 FbaWarning,
                 stacklevel=4,
@@ -239,34 +257,39 @@ def _numbers(
             FbaWarning,
             stacklevel=4,
         )
-    try:
-        values = np.array([float(w) for _, words in rows for w in words][: frames * channels])
-    except ValueError:
-        for number, words in rows:
-            for word in words:
-                _number(word, path, number)
-        raise
-    if not np.isfinite(values).all() or np.abs(values).max() > 1e12:
-        wrong = int(np.argmax(~np.isfinite(values) | (np.abs(values) > 1e12)))
-        position = 0
-        for number, words in rows:
-            if wrong < position + len(words):
-                raise FormatError(
-                    "motion must be finite, plausible numbers",
-                    path=path,
-                    line=number + 1,
-                    token=words[wrong - position],
-                )
-            position += len(words)
+    values = np.concatenate(read)[: frames * channels]
+    wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    if len(wrong):
+        ends = np.cumsum(counts)
+        row = int(np.searchsorted(ends, wrong[0], side="right"))
+        raise FormatError(
+            "motion must be finite, plausible numbers",
+            path=path,
+            line=at[row] + 1,
+            token=lines[at[row]].split()[int(wrong[0] - ends[row])],
+        )
     return values.reshape(frames, channels)
 
 
-def _number(word: str, path: str | Path | None, line: int) -> float:
+def _floats(
+    batch: list[str], lines: list[str], at: list[int], path: str | Path | None
+) -> npt.NDArray[np.float64]:
+    """Numbers of the last rows; FormatError with the line of a word that is none."""
+    try:
+        return np.array([float(word) for word in batch], dtype=np.float64)
+    except ValueError:
+        for number in at[-BATCH_LINES:]:
+            for word in lines[number].split():
+                _number(word, path, number, any_size=True)
+        raise
+
+
+def _number(word: str, path: str | Path | None, line: int, any_size: bool = False) -> float:
     try:
         value = float(word)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not (any_size or abs(value) <= LARGEST) or math.isnan(value):
         raise FormatError("expected a number", path=path, line=line + 1, token=word)
     return value
 
@@ -288,6 +311,8 @@ def _rate(frame_time: str) -> Fraction:
                 abs(1 / float(r) - value),
             ),
         )
+    if value > 1:
+        return 1 / Fraction(value).limit_denominator(1000)
     return Fraction(1 / value).limit_denominator(1000)
 
 

@@ -314,4 +314,7 @@ def test_a_face_from_gltf(run: Run, tmp_path: Path, face: Animation) -> None:
     assert (code, err) == (0, "")
     back = fba.read(tmp_path / "b.fba")
     assert back.rate == 50
+    code, _, err = run("encode", tmp_path / "face.glb", "-o", tmp_path / "c.fba", "--report")
+    assert code == 2
+    assert "there is no body" in err
     assert np.array_equal(back.face.values[::2, 2], face.face.values[:, 2])  # type: ignore[union-attr]

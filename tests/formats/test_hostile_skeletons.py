@@ -1,0 +1,158 @@
+"""Skeletons that are damaged or meant to hurt: an error that names the place, or what is there and a word."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gltf_edits import edited
+
+import fba
+from fba.animation import Animation, BodyTrack
+from fba.errors import FbaWarning, FormatError
+from fba.formats import bvh
+from fba.parameters import BAP_COUNT, bap_numbers
+
+FRAMES = 5
+BVH = """HIERARCHY
+ROOT Hips
+{{ OFFSET 0 {offset} 0 CHANNELS 3 Zrotation Xrotation Yrotation
+  End Site {{ OFFSET 0 1 0 }} }}
+MOTION
+Frames: {frames}
+Frame Time: {time}
+"""
+
+
+def text(rows: list[str], offset: str = "0", time: str = "0.1") -> str:
+    return BVH.format(offset=offset, frames=len(rows), time=time) + "\n".join(rows) + "\n"
+
+
+def test_more_frames_than_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bvh, "MOST_FRAMES", 3)
+    assert bvh.parse(text(["0 0 0"] * 3)).rotations.shape[0] == 3
+    with pytest.raises(FormatError, match="more than 3 frames; cut the motion into pieces") as caught:
+        bvh.parse(text(["0 0 0"] * 9))
+    assert caught.value.line == 11
+    monkeypatch.setattr(bvh, "MAX_LINES", 15)
+    with pytest.raises(FormatError, match="more than 15 lines"):
+        bvh.parse(text(["0 0 0"] * 9))
+
+
+@pytest.mark.parametrize("word", ["nan", "-inf", "1e400", "1e13", "x"])
+@pytest.mark.parametrize("row", range(7))
+def test_a_wrong_number_anywhere(monkeypatch: pytest.MonkeyPatch, word: str, row: int) -> None:
+    """Rows are read three at a time."""
+    monkeypatch.setattr(bvh, "BATCH_LINES", 3)
+    rows = ["1 2 3"] * 7
+    rows[row] = f"1 {word} 3"
+    with pytest.raises(FormatError) as caught:
+        bvh.parse(text(rows))
+    assert (caught.value.line, caught.value.token) == (8 + row, word)
+
+
+def test_lengths_beyond_all_measure() -> None:
+    with pytest.raises(FormatError) as caught:
+        bvh.parse(text(["0 0 0"], offset="1e300"))
+    assert (caught.value.line, caught.value.token) == (3, "1e300")
+
+
+def test_a_frame_an_hour() -> None:
+    assert bvh.parse(text(["0 0 0"] * 2, time="3600")).rate == Fraction(1, 3600)
+    assert bvh.parse(text(["0 0 0"] * 2, time="2.5")).rate == Fraction(2, 5)
+
+
+@pytest.fixture(scope="module")
+def bones(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A skeleton whose left knee bends, as of another program."""
+    path = tmp_path_factory.mktemp("glb") / "a.glb"
+    values = np.zeros((FRAMES, BAP_COUNT), dtype=np.int32)
+    values[:, bap_numbers()["l_knee_flexion"] - 1] = -10_000 * np.arange(FRAMES)
+    track = BodyTrack(values, np.ones(values.shape, dtype=bool))
+    fba.write(path, Animation(Fraction(25), np.arange(FRAMES), None, track), mesh=False)
+    return edited(path.read_bytes(), lambda whole: whole["animations"][0].pop("extras"))
+
+
+def node(whole: dict[str, Any], name: str) -> dict[str, Any]:
+    found: dict[str, Any] = next(entry for entry in whole["nodes"] if entry["name"] == name)
+    return found
+
+
+def number(whole: dict[str, Any], name: str) -> int:
+    return [entry["name"] for entry in whole["nodes"]].index(name)
+
+
+def circle(whole: dict[str, Any]) -> None:
+    node(whole, "l_knee")["children"].append(0)
+
+
+def two_parents(whole: dict[str, Any]) -> None:
+    node(whole, "l_knee")["children"].append(number(whole, "l_hip"))
+
+
+def no_length(whole: dict[str, Any]) -> None:
+    for entry in whole["nodes"]:
+        entry["translation"] = [0, 0, 0]
+    del whole["skins"]
+
+
+def no_turn(whole: dict[str, Any]) -> None:
+    whole["nodes"][0]["rotation"] = [0, 0, 0, 0]
+
+
+def too_many_keys(whole: dict[str, Any]) -> None:
+    whole["accessors"][0]["count"] = 10**7
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (circle, r"nodes\[0\]: is its own ancestor"),
+        (two_parents, "as a child, which is already a child of node"),
+        (no_length, "joints all coincide in its rest pose"),
+        (no_turn, "a quaternion of length 0"),
+        (too_many_keys, "more than the 4194304 elements"),
+    ],
+)
+def test_what_is_no_skeleton(
+    tmp_path: Path, bones: bytes, change: Callable[[dict[str, Any]], None], message: str
+) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(edited(bones, change))
+    with pytest.raises(FormatError, match=message):
+        fba.read(path)
+
+
+def lose_arms(whole: dict[str, Any]) -> None:
+    for side in "lr":
+        node(whole, f"{side}_shoulder")["name"] = f"{side} something"
+
+
+def split(whole: dict[str, Any]) -> None:
+    spine = number(whole, "vl5")
+    whole["nodes"][0]["children"].remove(spine)
+    whole["scenes"][0]["nodes"].append(spine)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lose_arms, "no joints for l_shoulder, r_shoulder; they stay as they are"),
+        (split, "has several skeletons; 'HumanoidRoot' is read, left out: vl5"),
+    ],
+)
+def test_what_is_there_is_played_and_the_rest_is_told(
+    tmp_path: Path, bones: bytes, change: Callable[[dict[str, Any]], None], message: str
+) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(edited(bones, change))
+    with pytest.warns(FbaWarning, match=message):
+        body = fba.read(path).body
+    assert body is not None
+    knee = body.values[:, bap_numbers()["l_knee_flexion"] - 1]
+    # feet are kept on the ground with what is left, so the knee bends a little more or less
+    assert np.abs(knee - -10_000 * np.arange(FRAMES)).max() <= 5000
