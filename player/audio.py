@@ -69,7 +69,7 @@ class Audio:
             self._device.start(given)
         except Exception as error:
             self.close()
-            raise NoDeviceError(str(error) or type(error).__name__) from error
+            raise NoDeviceError(", ".join(str(one) for one in error.args) or type(error).__name__) from error
         transport.use_clock(self.clock, self.clock.latency)
 
     @property

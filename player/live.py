@@ -40,19 +40,27 @@ class LiveAnimation:
     """What has arrived of an FBA stream; has the fields of `Animation`, which grow.
 
     source: is read by a thread of its own until its end, whatever the player does meanwhile. head: bytes
-    that were already read from it. name: of the stream. bap_steps: see `fba.Decoder`.
+    that were already read from it. name: of the stream. bap_steps: see `fba.Decoder`. at_end: called when
+    nothing more is read, to close the source.
 
     Damage is stepped over to the next I plane behind a start code. `message` says what is wrong, "" where
     nothing is. Whether there are a face and a body is decided when `wait` returns.
     """
 
     def __init__(
-        self, source: Readable, *, head: bytes = b"", name: str = "", bap_steps: str = "iso"
+        self,
+        source: Readable,
+        *,
+        head: bytes = b"",
+        name: str = "",
+        bap_steps: str = "iso",
+        at_end: Callable[[], None] | None = None,
     ) -> None:
         self.name = name
         self.message = ""
         self.growing = True
         self._source = source
+        self._at_end = at_end
         self._decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
         self._frames = GrowingFrames()
         self._news = threading.Condition()
@@ -142,6 +150,8 @@ class LiveAnimation:
             self._failure = error
             self.message = f"the stream ended early: {error}"
         finally:
+            if self._at_end is not None:
+                self._at_end()
             self._end()
 
     def _take(self, blocks: list[Block]) -> None:

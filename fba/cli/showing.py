@@ -1,0 +1,136 @@
+"""What `fba play` shows: files, and streams that are still arriving."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import sys
+import tempfile
+import warnings
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import click
+
+from fba.animation import Animation
+from fba.cli import options
+from fba.errors import FbaWarning, FormatError
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyModel
+    from fba.face.model import FaceModel
+    from player.live import LiveAnimation
+    from player.scene import Scene
+
+STREAMS = (b"\0\0\1\xba", b"\0\0\1\x01", b"\0\0\1\xb0", b"\0\0\1\xb5")
+"""How an FBA stream begins: the object, or the layers around it."""
+
+
+def opened(
+    file: Path, *, bap_steps: str, fps: Fraction | None, salvage: bool
+) -> tuple[Animation | LiveAnimation, bool]:
+    """A file's animation; of an FBA stream on standard input or in a FIFO, one that grows. And whether it is.
+
+    What arrives in another format is read to its end first. Raises click.UsageError where standard input is a
+    terminal, what `options.read_input` raises, and what `LiveAnimation.wait` raises.
+    """
+    name = "standard input" if str(file) == "-" else file.name
+    if str(file) == "-" and sys.stdin.isatty():
+        raise click.UsageError("- is standard input, which is the keyboard here: pipe a stream into it")
+    if str(file) != "-" and not is_pipe(file):
+        return options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage), False
+    with contextlib.ExitStack() as stack:
+        source: BinaryIO = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
+        head = b""
+        while len(head) < 4 and (more := source.read1(1 << 16)):  # type: ignore[attr-defined]
+            head += more
+        if not head:
+            raise FormatError("is empty: it ended before its first byte", path=name)
+        if not head.startswith(STREAMS):
+            return _spooled(head, source, name, bap_steps, fps, salvage), False
+        from player.live import LiveAnimation, wait_for
+
+        close = stack.pop_all().close
+        live = LiveAnimation(source, head=head, name=name, bap_steps=bap_steps, at_end=close)  # type: ignore[arg-type]
+    wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
+    return live, True
+
+
+def is_pipe(file: Path) -> bool:
+    """Whether it is a FIFO, or a device that is read once, such as /dev/stdin."""
+    try:
+        mode = os.stat(file).st_mode
+    except OSError:
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+
+
+def scene_of(
+    animation: Animation | LiveAnimation,
+    growing: bool,
+    *,
+    model: FaceModel | None,
+    body: BodyModel | None,
+    axes: str,
+    view: str,
+) -> Scene:
+    """A scene of what `opened` gave."""
+    from player.scene import Scene
+
+    if not growing:
+        return Scene(animation, model, body=body, axes=axes, view=view)  # type: ignore[arg-type]
+    from fba.face.model import FaceModel
+    from player.live import LiveTimeline
+
+    face = model or FaceModel.default()
+    timeline = LiveTimeline(animation, face)  # type: ignore[arg-type]
+    return Scene(animation, face, body=body, axes=axes, view=view, timeline=timeline)  # type: ignore[arg-type]
+
+
+def voice(files: tuple[Path, ...]) -> Path | None:
+    """The sound that lies beside one of the files, the first that has one and can be read."""
+    from player.audio import beside
+    from player.sound import check
+
+    for file in files:
+        found = None if str(file) == "-" or is_pipe(file) else beside(file)
+        if found is None:
+            continue
+        try:
+            check(found)
+        except FormatError as error:
+            warnings.warn(f"played without sound: {error}", FbaWarning, stacklevel=2)
+            continue
+        return found
+    return None
+
+
+def read_body(path: Path | None) -> BodyModel | None:
+    """The body of `--body`, or None for the built-in one."""
+    if path is None:
+        return None
+    from fba.body.model import BodyModel
+
+    return BodyModel.load(path)
+
+
+def _fifo(file: Path) -> BinaryIO:
+    click.echo(f"fba: waiting for a sender to open {file}", err=True)
+    return open(file, "rb")
+
+
+def _spooled(
+    head: bytes, source: BinaryIO, name: str, bap_steps: str, fps: Fraction | None, salvage: bool
+) -> Animation:
+    with tempfile.TemporaryDirectory(prefix="fba-") as folder:
+        path = Path(folder) / "stdin"
+        with path.open("wb") as file:
+            file.write(head)
+            while chunk := source.read(1 << 20):
+                file.write(chunk)
+        animation = options.read_input(path, bap_steps=bap_steps, header_fps=fps, name=name, salvage=salvage)
+    if animation.name != path.name:
+        return animation
+    return Animation(animation.rate, animation.index, animation.face, animation.body, name)

@@ -1,0 +1,243 @@
+"""`fba play`: what it hands to the window, and what it refuses."""
+
+from __future__ import annotations
+
+import io
+import os
+import threading
+import time
+import wave
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+import player
+from fba import Animation
+from player.compare import CompareScene
+from player.live import LiveAnimation
+
+Run = Callable[..., Any]
+
+
+class Window:
+    """Stands in for the window; keeps what it was to show."""
+
+    def __init__(self) -> None:
+        self.scene: Any = None
+        self.options: dict[str, Any] = {}
+        self.meanwhile: Callable[[Any], None] = lambda scene: None
+
+    def __call__(self, scene: Any, **options: Any) -> None:
+        self.scene, self.options = scene, options
+        self.meanwhile(scene)
+
+
+@pytest.fixture
+def window(monkeypatch: pytest.MonkeyPatch) -> Window:
+    stand_in = Window()
+    monkeypatch.setattr(player, "play", stand_in)
+    return stand_in
+
+
+@pytest.fixture
+def talk(tmp_path: Path, face: Animation) -> Path:
+    fba.write(tmp_path / "talk.fba", face)
+    return tmp_path / "talk.fba"
+
+
+def write_wav(path: Path) -> Path:
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(8000)
+        file.writeframes(np.zeros(800, dtype=np.int16).tobytes())
+    return path
+
+
+def pipe_in(monkeypatch: pytest.MonkeyPatch, data: bytes, terminal: bool = False) -> None:
+    class Stdin:
+        buffer = io.BufferedReader(io.BytesIO(data))  # type: ignore[arg-type]
+
+        def isatty(self) -> bool:
+            return terminal
+
+    monkeypatch.setattr("sys.stdin", Stdin())
+
+
+def test_a_file_is_played(run: Run, window: Window, talk: Path) -> None:
+    assert run("play", talk).code == 0
+    assert window.scene.timeline.frames == 50
+    assert window.options == {
+        "title": "talk.fba", "size": (1280, 720), "camera": None, "loop": False, "speed": 1.0, "start": None,
+        "paused": False, "interpolate": True, "audio": None, "file": talk, "bap_steps": "iso", "panels": (),
+    }  # fmt: skip
+
+
+def test_options_reach_the_window(run: Run, window: Window, talk: Path) -> None:
+    words = "--speed 0.5 --loop --start 1.2 --paused --no-interpolate"
+    words += " --size 640x480 --camera profile --view points"
+    assert run("play", talk, *words.split()).code == 0
+    taken = {
+        name: window.options[name] for name in ("speed", "loop", "start", "paused", "interpolate", "camera")
+    }
+    assert list(taken.values()) == [0.5, True, 1.2, True, False, "profile"]
+    assert (window.options["size"], window.scene.view) == ((640, 480), "points")
+
+
+def test_the_sound_beside_it_is_found(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
+    sound = write_wav(tmp_path / "talk.wav")
+    assert run("play", talk).code == 0
+    assert window.options["audio"] == sound
+    assert run("play", talk, "--no-audio").code == 0
+    assert window.options["audio"] is None
+    other = write_wav(tmp_path / "other.wav")
+    assert run("play", talk, "--audio", other).code == 0
+    assert window.options["audio"] == other
+
+
+def test_broken_sound(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "talk.wav"
+    broken.write_bytes(b"no sound at all")
+    found = run("play", talk)
+    assert (found.code, window.options["audio"]) == (0, None)
+    assert "played without sound" in found.err
+    window.scene = None
+    asked = run("play", talk, "--audio", broken)
+    assert asked.code == 1
+    assert "talk.wav: cannot be read as sound" in asked.err
+    assert window.scene is None
+
+
+def test_several_files_are_shown_together(
+    run: Run, window: Window, talk: Path, tmp_path: Path, body: Animation
+) -> None:
+    fba.write(tmp_path / "walk.fba", body)
+    assert run("play", talk, tmp_path / "walk.fba").code == 0
+    assert isinstance(window.scene, CompareScene)
+    assert (window.scene.arrangement, window.scene.names) == ("side", ("talk.fba", "walk.fba"))
+    assert (window.options["title"], window.options["panels"], window.options["file"]) == (
+        "talk.fba | walk.fba", (), None,
+    )  # fmt: skip
+
+
+def test_comparing(run: Run, window: Window, talk: Path, tmp_path: Path, face: Animation) -> None:
+    fba.write(tmp_path / "coarse.fba", face, fap_quant=31)
+    assert run("play", talk, tmp_path / "coarse.fba", "--compare").code == 0
+    assert (window.scene.arrangement, window.options["panels"]) == ("over", ("differences",))
+    assert {one.number for one in window.scene.differences().largest()} <= {3, 48}
+    assert run("play", talk, talk, "--compare", "--arrange", "side").code == 0
+    assert window.scene.arrangement == "side"
+    assert window.scene.differences().largest() == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--compare",), "--compare needs two files"),
+        (("--arrange", "over"), "--arrange needs two files"),
+        (("--start", "2.5"), "from 0 s to 2 s"),
+        (("--speed", "9"), "9"),
+        (("--camera", "below"), "below"),
+        (("missing.fba",), "missing.fba"),
+        (("-", "-"), "standard input"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(
+    run: Run, window: Window, talk: Path, words: tuple[str, ...], said: str
+) -> None:
+    refused = run("play", talk, *words)
+    assert refused.code == 2
+    assert said in refused.err
+    assert window.scene is None
+
+
+def test_sound_and_no_sound_contradict(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
+    refused = run("play", talk, "--audio", write_wav(tmp_path / "a.wav"), "--no-audio")
+    assert refused.code == 2
+    assert "contradict" in refused.err
+
+
+def test_no_file_or_too_many(run: Run, window: Window, talk: Path) -> None:
+    assert run("play").code == 2
+    many = run("play", *[talk] * 9)
+    assert many.code == 2
+    assert "at most 8" in many.err
+
+
+def test_a_stream_on_standard_input(
+    run: Run, window: Window, talk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pipe_in(monkeypatch, talk.read_bytes())
+    assert run("play", "-").code == 0
+    assert isinstance(window.scene.animation, LiveAnimation)
+    assert (window.options["title"], window.options["file"]) == ("standard input", None)
+    assert not window.scene.timeline.growing
+    assert window.scene.animation.snapshot() == fba.read(talk)
+
+
+def test_a_stream_from_a_fifo_is_shown_while_it_arrives(
+    run: Run, window: Window, talk: Path, tmp_path: Path
+) -> None:
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    data = talk.read_bytes()
+    more = threading.Event()
+
+    def send() -> None:
+        with fifo.open("wb", buffering=0) as file:
+            file.write(data[: len(data) // 2])
+            more.wait(20)
+            file.write(data[len(data) // 2 :])
+
+    seen: list[tuple[bool, int]] = []
+
+    def meanwhile(scene: Any) -> None:
+        seen.append((scene.timeline.growing, scene.timeline.frames))
+        more.set()
+        sender.join(20)
+        while scene.timeline.growing:
+            time.sleep(0.002)
+        seen.append((scene.timeline.growing, scene.timeline.frames))
+
+    window.meanwhile = meanwhile
+    sender = threading.Thread(target=send, daemon=True)
+    sender.start()
+    assert run("play", fifo).code == 0
+    assert seen[0][0]
+    assert 7 < seen[0][1] < 50
+    assert seen[1] == (False, 50)
+
+
+def test_other_formats_on_standard_input_are_read_to_their_end(
+    run: Run, window: Window, tmp_path: Path, face: Animation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fba.write(tmp_path / "face.fap", face)
+    pipe_in(monkeypatch, (tmp_path / "face.fap").read_bytes())
+    assert run("play", "-").code == 0
+    assert isinstance(window.scene.animation, Animation)
+    assert window.scene.timeline.frames == 50
+
+
+def test_nothing_on_standard_input(run: Run, window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe_in(monkeypatch, b"")
+    empty = run("play", "-")
+    assert (empty.code, "standard input: is empty" in empty.err) == (1, True)
+    pipe_in(monkeypatch, b"\0\0\1\xbarubbish")
+    rubbish = run("play", "-")
+    assert rubbish.code == 1
+    assert "plane" in rubbish.err
+    pipe_in(monkeypatch, b"", terminal=True)
+    keyboard = run("play", "-")
+    assert (keyboard.code, "keyboard" in keyboard.err) == (2, True)
+    assert window.scene is None
+
+
+def test_a_body_of_ones_own(run: Run, window: Window, tmp_path: Path, talk: Path) -> None:
+    (tmp_path / "body.glb").write_bytes(b"no glTF")
+    refused = run("play", talk, "--body", tmp_path / "body.glb")
+    assert refused.code == 1
+    assert "body.glb" in refused.err
