@@ -13,6 +13,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from fba.capture.paths import chain
 from fba.compiled import compiled, inlined
 
 Float = npt.NDArray[np.float64]
@@ -107,8 +108,10 @@ def _refine(sideways: Float, natural: Float, ease: Float, usual: float, period: 
     """Improves the path: Newton's method, whose equations couple each frame with its neighbours only."""
     count = path.shape[0]
     stiff = 2.0 / (SPEED * SPEED * period)
-    diagonal = np.zeros(count)
+    own = np.zeros(count)
     right = np.zeros(count)
+    move = np.zeros(count)
+    bonds = stiff * ease[1:]
     centre = usual + TURN * math.floor((float(np.median(path)) - usual) / TURN + 0.5)
     for _ in range(STEPS):
         for t in range(count):
@@ -126,25 +129,16 @@ def _refine(sideways: Float, natural: Float, ease: Float, usual: float, period: 
                 curve += 2.0 * bending * bending / (WRONG * WRONG)
             pull += 2.0 * (path[t] - centre) / (LOYAL * LOYAL)
             curve += 2.0 / (LOYAL * LOYAL)
-            diagonal[t] = period * curve
+            own[t] = period * curve
             right[t] = -period * pull
             if t > 0:
                 difference = path[t] - path[t - 1]
-                bond = stiff * ease[t]
-                diagonal[t] += bond
-                diagonal[t - 1] += bond
-                right[t] -= bond * difference
-                right[t - 1] += bond * difference
-        for t in range(1, count):  # Thomas's algorithm: next to the diagonal is -bond
-            bond = stiff * ease[t]
-            share = bond / diagonal[t - 1]
-            diagonal[t] -= share * bond
-            right[t] += share * right[t - 1]
+                right[t] -= bonds[t - 1] * difference
+                right[t - 1] += bonds[t - 1] * difference
+        chain(own, bonds, right, move)
         largest = 0.0
-        move = 0.0
-        for t in range(count - 1, -1, -1):
-            move = (right[t] + (stiff * ease[t + 1] * move if t < count - 1 else 0.0)) / diagonal[t]
-            largest = max(largest, abs(move))
-            path[t] += min(max(move, -LEAP), LEAP)
+        for t in range(count):
+            largest = max(largest, abs(move[t]))
+            path[t] += min(max(move[t], -LEAP), LEAP)
         if largest < SETTLED:
             break

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.body import BapSolver
-from fba.capture import feet, matching, rest
+from fba.capture import feet, ground, matching, rest
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 
@@ -124,10 +124,10 @@ def retarget_report(
             theirs = places[begin:end, mapped[aim]] - places[begin:end, mapped[joint]]
             angles[begin:end, column] = _between(ours, theirs)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
-        own = feet.body_heights(skeleton, frames, matrices[:, 0, :3, 3], toes)
+        own = feet.body_soles(skeleton, frames, matrices[:, 0, :3, 3], toes)
         has_feet = own is not None
         if own is not None:
-            heights[:, begin:end] = own
+            heights[:, begin:end] = own.lowest
     bones = tuple(
         BoneError(
             joint,
@@ -139,11 +139,11 @@ def retarget_report(
         )
         for column, (joint, aim) in enumerate(aims)
     )
-    source = feet.source_heights(motion, mapped, alignment.upright, turned, places)
+    metres = rest.scale(motion, mapped, skeleton) if scale is None else scale
     standing = None
-    if has_feet and source is not None:
-        metres = rest.scale(motion, mapped, skeleton) if scale is None else scale
-        standing = _feet(source[:, :count] * metres, heights) if metres else None
+    if has_feet and metres:
+        source = feet.source_soles(motion, mapped, alignment.upright, turned, places, metres)
+        standing = _feet(source, heights) if source is not None else None
     used = set(mapped.values())
     return RetargetReport(
         family,
@@ -162,15 +162,20 @@ def _between(a: Float, b: Float) -> Float:
     return result
 
 
-def _feet(source: Float, body: Float) -> FeetError | None:
-    level = feet.ground(source)
-    above = source - level
+def _feet(source: feet.Soles, body: Float) -> FeetError | None:
+    middles = source.points.mean(axis=1)
+    level = ground.found(source.lowest, middles).under(middles)[:, : body.shape[1]]
+    above = source.lowest[:, : body.shape[1]] - level
     on = above < CLOSE
     if not on.any():
         return None
     # the body's ground is height 0, or where the source's is: whichever its feet say
-    floor = level if abs(np.median((body - level - above)[on])) < abs(np.median((body - above)[on])) else 0.0
-    error = np.abs(body - floor - above)[on]
+    errors = [np.abs(body - floor - above)[on] for floor in (np.zeros_like(level), level)]
+    error = min(errors, key=lambda e: float(np.median(e)))
     return FeetError(
-        level, int(on.sum()), float(error.mean()), float(error.max()), float((error <= CLOSE).mean())
+        float(np.median(level[on])),
+        int(on.sum()),
+        float(error.mean()),
+        float(error.max()),
+        float((error <= CLOSE).mean()),
     )

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fba.body import BapSolver, wrapped
 from fba.body.solving import joint_angles
-from fba.capture import aiming, feet, hinges, rest, rotations, spine
+from fba.capture import aiming, feet, ground, hinges, legs, rest, rotations, spine
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning
 from fba.parameters import BAP_COUNT, baps
@@ -28,6 +28,9 @@ STIFF = {"thumb": 0.4, "index": 0.1, "middle": 0.1, "ring": 0.1, "pinky": 0.1}
 Thumbs bend in another plane in every source: a knuckle that turned all the way would stand unnaturally."""
 FOREARM_SHARE = 0.5
 """Of the hand's twist against the forearm, what the forearm takes: radius and ulna turn about each other."""
+FOOT_STEPS = 4
+ROUNDS = 2
+"""How often legs move for what their feet still lack."""
 CLAVICLE_SHARE = 0.5
 """Of the clavicle's turn, what the joint at the breastbone takes; the one at the shoulder blade has the
 rest."""
@@ -63,6 +66,7 @@ class Retarget:
             world = upright @ rotations.matrices(turned[:, source]) @ upright.T
             self.wanted[joint] = world @ correction
         self.aims = alignment.aims
+        self.feet: dict[str, Float] = {}
         anchors = [joint for joint in spine.joints(self.skeleton) if joint in mapped]
         if groups and len(anchors) > 1:
             at = {joint: self.places[:, mapped[joint]] for joint in anchors}
@@ -79,13 +83,14 @@ class Retarget:
         if not (np.isfinite(self.scale) and self.scale > 0):
             raise ValueError(f"scale must be a positive number, not {scale}")
 
-    def values(self, origin: str, ground: str) -> npt.NDArray[np.int32]:
+    def values(self, origin: str, floor: str, plant: bool) -> npt.NDArray[np.int32]:
         """int32 (T, 296): the BAPs that reach the wanted rotations and places."""
         count = len(self.motion)
         numbers = {joint: self.skeleton.number(joint) for joint in self.wanted}
         result = np.zeros((count, BAP_COUNT), dtype=np.int32)
         root = self._root_places()
-        root[:, 1] += self._lift(root, ground)
+        if floor != "none":
+            self._stand(root, floor, plant)
         if origin != "source":
             place = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
             root[:, [0, 2]] -= (place - self.skeleton.centres[0])[[0, 2]]
@@ -233,41 +238,28 @@ class Retarget:
         ankle, subtalar, toe = f"{side}_ankle", f"{side}_subtalar", f"{side}_metatarsal"
         if ankle not in self.wanted or subtalar not in self.skeleton:
             return
-        foot = self.wanted[ankle]
+        foot = self.feet.setdefault(side, self.wanted[ankle])
         if self.aims.get(ankle) != toe:
-            self._split(ankle, subtalar)
+            self._split(ankle, subtalar, foot)
             return
         places = {j: self.skeleton.centres[self.skeleton.number(j)] for j in (ankle, subtalar, toe)}
         heel, sole = places[subtalar] - places[ankle], places[toe] - places[subtalar]
-        axes, *_ = self._turns(subtalar)
-        above, direction = self._before(ankle), self._direction(ankle)
-        ankle_axes, *_ = self._turns(ankle)
-        start = self._closest(ankle, np.swapaxes(above, 1, 2) @ foot)
-        angles = start
-        roll = np.zeros((len(foot), 1))
-        for _ in range(4):
-            bent = heel + aiming.product(axes, roll) @ sole
-            bent /= np.linalg.norm(bent, axis=1, keepdims=True)
-            angles = aiming.aim(ankle_axes, start, bent, _in(above, direction), np.full(2, LOOSE))
-            self.wanted[ankle] = above @ aiming.product(ankle_axes, angles)
-            roll = self._closest(subtalar, np.swapaxes(self.wanted[ankle], 1, 2) @ foot)
-            roll = np.clip(roll, -1.0, 1.0)
-        bent = heel + aiming.product(axes, roll) @ sole
-        bent /= np.linalg.norm(bent, axis=1, keepdims=True)
-        angles = aiming.aim(ankle_axes, start, bent, _in(above, direction), np.full(2, LOOSE))
-        self.wanted[ankle] = above @ aiming.product(ankle_axes, angles)
-        self.wanted[subtalar] = self.wanted[ankle] @ aiming.product(axes, roll)
+        direction = foot @ self._bone(ankle, toe)
+        for _ in range(FOOT_STEPS):  # what lies between the two joints turns with the ankle only
+            self._split(ankle, subtalar, foot)
+            foot = rotations.between_all(self.wanted[ankle] @ heel + foot @ sole, direction) @ foot
+        self._split(ankle, subtalar, foot)
 
-    def _split(self, ankle: str, subtalar: str) -> None:
+    def _split(self, ankle: str, subtalar: str, foot: Float) -> None:
         """Both joints together take the foot's rotation: flexion, twisting and roll make any of them."""
-        foot, above = self.wanted[ankle], self._before(ankle)
+        above = self._before(ankle)
         own = self._turns(ankle)[0]
         axes = np.concatenate([own, self._turns(subtalar)[0]])
         self.wanted[subtalar] = foot
         handed = np.linalg.det(axes) if len(axes) == 3 else 0.0
         if abs(handed) < 0.5:
             return
-        last = np.einsum("ki,tji,tjl,l->tk", axes, above, foot, axes[2])  # the last axis, as turned by two
+        last = _in(above, foot @ axes[2]) @ axes.T  # the last axis, as the foot turns it
         outer = np.arctan2(-handed * last[:, 1], last[:, 2])
         inner = np.arctan2(handed * last[:, 0], np.hypot(last[:, 1], last[:, 2]))
         self.wanted[ankle] = above @ aiming.product(own, np.stack([outer, inner], axis=1))
@@ -285,15 +277,60 @@ class Retarget:
             return 0.01
         return unit
 
-    def _lift(self, root: Float, ground: str) -> Float | float:
-        """Metres by which to raise the body, so that its feet stand as the source's do."""
-        source = feet.source_heights(self.motion, self.mapped, self.upright, self.turned, self.places)
-        body = feet.body_heights(self.skeleton, self.wanted, root, "l_metatarsal" in self.mapped)
-        if source is None or body is None or ground == "none":
-            return 0.0
-        source = source * self.scale
-        level = feet.ground(source)
-        return feet.lift(source, body, level, 0.0 if ground == "floor" else level, float(self.motion.rate))
+    def _stand(self, root: Float, floor: str, plant: bool) -> None:
+        """Raises root (T, 3) until feet stand as the source's do; plant: legs move for what is lacking."""
+        toes = "l_metatarsal" in self.mapped
+        rate = float(self.motion.rate)
+        source = feet.source_soles(
+            self.motion, self.mapped, self.upright, self.turned, self.places, self.scale
+        )
+        body = feet.body_soles(self.skeleton, self.wanted, root, toes)
+        if source is None or body is None:
+            return
+        middles = source.points.mean(axis=1)
+        level = ground.found(source.lowest, middles).under(middles)
+        above = source.lowest - level
+        under = np.zeros_like(level) if floor == "floor" else level
+        stiff = np.ones_like(above)
+        if plant and all(self.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):
+            pliant = np.array([legs.pliancy(self._leg(side, root)) for side in "lr"])
+            stiff = 1.1 - pliant
+            raised = feet.lift(above, body.lowest - under, stiff, rate)
+            whole, along = feet.slips(source.points, body.points, level, rate)
+            root[:, [0, 2]] += whole
+            ups = feet.heights(above, body.lowest - under + raised, rate)
+            for side, pitch in zip("lr", feet.pitches(body.points, ups), strict=True):
+                self.feet[side] = pitch @ self.feet[side]
+                self._foot(side)
+            for _ in range(ROUNDS):
+                body = feet.body_soles(self.skeleton, self.wanted, root, toes) or body
+                ups = feet.heights(above, body.lowest - under + raised, rate)
+                for side, up, course in zip("lr", ups, along, strict=True):
+                    self._move(side, root, np.stack([course[:, 0], up, course[:, 1]], axis=1))
+                along = np.zeros_like(along)
+            body = feet.body_soles(self.skeleton, self.wanted, root, toes) or body
+        root[:, 1] += feet.lift(above, body.lowest - under, stiff, rate)
+
+    def _move(self, side: str, root: Float, move: Float) -> None:
+        """A leg takes its foot elsewhere, by move (T, 3), metres."""
+        thigh, shank = legs.reach(self._leg(side, root), move)
+        self.wanted[f"{side}_hip"] = thigh @ self.wanted[f"{side}_hip"]
+        self.wanted[f"{side}_knee"] = shank @ self.wanted[f"{side}_knee"]
+        self._foot(side)
+
+    def _leg(self, side: str, root: Float) -> legs.Leg:
+        """Where the joints of a leg are."""
+        knee = f"{side}_knee"
+        found = {
+            name: (place, frame)
+            for name, place, frame in feet.followed(self.skeleton, self.wanted, root, f"{side}_ankle")
+        }
+        axes, *_ = self._turns(knee)
+        bone = self._bone(knee, f"{side}_ankle")
+        outermost = abs(axes[0] @ bone) < abs(axes[-1] @ bone)
+        axis = found[f"{side}_hip"][1] @ axes[0] if outermost else found[knee][1] @ axes[-1]
+        hip, middle, ankle = (found[f"{side}_{joint}"][0] for joint in ("hip", "knee", "ankle"))
+        return legs.Leg(hip, middle, ankle, axis)
 
     def _root_places(self) -> Float:
         """(T, 3): where the root must be for the middle of the hips to be where the source's is."""

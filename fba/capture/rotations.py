@@ -7,6 +7,9 @@ import numpy.typing as npt
 
 Float = npt.NDArray[np.float64]
 
+LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(0, 2, 1)
+"""(3, 3, 3): summed with an axis over the first index, the matrix that takes v to axis x v."""
+
 
 def multiply(a: Float, b: Float) -> Float:
     """Quaternion product, a after b: (..., 4)."""
@@ -44,15 +47,12 @@ def matrices(quaternions: Float) -> Float:
 
 def turn(axis: Float, angle: Float) -> Float:
     """Matrices (..., 3, 3) of turns about unit axes (3,) or (..., 3) by angles (...)."""
-    axis = np.broadcast_to(axis, (*np.shape(angle), 3))
-    x, y, z = np.moveaxis(axis, -1, 0)
-    zero = np.zeros_like(x)
-    cross = np.stack(
-        [np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], axis=-2
-    )
+    axis = np.asarray(axis, dtype=np.float64)
+    cross = np.tensordot(axis, LEVI_CIVITA, axes=1)
     s = np.sin(angle)[..., None, None]
     c = np.cos(angle)[..., None, None]
-    result: Float = np.eye(3) + s * cross + (1 - c) * (cross @ cross)
+    square = axis[..., :, None] * axis[..., None, :]
+    result: Float = c * (np.eye(3) - square) + s * cross + square
     return result
 
 

@@ -39,6 +39,7 @@ def from_skeleton(
     scale: float | None = None,
     origin: str = "source",
     ground: str = "floor",
+    plant: bool = True,
     spine: str | int = "spread",
     solver: BapSolver | None = None,
 ) -> Animation:
@@ -47,15 +48,18 @@ def from_skeleton(
     rate: frames a second; the motion's own where None, else resampled (slerp). joints: source joint name ->
     joint of the standard, in place of the built-in families of names. scale: metres of the body for one unit
     of the source's root translation; by default the ratio of leg lengths, so the source's unit does not
-    matter and feet do not slide. origin: what stands at the default place: "source", the source's own origin;
-    "start", the first frame; "middle", the middle of the path, which keeps long walks within what a stream
-    can carry. ground: the height of the feet is corrected for the body's own proportions such that they stand
-    where the source's stand: "floor", on the ground, height 0, whatever the height of the source's ground;
-    "source", at the source's own height; "none", uncorrected. spine: "spread" shares the spine's rotations
-    out over the vertebrae of groups Spine1 and Spine2 and those that the source's joints are, "full" over
-    all; both keep the source's bones exactly. "simple" turns the four of group Spine1 only, a number the
-    groups Spine1 up to that: these keep the head, and the rest as closely as they can. "joints" turns one
-    vertebra for each joint of the source. solver: skeleton and axes; the default body where None.
+    matter and feet do not slide. origin: what stands at the default place: "source", the source's own
+    origin; "start", the first frame; "middle", the middle of the path, which keeps long walks within what a
+    stream can carry. ground: the height of the feet is corrected for the body's own proportions such that
+    they stand where the source's stand: "floor", on the ground, height 0, whatever the height of the
+    source's ground; "source", at the source's own height; "none", uncorrected. plant: what feet then still
+    lack in height, and what they slip on the ground against the source's, legs make up for by bending and
+    swinging a little, and the body by moving along; has no say where ground is "none". spine: "spread"
+    shares the spine's rotations out over the vertebrae of groups Spine1 and Spine2 and those that the
+    source's joints are, "full" over all; both keep the source's bones exactly. "simple" turns the four of
+    group Spine1 only, a number the groups Spine1 up to that: these keep the head, and the rest as closely as
+    they can. "joints" turns one vertebra for each joint of the source. solver: skeleton and axes; the
+    default body where None.
 
     Bones point where the source's bones point; the spine's parts turn the vertebrae that carry them;
     where the source turns about an axis that a joint lacks, the joint before or after it turns instead.
@@ -101,7 +105,7 @@ def from_skeleton(
         return _track(motion, direct.values(motion, solver, scale, origin), set(motion.names))
     retarget = Retarget(motion, mapped, solver, scale, groups, spine in ("spread", "joints"))
     turned = {*retarget.wanted, solver.skeleton.names[0]}
-    return _track(motion, retarget.values(origin, ground), turned)
+    return _track(motion, retarget.values(origin, ground, plant), turned)
 
 
 def _track(motion: SkeletonMotion, values: npt.NDArray[np.int32], turned: set[str]) -> Animation:

@@ -284,9 +284,10 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     errors = bone_errors(captured, animation.body.values, bones)
     assert len(errors) >= 14
     for bone, angles in errors.items():
-        assert angles.mean() < 1.0, bone
+        # thighs and shanks of the other proportions of cmu_walk turn a little more, for the feet to stand
+        assert angles.mean() < (1.0 if name != "vreng/cmu_walk.bvh" else 1.7), bone
         assert angles.max() < 5.0, bone
-    assert np.concatenate(list(errors.values())).mean() < 0.15
+    assert np.concatenate(list(errors.values())).mean() < 0.35
     report = retarget_report(captured, animation)  # says the same as the independent measurement
     for bone in report.bones:
         if (bone.joint, bone.aim) in errors:
@@ -298,9 +299,8 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     assert low.min() > -0.045
     assert report.feet is not None
     assert report.feet.mean < 0.005
-    assert report.feet.worst < 0.025
-    assert report.feet.within > 0.8
-    assert report.feet.within > 0.95 or name == "vreng/cmu_walk.bvh"  # the ground of that capture slopes
+    assert report.feet.worst < 0.011
+    assert report.feet.within > 0.998
 
 
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")

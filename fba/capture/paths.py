@@ -1,0 +1,29 @@
+"""Courses over time whose frames are coupled with their neighbours: the compiled solution."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled
+
+Float = npt.NDArray[np.float64]
+
+
+@compiled
+def chain(own: Float, bonds: Float, pull: Float, course: Float) -> None:
+    """Fills course (T,): least sum of own[t] x[t]^2 + bonds[t] (x[t + 1] - x[t])^2 - 2 pull[t] x[t].
+
+    own: (T,), positive; bonds: (T - 1,), not negative; pull: (T,). own and pull are overwritten. Thomas's
+    algorithm.
+    """
+    count = own.shape[0]
+    for t in range(count - 1):
+        own[t] += bonds[t]
+        own[t + 1] += bonds[t]
+    for t in range(1, count):
+        share = bonds[t - 1] / own[t - 1]
+        own[t] -= share * bonds[t - 1]
+        pull[t] += share * pull[t - 1]
+    for t in range(count - 1, -1, -1):
+        course[t] = (pull[t] + (bonds[t] * course[t + 1] if t < count - 1 else 0.0)) / own[t]
