@@ -26,6 +26,11 @@ NEAR, FAR = 0.010, 0.030
 """Metres from the body's neck: up to the first a vertex moves as the neck there, beyond the second with the
 skull alone."""
 NEIGHBOURS = 4
+SAME, ALMOST, ROUNDS = 1e-5, 0.01, 20
+"""Metres: vertices so near are the same; those of one mesh may at first be so far apart. How often a face is
+moved by what its vertices are off."""
+RIM = 0.3
+"""The share of a neck's width that its lower rim has at least."""
 SEAM = 0.002
 """A face whose vertices come this close (m) to those of the body's neck brings its own neck."""
 
@@ -55,9 +60,12 @@ class HeadOnBody:
         self.place = placement(body, eyes)
         """float64 (4, 4): the face's frame into the body's, as modelled."""
         self._size = float(self.place[0, 0])
+        neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
+        if neck:
+            anchors = np.concatenate([part.vertices for part in neck])
+            self.place[:3, 3] += _offset(anchors, places * self._size + self.place[:3, 3])
         self._shift = self.place[:3, 3].astype(np.float32)
         placed = places.astype(np.float64) * self._size + self.place[:3, 3]
-        neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
         joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
         weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
         joints[:, 0], weights[:, 0] = self._skull, 1.0
@@ -68,7 +76,6 @@ class HeadOnBody:
         if neck:
             from scipy.spatial import cKDTree
 
-            anchors = np.concatenate([part.vertices for part in neck])
             dense = _dense(neck, len(body.skeleton))
             edge, outward = _lower_edge(anchors, neck)
             if len(edge) and len(placed):
@@ -162,6 +169,28 @@ def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
     return place
 
 
+def _offset(anchors: Float32, placed: Float64) -> Float64:
+    """(3,) how far a face is off a body whose neck it has, vertex by vertex; 0 where it has another.
+
+    Where pupils are found differs a little from one reader to another.
+    """
+    from scipy.spatial import cKDTree
+
+    none = np.zeros(3)
+    if not len(placed):
+        return none
+    tree, moved = cKDTree(placed), anchors.astype(np.float64)
+    for _ in range(ROUNDS):
+        away, rows = tree.query(moved)
+        near = away < ALMOST
+        if not near.any() or float((away < SAME).mean()) > 0.5:
+            break
+        moved = moved + np.median(placed[rows[near]] - moved[near], axis=0)
+    offset: Float64 = anchors[0].astype(np.float64) - moved[0]
+    found = float((tree.query(moved)[0] < SAME).mean()) > 0.5
+    return offset if found and float(np.linalg.norm(offset)) > SAME else none
+
+
 def _dense(neck: list[BodyPart], joints: int) -> Float64:
     """(A, J) weights of the necks' vertices."""
     rows = sum(len(part.vertices) for part in neck)
@@ -190,14 +219,13 @@ def _nearest(
 
 
 def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]:
-    """Vertices of the open edges in the lower half of necks, and the ways out over them (N, 3)."""
+    """Vertices of the open rims in the lower half of necks, and the ways out over them (N, 3)."""
     starts = np.cumsum([0, *(len(part.vertices) for part in neck)])
     triangles = np.concatenate([part.triangles + start for part, start in zip(neck, starts, strict=False)])
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     _, inverse, counts = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    edge = np.unique(sides[counts[inverse.ravel()] == 1])
-    middle = (anchors[:, 1].min() + anchors[:, 1].max()) / 2
-    edge = edge[anchors[edge, 1] < middle]
+    open_sides = sides[counts[inverse.ravel()] == 1]
+    edge = _low_rims(anchors, open_sides)
     within = np.zeros((len(anchors), 3))
     count = np.zeros((len(anchors), 1))
     inner = np.ones(len(anchors), dtype=bool)
@@ -208,6 +236,24 @@ def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]
         np.add.at(count, a[use], 1)
     outward = np.where(count[edge] > 0, anchors[edge] - within[edge] / np.maximum(count[edge], 1), 0.0)
     return edge, outward
+
+
+def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
+    """Vertices of the rims that a neck ends in below: not its chin, nor holes within."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links = (np.ones(len(open_sides)), (open_sides[:, 0], open_sides[:, 1]))
+    _, label = connected_components(coo_array(links, shape=(len(anchors),) * 2), directed=False)
+    middle = (anchors[:, 1].min() + anchors[:, 1].max()) / 2
+    wide = RIM * np.ptp(anchors[:, 0])
+    rims = np.unique(open_sides)
+    found = [np.zeros(0, dtype=np.int64)]
+    for number in np.unique(label[rims]):
+        rim = rims[label[rims] == number]
+        if anchors[rim, 1].mean() < middle and np.ptp(anchors[rim, 0]) > wide:
+            found.append(rim)
+    return np.concatenate(found)
 
 
 def _beyond(

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from fba.body import BapSolver
+from fba.body.heads import HeadOnBody
 from fba.body.importers import import_makehuman
 from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
-from fba.parameters import joints
+from fba.parameters import baps, joints
 
 FILES = ("base.obj", "default.mhskel", "default_weights.mhw")
 
@@ -64,10 +66,44 @@ def test_a_hand_goes_where_its_wrist_goes(body: BodyModel) -> None:
     values[37] = 1.2e5  # l_elbow_flexion
     solver = BapSolver(body.skeleton)
     wrist = body.skeleton.number("l_wrist")
-    for baps in (np.zeros(296), values):
-        pose = solver.pose(baps)
+    for angles in (np.zeros(296), values):
+        pose = solver.pose(angles)
         middle = body.skin(pose)[hand].mean(axis=0)
         assert np.linalg.norm(middle - pose[wrist, :3, 3]) < 0.08
+
+
+def test_its_own_head_continues_its_skin(folder: Path, body: BodyModel) -> None:
+    """A head made of the same mesh ends where the body begins, and stays there in any pose."""
+    from fba.face.importers.makehuman import import_makehuman as import_head
+    from fba.face.model import point_row
+
+    model = import_head(folder)
+    head = HeadOnBody(body, model.vertices, model.points[[point_row("3.5"), point_row("3.6")]])
+    assert head.brings_neck
+    skin = model.part("skin")
+    skin_rows = np.arange(len(skin.vertices))
+    assert head.hidden[skin_rows].sum() < 10
+    trunk = body.part("skin")
+    rim = np.unique(open_edges(trunk.triangles))
+    rim = rim[trunk.vertices[rim, 1] > 1.3]
+    assert len(rim) == 42  # the ring that MakeHuman's heads are cut along
+    turned = {"skullbase_tilt": 30.0, "vc4_torsion": 40.0}
+    number = {bap.name: bap.number for bap in baps()}
+    values = np.zeros(296)
+    for name, angle in turned.items():
+        values[number[name] - 1] = np.radians(angle) * 1e5
+    for matrices in (body.bind, BapSolver(body.skeleton).pose(values)):
+        face = head.skin(model.vertices, matrices)[skin_rows]
+        below = body.skin(matrices)[body.starts["skin"] + rim]
+        assert cKDTree(face).query(below)[0].max() < 2e-3
+
+
+def open_edges(triangles: np.ndarray) -> np.ndarray:
+    sides = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
+    edges, counts = np.unique(sides, axis=0, return_counts=True)
+    return edges[counts == 1]
 
 
 @pytest.mark.parametrize("missing", FILES)

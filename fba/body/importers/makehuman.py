@@ -3,6 +3,7 @@
 Users point it at a copy of their own (the files are CC0): the base mesh "hm08" (`base.obj`), its rig
 (`default.mhskel`) and the weights (`default_weights.mhw`) in one folder. `makehuman.csv` says which places
 and bones of the rig each joint of the standard takes; the vertebrae are spread along its spine.
+`makehuman_neck.csv` is the ring of vertices where its heads end.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ BLADE = (0.3, 0.75)
 """Shares of the way from the breastbone to the arm over which the shoulder blade takes over."""
 WHOLE = 0.999
 """What the skull carries by more is head."""
-SKIN = Material("skin", (0.55, 0.33, 0.24), 0.6)
+SKIN = Material("skin", (0.71, 0.47, 0.36), 0.55)
 EYE = Material("eye", (0.75, 0.72, 0.70), 0.2)
 MAX_WEIGHTS = 1 << 20
 
@@ -68,7 +69,7 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
     """
     folder = Path(path) if Path(path).is_dir() else Path(path).parent
     mesh = read_obj_mesh(folder / "base.obj" if Path(path).is_dir() else path)
-    if len(mesh.vertices) != VERTICES or "body" not in mesh.groups:
+    if len(mesh.vertices) != VERTICES or "body" not in mesh.groups or not len(mesh.of("body")):
         raise ModelError(
             f"{folder}: this is not MakeHuman's base mesh hm08: {len(mesh.vertices)} vertices instead of "
             f"{VERTICES}"
@@ -214,15 +215,35 @@ def _eye_radius(mesh: ObjMesh, vertices: Float64) -> float:
     return float(np.ptp(eye[:, 2])) / 2 if len(eye) else 0.0
 
 
+@cache
+def _neckline() -> tuple[int, ...]:
+    with (files(__package__) / "makehuman_neck.csv").open(encoding="utf-8") as file:
+        return tuple(int(row["vertex"]) for row in csv.DictReader(file))
+
+
+def _above(triangles: Int64, vertices: Float64) -> npt.NDArray[np.bool_]:
+    """(F,) triangles above the neckline, where heads made of this mesh end too, so that both meet."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    sides = sides[~np.isin(sides, _neckline()).any(axis=1)]
+    links = (np.ones(len(sides)), (sides[:, 0], sides[:, 1]))
+    _, label = connected_components(coo_array(links, shape=(len(vertices),) * 2), directed=False)
+    used = np.unique(triangles)
+    crown = used[vertices[used, 1].argmax()]
+    above: npt.NDArray[np.bool_] = (label[triangles] == label[crown]).any(axis=1)
+    return above
+
+
 def _parts(mesh: ObjMesh, vertices: Float64, weights: Float64) -> tuple[BodyPart, ...]:
     """Body, neck and head, and the eyes of that."""
     default = Skeleton.default()
-    neck = [default.number(name) for name in (*chain("vt1", "vc1"), "skullbase")]
     skull = weights[:, default.number("skullbase")]
-    upper = weights[:, neck].sum(axis=1)
     body = mesh.of("body")
-    head = (skull[body] > WHOLE).all(axis=1)
-    throat = ~head & (upper[body] > 0.02).all(axis=1)
+    above = _above(body, vertices)
+    head = above & (skull[body] > WHOLE).all(axis=1)
+    throat = above & ~head
     spine = [name[0] == "v" or name == "sacroiliac" for name in default.names]
     joints, strong = strongest(weights, spine)
     normals = vertex_normals(vertices, body)
