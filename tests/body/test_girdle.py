@@ -113,12 +113,11 @@ def test_no_jump_where_there_is_no_one_way() -> None:
 
 
 def test_the_built_in_person_has_no_notch_with_raised_arms() -> None:
-    """The outline from neck to arm rises all the way; it was folded some centimetres deep."""
+    """The outline from neck to arm hardly falls; where nothing went with the arm it fell by 27 mm."""
     body = BodyModel.default()
     number = {bap.name: bap.number for bap in baps()}
     values = np.zeros(296)
     values[number["l_shoulder_abduct"] - 1] = np.radians(150) * 1e5
-    values[number["l_sternoclavicular_abduct"] - 1] = np.radians(15) * 1e5
     moved = body.skin(BapSolver(body.skeleton).pose(values))
     shirt = body.part("shirt")
     at = moved[body.starts["shirt"] :][: len(shirt.vertices)]
@@ -127,4 +126,4 @@ def test_the_built_in_person_has_no_notch_with_raised_arms() -> None:
         near = (np.abs(at[:, 0] - x) < 0.012) & (np.abs(at[:, 2] + 0.06) < 0.05)
         tops.append(at[near, 1].max())
     fall = np.maximum.accumulate(tops) - tops
-    assert fall.max() < 0.045
+    assert fall.max() < 0.015
