@@ -13,8 +13,11 @@ from fba.cli import options
 from fba.errors import FbaWarning, FormatError
 
 if TYPE_CHECKING:
-    from player.scene import Scene
+    from fba.animation import Animation
+    from player.showable import Showable
 
+MOST = 8
+"""Files in one picture."""
 SHEETS = ("faps", "visemes", "expressions", "all")
 
 
@@ -40,11 +43,12 @@ class SheetType(click.ParamType[str | int]):
         "fba render walk.fba -o part.gif --start 2 --end 5 --camera front",
         "fba render walk.fba -o frames/%05d.png --transparent",
         "fba render walk.fba -o sheet.png --contact-sheet 12",
+        "fba render original.fap decoded.fba -o both.mp4",
         "fba render --fap open_jaw=800 --viseme 4 --expression joy=50 -o face.png",
         "fba render --contact-sheet expressions -o expressions.png",
     )
 )
-@click.argument("file", type=options.EXISTING, required=False)
+@click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")
 @click.option(
     "-o",
     "--output",
@@ -83,6 +87,17 @@ class SheetType(click.ParamType[str | int]):
     "expressions. --size is that of one picture.",
 )
 @options.model_option
+@click.option(
+    "--body",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE.glb",
+    help="The body. Default: the built-in person.",
+)
+@click.option(
+    "--arrange",
+    type=click.Choice(["side", "over"]),
+    help="Several files: side by side (default), or the others as drawings over the first.",
+)
 @click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
 @options.fps_option("Frame rate of the film; default: the input's own, or a part of it.")
 @click.option("--frame", type=int, help="For a picture: which frame; -1 is the last.")
@@ -105,13 +120,15 @@ class SheetType(click.ParamType[str | int]):
 @options.bap_steps_option
 @options.salvage_option
 def command(
-    file: Path | None,
+    files: tuple[Path, ...],
     output: str,
     faps: tuple[str, ...],
     visemes: tuple[str, ...],
     expressions: tuple[str, ...],
     sheet: str | int | None,
     model: Path | None,
+    body: Path | None,
+    arrange: str | None,
     size: tuple[int, int] | None,
     fps: Fraction | None,
     frame: int | None,
@@ -129,7 +146,7 @@ def command(
     bap_steps: str,
     salvage: bool,
 ) -> None:
-    """Render a file, or a face in a given pose, to a picture, numbered pictures, or a film (MP4 or GIF).
+    """Render files, or a face in a given pose, to a picture, numbered pictures, or a film (MP4 or GIF).
 
     Needs OpenGL through EGL, but no display.
     """
@@ -137,17 +154,23 @@ def command(
 
     given = [name for name, value in (("--fap", faps), ("--viseme", visemes), ("--expression", expressions),
                                       ("--contact-sheet", isinstance(sheet, str))) if value]  # fmt: skip
-    if file is not None and given:
+    if files and given:
         what = f"{given[0]} {sheet}" if given == ["--contact-sheet"] else given[0]
-        raise click.UsageError(f"{what} makes a picture without a file; leave out {file}")
-    if file is None and isinstance(sheet, int):
+        raise click.UsageError(f"{what} makes a picture without a file; leave out {files[0]}")
+    if not files and isinstance(sheet, int):
         raise click.UsageError(f"--contact-sheet {sheet} shows frames of a file: give one")
-    if file is None and not given:
+    if not files and not given:
         raise click.UsageError("give a file, or a face by --fap, --viseme, --expression or --contact-sheet")
     moments = {"--frame": frame, "--time": time, "--start": start, "--end": end, "--fps": fps}
     for name, value in (*moments.items(), ("--audio", audio)):
-        if file is None and value is not None:
+        if not files and value is not None:
             raise click.UsageError(f"{name} goes with a file; {given[0]} makes a single picture")
+    if len(files) > MOST or (arrange is not None and len(files) < 2):
+        raise click.UsageError(
+            f"{len(files)} files are too many for one picture; at most {MOST}"
+            if len(files) > MOST
+            else "--arrange goes with several files"
+        )
     film = is_film(output)
     if audio is not None and (no_audio or not output.lower().endswith(".mp4")):
         raise click.UsageError(
@@ -162,25 +185,24 @@ def command(
         raise click.UsageError(
             f"--contact-sheet {sheet} makes one picture, .png or .jpg, of frames between --start and --end"
         )
-    import player
+    if not files and film:
+        raise click.UsageError("a face in one pose is a picture: write it to a .png")
     from fba.cli.still import still
+    from player.recording import render
 
-    if file is None:
-        animation = still(faps, visemes, expressions)
-        if film:
-            raise click.UsageError("a face in one pose is a picture: write it to a .png")
-    else:
-        animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage)
-    scene = player.Scene(animation, options.read_model(model), axes=axes, view=view)
-    for switch, state in shows:
-        scene.show(switch, state)
+    animations = [
+        options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage) for file in files
+    ] or [still(faps, visemes, expressions)]
+    scene = _scene(animations, files, arrange or "side", model=model, body=body, axes=axes, view=view)
+    for switch, on in shows:
+        scene.show(switch, on)
     if sheet is not None:
         _frames_sheet(scene, sheet, Path(output), tile=size, camera=camera, start=start, end=end)
         return
-    if audio is None and file is not None and not no_audio and output.lower().endswith(".mp4"):
-        audio = _voice(file)
+    if audio is None and not no_audio and output.lower().endswith(".mp4"):
+        audio = _voice(files)
     with options.progress("rendering", None) as step, options.usage_errors():
-        written = player.render(
+        written = render(
             scene,
             output,
             size=size,
@@ -206,11 +228,36 @@ def _size(size: tuple[int, int] | None, output: str) -> str:
     return f"{width}x{height}"
 
 
-def _voice(file: Path) -> Path | None:
-    """The sound beside a file, where it can be read."""
+def _scene(
+    animations: list[Animation],
+    files: tuple[Path, ...],
+    arrange: str,
+    *,
+    model: Path | None,
+    body: Path | None,
+    **how: Any,
+) -> Any:
+    """One scene, or several in one."""
+    from player.scene import Scene
+
+    face, figure = options.read_model(model), None
+    if body is not None:
+        from fba.body.model import BodyModel
+
+        figure = BodyModel.load(body)
+    scenes = [Scene(animation, face, body=figure, **how) for animation in animations]
+    if len(scenes) == 1:
+        return scenes[0]
+    from player.compare import CompareScene
+
+    return CompareScene(scenes, arrangement=arrange, names=[file.name for file in files])
+
+
+def _voice(files: tuple[Path, ...]) -> Path | None:
+    """The sound beside the first of the files that has one, where it can be read."""
     from player.sound import beside, check
 
-    found = beside(file)
+    found = next((voice for voice in map(beside, files) if voice is not None), None)
     if found is not None:
         try:
             check(found)
@@ -230,7 +277,7 @@ def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, i
     click.echo(f"{output}: {pixels.shape[1]}x{pixels.shape[0]}")
 
 
-def _frames_sheet(scene: Scene, count: int, output: Path, **how: Any) -> None:
+def _frames_sheet(scene: Showable, count: int, output: Path, **how: Any) -> None:
     from player.film_sheet import film_sheet
     from player.picture_files import write_picture
 

@@ -282,9 +282,31 @@ def test_a_sheet_of_frames(run: Run, clip: Path, tmp_path: Path) -> None:
     assert columns * rows == 6
 
 
+@pytest.mark.usefixtures("opengl")
+def test_several_files_stand_in_one_picture(run: Run, clip: Path, tmp_path: Path) -> None:
+    found = {}
+    for name, arguments in (
+        ("one", (clip,)),
+        ("side", (clip, clip)),
+        ("over", (clip, clip, "--arrange", "over")),
+    ):
+        output = tmp_path / f"{name}.png"
+        size = ("--size", "160x80", "--camera", "front", "--transparent")
+        assert run("render", *arguments, "-o", output, *size) == (0, f"{output}: 160x80\n", "")
+        with Image.open(output) as picture:
+            found[name] = np.asarray(picture)
+    heads = {
+        name: int((np.diff((shown[30, :, 3] > 127).astype(int)) > 0).sum()) for name, shown in found.items()
+    }
+    assert heads == {"one": 1, "side": 2, "over": 1}
+    assert (found["one"] != found["over"]).any()
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (("-o", "a.png", "--arrange", "over"), "--arrange goes with several files"),
+        (("-o", "a.png", *["clip.fba"] * 8), "9 files are too many"),
         (("-o", "a.mp4", "--audio", "clip.fba", "--no-audio"), "contradict"),
         (("-o", "a.gif", "--audio", "clip.fba"), "--audio goes into an .mp4"),
         (("-o", "a.png", "--contact-sheet", "0"), "neither a number of frames nor one of 'faps'"),
