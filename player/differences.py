@@ -86,14 +86,8 @@ def differences(timeline: CompareTimeline, second: int = 1) -> Differences:
     times = times[(times >= low - 1e-9) & (times <= high + 1e-9)]
     if len(times) > MOST_FRAMES:
         times = times[np.linspace(0, len(times) - 1, MOST_FRAMES).astype(int)]
+    faces, bodies = one.many(times - float(timeline.later[0]))
+    other_faces, other_bodies = other.many(times - float(timeline.later[second]))
     face = one.animation.face is not None and other.animation.face is not None
     body = one.animation.body is not None and other.animation.body is not None
-    shown_faps = np.zeros((len(times), 68), dtype=np.float32)
-    shown_baps = np.zeros((len(times), 296))
-    for row, time in enumerate(times.tolist()):
-        here, there = timeline.own_time(0, time), timeline.own_time(second, time)
-        if face:
-            shown_faps[row] = other.faps(there) - one.faps(here)
-        if body:
-            shown_baps[row] = other.baps(there) - one.baps(here)
-    return Differences(times, shown_faps, shown_baps)
+    return Differences(times, (other_faces - faces) * face, (other_bodies - bodies) * body)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.face.resolve import Resolver, hold
-from fba.parameters import BAP_COUNT
+from fba.parameters import BAP_COUNT, FAP_COUNT
 
 Float64 = npt.NDArray[np.float64]
 
@@ -128,13 +129,49 @@ class Timeline:
         first = self._body(before).astype(np.float64)
         if share == 0.0 or not self.interpolate:
             return first
-        way = self._body(after) - first
-        if max(way.max(), -way.min()) > TURN / 2:
-            shifts = way[SHIFTS].copy()
-            way -= TURN * np.rint(way / TURN)
-            way[SHIFTS] = shifts
-        shown: Float64 = first + way * share
+        shown: Float64 = first + _shorter(self._body(after) - first) * share
         return shown
+
+    def many(self, times: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], Float64]:
+        """`faps` (T, 68) and `baps` (T, 296) at many times (T,), seconds, much faster than one by one."""
+        at = np.asarray(times, dtype=np.float64) * self.rate.numerator / self.rate.denominator
+        if not self.frames or not np.isfinite(at).all():
+            raise ValueError("the times must be finite, and the animation must have frames")
+        index = self.animation.index
+        at = np.where(np.abs(at - np.rint(at)) < FRAME_ROUNDING, np.rint(at), at)
+        before = np.clip(np.searchsorted(index, at, side="right") - 1, 0, len(index) - 1)
+        after = np.minimum(before + 1, len(index) - 1)
+        gap = np.maximum(index[after] - index[before], 1)
+        share = np.clip((at - index[before]) / gap, 0.0, 1.0) * self.interpolate
+        faces, bodies = np.zeros((len(at), FAP_COUNT), np.float32), np.zeros((len(at), BAP_COUNT))
+        if self.animation.face is not None:
+            first = self._gathered(before, self._face, self._faces_shown)
+            way = self._gathered(after, self._face, self._faces_shown) - first
+            faces = first + way * share.astype(np.float32)[:, None]
+        if self.animation.body is not None:
+            start = self._gathered(before, self._body, self._bodies_shown).astype(np.float64)
+            turn = self._gathered(after, self._body, self._bodies_shown) - start
+            bodies = start + _shorter(turn) * share[:, None]
+        return faces, bodies
+
+    def _gathered(
+        self,
+        frames: npt.NDArray[np.intp],
+        look: Callable[[int], npt.NDArray[Any]],
+        shown: OrderedDict[int, npt.NDArray[Any]],
+    ) -> npt.NDArray[Any]:
+        """Rows of many frames; look: works out one frame, with its block, which is then in shown."""
+        blocks = frames // self.block
+        parts = {}
+        for block in np.unique(blocks).tolist():
+            chosen = blocks == block
+            look(int(frames[chosen].max()))
+            parts[block] = (chosen, shown[block][frames[chosen] - block * self.block])
+        first = next(iter(parts.values()))[1]
+        gathered = np.zeros((len(frames), first.shape[1]), dtype=first.dtype)
+        for chosen, rows in parts.values():
+            gathered[chosen] = rows
+        return gathered
 
     def _face(self, frame: int) -> npt.NDArray[np.float32]:
         block, row = divmod(frame, self.block)
@@ -173,6 +210,15 @@ class Timeline:
 
     def _rows(self, block: int) -> slice:
         return slice(block * self.block, (block + 1) * self.block)
+
+
+def _shorter(way: Float64) -> Float64:
+    """Changes of BAPs (..., 296), with angles going the shorter way round."""
+    if not way.size or max(way.max(), -way.min()) <= TURN / 2:
+        return way
+    shorter: Float64 = way - TURN * np.rint(way / TURN)
+    shorter[..., SHIFTS] = way[..., SHIFTS]
+    return shorter
 
 
 def _keep(shown: OrderedDict[int, npt.NDArray[Any]], block: int, values: npt.NDArray[Any]) -> None:

@@ -93,6 +93,23 @@ def test_between_frames_a_joint_turns_about_one_axis_nearly(turns: tuple[int, in
     assert np.degrees((half.inv() * middle).magnitude()) < 1.5
 
 
+@pytest.mark.parametrize("interpolate", [True, False])
+def test_many_times_at_once_are_the_same_as_one_by_one(interpolate: bool) -> None:
+    count = BLOCK + 30
+    faces = [{3: t % 70, 5: -t} if t % 3 else {} for t in range(count)]
+    bodies = [{5: 50_000 * (t % 13), 181: t} if t % 4 else {} for t in range(count)]
+    index = np.cumsum(np.arange(count) % 3 + 1)
+    timeline = Timeline(Animation(Fraction(30), index, face_track(faces), body_track(bodies)))
+    timeline.interpolate = interpolate
+    times = np.random.default_rng(2).uniform(-1, float(timeline.end) + 1, 60)
+    times[:3] = [float(timeline.time_of(frame)) for frame in (0, 77, count - 1)]
+    shown_faps, shown_baps = timeline.many(times)
+    np.testing.assert_allclose(shown_faps, [timeline.faps(time) for time in times], atol=1e-3)
+    np.testing.assert_allclose(shown_baps, [timeline.baps(time) for time in times], atol=1e-6)
+    with pytest.raises(ValueError, match="finite"):
+        timeline.many([0.0, float("nan")])
+
+
 def test_ntsc_frames_are_found_by_their_own_times() -> None:
     timeline = Timeline(face_animation([{3: t} for t in range(2000)], rate="30000/1001"))
     for frame in (0, 1, 777, 1999):
