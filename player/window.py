@@ -117,9 +117,8 @@ class Window:
     ) -> None:
         if size[0] < 1 or size[1] < 1:
             raise ValueError(f"a window must have at least 1x1 pixels, not {size[0]}x{size[1]}")
-        chosen = scene.camera(camera, size[0] / size[1]) if isinstance(camera, str) else camera
         timeline: Any = scene.timeline
-        self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=chosen, size=size)
+        self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=camera, size=size)
         self.keeper = Keeper(self.session, folder)
         self.pictures = 0
         self._title = title or scene.title or "fba"

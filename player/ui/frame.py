@@ -130,6 +130,8 @@ class Places:
         high = min(self._sizes.get(panel.name, (wide, panel.height or 120.0))[1], room)
         if panel.name in self._moved:
             return 0.0, 0.0
+        if panel.side == "middle":
+            return (display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2
         for column in range(4):
             away = EDGE + column * (wide + GAP)
             y = next_free.get((panel.side, column), TOP)

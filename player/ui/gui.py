@@ -46,6 +46,8 @@ class Gui:
         self.panels = make_panels()
         self._places = Places()
         self._open: set[str] = set()
+        self._cover()
+        session.viewpoint.camera = session.viewpoint.beginning
         self._button = -1
         self.shown = 1.0
         """How much of the bar is there, 0 to 1."""
@@ -69,6 +71,7 @@ class Gui:
         io.display_size = imgui.ImVec2(*display)
         io.display_framebuffer_scale = imgui.ImVec2(scale, scale)
         io.delta_time = min(max(delta, 1e-4), 0.25)
+        self._cover()
         imgui.new_frame()
         if imgui.get_frame_count() > 2:  # before, imgui does not know what is where
             self._mouse(io)
@@ -89,6 +92,12 @@ class Gui:
         implot.destroy_context(self._plots)
         imgui.destroy_context(self._context)
         self._context = None
+
+    def _cover(self) -> None:
+        """Tell the camera how much of the picture the bar takes."""
+        session = self.session
+        wide, high = (pixels / session.scale for pixels in session.size)
+        session.viewpoint.covered = 0.0 if session.bare else self.bar.height((wide, high)) / max(high, 1.0)
 
     def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:
         session = self.session

@@ -9,64 +9,62 @@ from player.ui.keys import keys, mouse
 from player.ui.panel import Panel, heading
 from player.ui.session import Session
 
+WIDE = 320.0
+"""Points that a column needs."""
+
 
 class HelpPanel(Panel):
-    """All keys, from the table of keys, those of switches, and the mouse; in two columns where they fit."""
+    """All keys, from the table of keys, those of switches, and the mouse; in columns where they fit."""
 
     name, title, label = "help", "Keys and mouse", "Help"
-    side = "left"
-    width, height = 800.0, 560.0
+    side = "middle"
+    width, height = 1040.0, 520.0
 
     def draw(self, session: Session) -> None:
         """Draw it."""
-        wide = imgui.get_content_region_avail().x
-        if wide > 640 and imgui.begin_table("columns", 2):
+        groups = _groups(session)
+        columns = min(int(imgui.get_content_region_avail().x // WIDE), 3)
+        imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
+        if columns > 1 and imgui.begin_table("columns", columns):
             imgui.table_next_row()
-            imgui.table_next_column()
-            _groups({"Play", "Keep"})
-            imgui.table_next_column()
-            _groups({"View", "Window"})
-            _rest(session)
+            for chosen in _columns(columns):
+                imgui.table_next_column()
+                for name in chosen:
+                    _group(name, groups.get(name, []))
             imgui.end_table()
-        else:
-            _groups({row.group for row in keys()})
-            _rest(session)
+        elif columns <= 1:
+            for name, rows in groups.items():
+                _group(name, rows)
+        imgui.pop_style_var()
 
 
-def _groups(chosen: set[str]) -> None:
-    group = ""
+def _columns(count: int) -> list[list[str]]:
+    """The names of the groups in so many columns, 2 or 3."""
+    if count == 2:
+        return [["Play", "Keep", "Window"], ["View", "Switches", "Mouse"]]
+    return [["Play"], ["View", "Switches", "Keep"], ["Window", "Mouse"]]
+
+
+def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
+    """(keys, what they do) by the name of their group."""
+    found: dict[str, list[tuple[str, str]]] = {}
     for row in keys():
-        if row.group not in chosen:
-            continue
-        if row.group != group:
-            if group:
-                imgui.end_table()
-            group = row.group
-            heading(group)
-            _table(group)
-        _line(row.shown, row.does)
-    imgui.end_table()
+        found.setdefault(row.group, []).append((row.shown, row.does))
+    found["Switches"] = session.switch_keys()
+    found["Mouse"] = list(mouse())
+    return found
 
 
-def _rest(session: Session) -> None:
-    switches = session.switch_keys()
-    if switches:
-        heading("Switches")
-        _table("switches")
-        for key, text in switches:
-            _line(key, text)
-        imgui.end_table()
-    heading("Mouse")
-    _table("mouse")
-    for what, does in mouse():
-        _line(what, does)
-    imgui.end_table()
-
-
-def _table(name: str) -> None:
+def _group(name: str, rows: list[tuple[str, str]]) -> None:
+    if not rows:
+        return
+    heading(name)
     imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit)
-    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, 138.0)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, 112.0)
     imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
+    for key, does in rows:
+        _line(key, does)
+    imgui.end_table()
 
 
 def _line(key: str, does: str) -> None:

@@ -16,8 +16,8 @@ class Panel:
     """A window over the picture. A subclass sets the names and draws; it may keep what it needs.
 
     name: in the table of keys ("panel NAME" is its action) and in `Session.open`. title: for people. label:
-    on its button above the picture. side: "right" or "left", where it opens. width, height: points; height
-    0 for as much as it needs. One object of each panel lives as long as the window.
+    on its button above the picture. side: "right", "left" or "middle", where it opens. width, height: points;
+    height 0 for as much as it needs. One object of each panel lives as long as the window.
     """
 
     name: ClassVar[str]

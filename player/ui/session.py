@@ -78,7 +78,7 @@ class Session:
         transport: Transport | None = None,
         *,
         source: Source | None = None,
-        camera: Camera | None = None,
+        camera: Camera | str | None = None,
         size: tuple[int, int] = (1280, 720),
         scale: float = 1.0,
         clock: Callable[[], float] = wall.monotonic,

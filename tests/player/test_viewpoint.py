@@ -1,0 +1,100 @@
+"""How the camera of a window moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fba.animation import Animation
+from player.camera import PRESETS, Camera
+from player.scene import Scene
+from player.viewpoint import GLIDE, Viewpoint
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 5.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Walking:
+    """A scene in which somebody walks two metres a second along x."""
+
+    def camera(self, preset: str | None = None, aspect: float = 1.0) -> Camera:
+        return Camera(distance=3.0)
+
+    def travel(self, time: float) -> tuple[float, float, float]:
+        return (2.0 * time, 0.0, 0.0)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def test_it_glides_to_a_preset_and_arrives(talking: Animation, clock: Clock) -> None:
+    scene = Scene(talking)
+    viewpoint = Viewpoint(scene, 1.5, "front", clock=clock)
+    viewpoint.preset("profile")
+    assert viewpoint.gliding
+    assert viewpoint.camera.yaw == pytest.approx(0)
+    clock.now += GLIDE / 2
+    assert viewpoint.camera.yaw == pytest.approx(45)  # eased, it is half way at half time
+    clock.now += GLIDE / 2
+    assert not viewpoint.gliding
+    assert viewpoint.camera == scene.camera("profile", 1.5)
+
+
+def test_a_new_glide_begins_where_it_is(clock: Clock) -> None:
+    viewpoint = Viewpoint(Walking(), 1.0, Camera(yaw=0), clock=clock)  # type: ignore[arg-type]
+    viewpoint.glide(Camera(yaw=80))
+    clock.now += GLIDE / 2
+    viewpoint.glide(Camera(yaw=0))
+    assert viewpoint.camera.yaw == pytest.approx(40)
+
+
+def test_by_hand_it_moves_at_once(clock: Clock) -> None:
+    viewpoint = Viewpoint(Walking(), 1.0, Camera(), clock=clock)  # type: ignore[arg-type]
+    viewpoint.glide(Camera(yaw=80))
+    viewpoint.camera = Camera(yaw=-20)
+    assert viewpoint.camera.yaw == -20
+    assert not viewpoint.gliding
+    viewpoint.reset()
+    clock.now += GLIDE
+    assert viewpoint.camera == Camera()
+
+
+def test_between_cameras_it_takes_the_shorter_way() -> None:
+    half = Camera(yaw=170, distance=1.0).between(Camera(yaw=-170, distance=4.0), 0.5)
+    assert abs(half.yaw) == pytest.approx(180)
+    assert half.distance == pytest.approx(2.0)  # as much nearer in the first half as in the second
+
+
+def test_it_follows_and_stays_without_a_jump(clock: Clock) -> None:
+    viewpoint = Viewpoint(Walking(), 1.0, Camera(), clock=clock)  # type: ignore[arg-type]
+    assert viewpoint.at(3.0).target == (6.0, 0.0, 0.0)
+    viewpoint.toggle_follow(3.0)
+    assert viewpoint.at(3.0).target == (6.0, 0.0, 0.0)
+    assert viewpoint.at(4.0).target == (6.0, 0.0, 0.0)
+    viewpoint.toggle_follow(4.0)
+    assert viewpoint.at(4.0).target == (6.0, 0.0, 0.0)
+    assert viewpoint.at(5.0).target == (8.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("preset", [*PRESETS, None])
+def test_views_fit_above_what_is_covered(talking: Animation, clock: Clock, preset: str | None) -> None:
+    scene = Scene(talking)
+    viewpoint = Viewpoint(scene, 1.6, clock=clock)
+    viewpoint.covered = 0.25
+    camera, subject = viewpoint.fitted(preset), scene.subject
+    matrix = camera.projection_matrix(1.6) @ camera.view_matrix()
+    ends = []
+    for side in (-1, 1):
+        x, y, z = subject.centre
+        clip = matrix @ np.array([x, y + side * subject.half_height, z, 1])
+        ends.append(clip[1] / clip[3])
+    assert ends[0] > -0.52  # the lowest quarter of -1..1 ends at -0.5
+    assert ends[1] < 1.02
+    assert ends[1] - ends[0] > 1.4
