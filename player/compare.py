@@ -36,7 +36,7 @@ FIELD_OF_VIEW = 14.0
 """Degrees: from further away than one figure alone, so that all are seen from the same side."""
 SHOULDERS = 0.25
 """Half the width (m) of a body of which only the upper part is in view."""
-ABOVE = 1.0
+ABOVE = 0.96
 """Height of a caption above the middle of a head, in half heads."""
 
 
@@ -264,7 +264,7 @@ class CompareScene:
         low = min(a - width for a, width in zip(along, widths, strict=True))
         high = max(a + width for a, width in zip(along, widths, strict=True))
         bottom = min(float(p[1]) - s.half_height for p, s in zip(places, subjects, strict=True))
-        room = 1.08 if any(self.names) and self._arrangement == "side" else 1.0  # for captions
+        room = 1.05 if any(self.names) and self._arrangement == "side" else 1.0  # for captions
         top = max(float(p[1]) + s.half_height * room for p, s in zip(places, subjects, strict=True))
         middle = np.mean(places, axis=0)
         middle = middle + right * ((low + high) / 2 - float(middle @ right))

@@ -1,0 +1,74 @@
+"""The panel of differences, drawn into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from player_tracks import face_track
+
+from fba.animation import Animation
+from player.compare import CompareScene
+from player.scene import Scene
+from player.transport import Transport
+from player.ui.session import Session
+
+pytest.importorskip("imgui_bundle")
+
+from player.ui.differences_panel import DifferencesPanel, thinned
+from player.ui.picture import Studio
+
+SIZE = (900, 640)
+
+
+def talk(values: list[int]) -> Animation:
+    return Animation(Fraction(10), np.arange(len(values)), face=face_track([{3: v, 18: 5} for v in values]))
+
+
+@pytest.fixture
+def studio(opengl: None) -> Iterator[Studio]:
+    scene = CompareScene(
+        [Scene(talk([0, 10, 20, 30])), Scene(talk([0, 10, 90, 30]))], names=["a.fba", "b.fba"]
+    )
+    session = Session(scene, Transport(scene.timeline, clock=lambda: 0.0), size=SIZE)  # type: ignore[arg-type]
+    with Studio(session) as made:
+        yield made
+
+
+def click(studio: Studio, place: tuple[float, float]) -> None:
+    io = studio.gui.io
+    io.add_mouse_pos_event(*place)
+    studio.draw(2)
+    for down in (True, False):
+        studio.gui.io.add_mouse_button_event(0, down)
+        studio.draw(2)
+
+
+def test_a_row_takes_to_where_the_difference_is_largest(studio: Studio) -> None:
+    studio.session.open.add("differences")
+    picture = studio.draw(6)
+    panel = picture[60:600, 520:886, :3].astype(int)
+    accent = (abs(panel - (92, 173, 230)).sum(axis=2) < 60).sum()
+    assert accent > 100  # the curve and the heading
+    click(studio, (600.0, 186.0))
+    assert studio.session.transport.time == pytest.approx(0.2)
+
+
+def test_it_is_there_only_where_something_is_compared(opengl: None) -> None:
+    panel, alone = DifferencesPanel(), Scene(talk([0, 1]))
+    assert not panel.available(Session(alone, Transport(alone.timeline)))
+    pair = CompareScene([alone, alone])
+    assert panel.available(Session(pair, Transport(pair.timeline)))  # type: ignore[arg-type]
+
+
+def test_a_long_curve_keeps_its_peaks() -> None:
+    values = np.zeros(100_000)
+    values[[7, 50_123, 99_999]] = (5.0, -8.0, 3.0)
+    times, shown = thinned(np.arange(100_000) / 25, values, 500)
+    assert (len(times), shown.max(), shown.min()) == (500, 5.0, -8.0)
+    assert times[int(shown.argmin())] == 50_123 / 25
+    assert (np.diff(times) > 0).all()
+    short = np.arange(3.0)
+    assert thinned(short, short, 3)[0] is short
