@@ -8,13 +8,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from fba.compiled import compiled
 from player.coarse import TOLERANCES
 from player.shapes import FaceMesh, FaceShape
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 
-PIXELS = 0.9
+PIXELS = 1.3
 """How far the coarser mesh may be off, in pixels."""
 SAMPLED = 24
 """Vertices from which the distance to the camera is taken."""
@@ -83,12 +84,25 @@ def _left(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> _Level:
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """From an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
-    if not len(mesh.positions):
-        return 0.0
-    some = mesh.positions[:: max(len(mesh.positions) // SAMPLED, 1)]
-    away = some @ mesh.matrix[:3, :3].T + (mesh.matrix[:3, 3] - eye)
-    nearest = float(np.sqrt(np.einsum("ij,ij->i", away, away).min()))
-    return nearest / (float(np.linalg.norm(mesh.matrix[:3, 0])) or 1.0)
+    step = max(len(mesh.positions) // SAMPLED, 1)
+    return float(_nearest(mesh.positions, mesh.matrix, eye, step))
+
+
+@compiled
+def _nearest(positions: Float32, matrix: Float64, eye: Float64, step: int) -> float:
+    least = np.inf
+    for i in range(0, len(positions), step):
+        squared = 0.0
+        for k in range(3):
+            away = matrix[k, 3] - eye[k]
+            for j in range(3):
+                away += matrix[k, j] * positions[i, j]
+            squared += away * away
+        least = min(least, squared)
+    scale = 0.0
+    for k in range(3):
+        scale += matrix[k, 0] * matrix[k, 0]
+    return np.sqrt(least / scale) if least < np.inf and scale > 0.0 else 0.0
 
 
 def same(one: npt.NDArray[np.float32], other: npt.NDArray[np.float32]) -> bool:

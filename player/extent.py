@@ -18,10 +18,9 @@ MARGIN = 0.03
 """Added on every side, as a share of what is filled."""
 NEAR = 1e-3
 ROW = 64
-PIXELS_A_CORNER = 25
-"""So many pixels are looked at in the time that one corner of a band takes, in software OpenGL."""
 STILL = 0.3
 """What goes with the head by less than this is looked at apart: shoulders are wide, and low."""
+
 
 Rectangle = tuple[int, int, int, int]
 
@@ -31,7 +30,7 @@ class Steps:
     """Where a picture has to be smoothed.
 
     rectangles: left, bottom, width and height in pixels. bands: float32 (N, 2), corners of triangles, -1..1
-    across the picture.
+    across the picture; no two lie over each other.
     """
 
     rectangles: list[Rectangle]
@@ -45,15 +44,11 @@ def steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner
     """
     if not is_compiled():
         return Steps(filled(view, matrix, size), np.zeros((0, 2), dtype=np.float32))
-    whole, bands = [], [np.zeros((0, 2), dtype=np.float32)]
+    outliner.begin(size)
     for face in view.faces:
-        along = outliner.outlines([face], matrix, size)
-        held = filled(View(faces=[face]), matrix, size)
-        if sum(_area(rectangle) for rectangle in held) < len(along) * PIXELS_A_CORNER:
-            whole.append(face)  # teeth and lashes: all outline
-        else:
-            bands.append(along)
-    return Steps(filled(replace(view, faces=whole), matrix, size), np.concatenate(bands))
+        outliner.add(face, matrix)
+    rest = filled(replace(view, faces=[]), matrix, size)
+    return Steps(rest, outliner.tiles())
 
 
 def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:

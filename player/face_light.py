@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.compiled import is_compiled
+from fba.compiled import compiled, inlined, is_compiled
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from player.kept import kept
-from player.visibility import BAKING, HARMONICS, Visibility, bake
+from player.visibility import BAKING, HARMONICS, Visibility, bake, weights
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -28,6 +28,8 @@ FREE = (0.9, 0.8, 0.0, 0.3)
 """The light that reaches a tongue put out."""
 ON_TEETH = 0.3
 """How much more light falls on teeth than finds its way between the lips."""
+STEP = 2
+"""Digits to which the head's rotation is taken: its light changes by less than is seen."""
 MOVES = 0.05
 """What sways less than this is lit without care."""
 
@@ -72,33 +74,23 @@ class FaceLight:
         """
         if self._baked is None:
             self._baked = self._bake()
-        share = self._mouth_open(positions, self._baked.gaps)
+        share = round(self._mouth_open(positions, self._baked.gaps), 2)
         out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
-        turned = (matrix @ turn).T
-        key = (
-            *np.round([*turned.ravel(), *matrix.ravel()], 3),
-            round(share, 2),
-            *(float(o.sum()) for o in out),
-        )
+        # In steps that nobody sees, the same whatever was shown before.
+        turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
+        key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
         if self._lit is None or self._lit[0] != key:
-            light = self._blended(turned, share)
-            if not np.allclose(turn, np.eye(3), atol=1e-3):
-                still = self._blended(matrix.T, share)
-                light = still + (light - still) * self._sway[:, None]
+            light = np.empty((len(self._sway), 4), dtype=np.float32)
+            basis = np.concatenate([_basis(turned), _basis(still)]).astype(np.float32)
+            bent = not np.array_equal(turned, still)
+            shut, wide = self._baked.shut, self._baked.wide
+            _reaching(*shut.arrays, *wide.arrays, np.float32(share), basis, self._sway, bent, light)
             for rows in self._teeth:  # as a photographer would have it
                 light[rows, :2] += (1 - light[rows, :2]) * np.float32(ON_TEETH * share)
             for rows, outside in zip(self._tongues, out, strict=True):
                 light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
             self._lit = (key, light)
         return self._lit[1]
-
-    def _blended(self, into: Float64, share: float) -> Float32:
-        """(V, 4) for lights turned by `into` (3, 3), the mouth open by a share."""
-        assert self._baked is not None
-        light = _reaching(self._baked.shut, into)
-        if share > 0:
-            light += (_reaching(self._baked.wide, into) - light) * np.float32(share)
-        return light
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -164,10 +156,53 @@ def _kept_visibility(positions: Float32, normals: Float32, triangles: Int32, wit
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 
-def _reaching(visibility: Visibility, into: Float64) -> Float32:
-    key = visibility.towards(_unit(into @ KEY_DIRECTION))[0]
-    rim, through = visibility.towards(_unit(into @ RIM_DIRECTION))
-    return np.stack([key, visibility.open, through, rim], axis=1)
+def _basis(into: Float64) -> Float64:
+    """(2, 16) what weighs the harmonics for key and rim light, turned by `into` (3, 3)."""
+    return weights(np.stack([_unit(into @ KEY_DIRECTION), _unit(into @ RIM_DIRECTION)]))
+
+
+@inlined
+def _product(table: Float32, row: int, basis: Float32, light: int) -> np.float32:
+    found = np.float32(0.0)
+    for k in range(HARMONICS):
+        found += table[row, k] * basis[light, k]
+    return min(max(found, np.float32(0.0)), np.float32(1.0))
+
+
+@compiled
+def _reaching(
+    light: Float32,
+    through: Float32,
+    open_: Float32,
+    wide_light: Float32,
+    wide_through: Float32,
+    wide_open: Float32,
+    share: float,
+    basis: Float32,
+    sway: Float32,
+    bent: bool,
+    out: Float32,
+) -> None:
+    """out (V, 4): key light, sky, through, rim light. basis (4, 16): for key and rim light of what goes with
+    the head, then of what stands; bent: whether they differ. share: of the mouth wide open."""
+    for i in range(len(out)):
+        part = sway[i] if bent else np.float32(1.0)
+        for turned in range(2):
+            weight = part if turned == 0 else np.float32(1.0) - part
+            if turned == 0:
+                out[i, 0] = out[i, 2] = out[i, 3] = 0.0
+                out[i, 1] = open_[i] + (wide_open[i] - open_[i]) * share
+            if weight == 0.0:
+                continue
+            key, rim = _product(light, i, basis, 2 * turned), _product(light, i, basis, 2 * turned + 1)
+            thin = _product(through, i, basis, 2 * turned + 1)
+            if share > 0.0:
+                key += (_product(wide_light, i, basis, 2 * turned) - key) * share
+                rim += (_product(wide_light, i, basis, 2 * turned + 1) - rim) * share
+                thin += (_product(wide_through, i, basis, 2 * turned + 1) - thin) * share
+            out[i, 0] += weight * key
+            out[i, 2] += weight * thin
+            out[i, 3] += weight * rim
 
 
 def _unit(vector: Float64) -> Float64:

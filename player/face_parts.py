@@ -35,9 +35,9 @@ ROUGH = 0.36
 """Strength of the skin's relief."""
 NECK = 2.3
 """Length over which a neck bends, in distances from eyes to nose (ENS)."""
-MOST_BENT, BENT = 0.1, 0.8
-"""Where more than this share of a part's edges bend by more than the angle of this cosine, light is worked
-out pixel by pixel."""
+MOST_BENT, BENT, LONG = 0.1, 0.8, 0.005
+"""Where more than this share of a part's edges bend by more than the angle of this cosine, and are longer
+than this (m), light is worked out pixel by pixel."""
 NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
 """How a coarser part keeps these: what a normal that is off by its own length, a texture off by a metre, and
 a colour off by all its light count in metres."""
@@ -167,9 +167,10 @@ def _is_smooth(part: Part) -> bool:
     """Whether most edges bend so little that light may be worked out at their ends."""
     if part.normals is None or not len(part.triangles):
         return True
-    corners = part.normals[part.triangles]
-    cosines = np.einsum("tkn,tkn->tk", corners, np.roll(corners, 1, axis=1))
-    return bool(np.quantile(cosines, MOST_BENT) > BENT)
+    upright, places = part.normals[part.triangles], part.vertices[part.triangles]
+    cosines = np.einsum("tkn,tkn->tk", upright, np.roll(upright, 1, axis=1))
+    lengths = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2)
+    return bool(((cosines < BENT) & (lengths > LONG)).mean() < MOST_BENT)
 
 
 def _picture(part: Part) -> npt.NDArray[np.uint8] | None:

@@ -26,11 +26,10 @@ class FaceRenderer:
 
     def __init__(self, context: Any) -> None:
         self._gl = context
-        self._programs: dict[bool, Any] = {}
+        self._programs: dict[tuple[str, ...], Any] = {}
         self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
         self._reliefs: dict[int, Any] = {}
         self._pixels: npt.NDArray[np.uint8] | None = None
-        self._white = context.texture((1, 1), 4, bytes([255] * 4))
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
@@ -63,16 +62,34 @@ class FaceRenderer:
         for _, parts in self._kept.values():
             _release(parts)
         self._kept.clear()
-        for part in (self._white, *self._reliefs.values(), *self._programs.values()):
+        for part in (*self._reliefs.values(), *self._programs.values()):
             part.release()
         self._reliefs.clear()
         self._programs.clear()
 
-    def _program(self, smooth: bool) -> Any:
-        if smooth not in self._programs:
-            self._programs[smooth] = load_program(self._gl, "face", *(["SMOOTH"] if smooth else []))
-            self._place(self._programs[smooth])
-        return self._programs[smooth]
+    def _program(self, words: tuple[str, ...]) -> Any:
+        if words not in self._programs:
+            self._programs[words] = load_program(self._gl, "face", *words)
+            self._place(self._programs[words])
+        return self._programs[words]
+
+    def _array(self, parts: dict[str, Any], words: tuple[str, ...]) -> Any:
+        """The part's vertices as the program takes them."""
+        if words not in parts["arrays"]:
+            attributes: list[tuple[Any, ...]] = [
+                (parts["positions"], "3f", "in_position"),
+                (parts["normals"], "3f", "in_normal"),
+                (parts["light"], "4f", "in_light"),
+            ]
+            if "TEXTURED" in words:
+                attributes.append((parts["still"], "4f 2f 1f", "in_colour", "in_texture", "in_sway"))
+            else:
+                attributes.append((parts["still"], "4f 8x 1f", "in_colour", "in_sway"))
+            if parts["across"] is not None:
+                attributes.append((parts["across"], "4f 4f", "in_across", "in_along"))
+            program, triangles = self._program(words), parts["triangles"]
+            parts["arrays"][words] = self._gl.vertex_array(program, attributes, index_buffer=triangles)
+        return parts["arrays"][words]
 
     def _place(self, program: Any) -> None:
         eye, matrix, pixel = self._camera
@@ -82,7 +99,7 @@ class FaceRenderer:
         set_uniform(program, "pixel", pixel)
 
     def _draw(self, mesh: FaceMesh) -> None:
-        parts, shape, program = self._parts(mesh), mesh.shape, self._program(mesh.shape.smooth)
+        parts, shape = self._parts(mesh), mesh.shape
         for name, array in (("positions", mesh.positions), ("normals", mesh.normals), ("light", mesh.light)):
             if name == "light":
                 if parts["lit"] is not None and same(parts["lit"], array):
@@ -93,22 +110,34 @@ class FaceRenderer:
         wide = self._camera[2] * distance(mesh, self._camera[0])
         picture = parts["pictures"].suited(wide)
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
+        words = tuple(
+            word
+            for word, there in (
+                ("SMOOTH", shape.smooth),
+                ("HAIRS", shape.across is not None),
+                ("TEXTURED", picture is not None),
+                ("FINE", repeats is not None),
+            )
+            if there
+        )
+        program, array = self._program(words), self._array(parts, words)
         for name, value in (
             ("world", matrix_bytes(mesh.matrix)),
             ("turn", tuple(float(v) for v in mesh.turn)),
             ("centre", tuple(float(v) for v in mesh.centre)),
-            ("textured", 0.0 if picture is None else 1.0),
             ("scatter", shape.scatter),
-            ("fine", shape.fine if repeats is not None else (0.0, 1.0)),
+            ("fine", shape.fine),
             ("two_sided", 1.0 if shape.two_sided else 0.0),
             ("relief", 1),
         ):
             set_uniform(program, name, value)
-        (picture or self._white).use(0)
-        (repeats or self._white).use(1)
+        if picture is not None:
+            picture.use(0)
+        if repeats is not None:
+            repeats.use(1)
         if shape.closed:
             self._gl.enable(self._gl.CULL_FACE)
-        parts["array"].render()
+        array.render()
         if shape.closed:
             self._gl.disable(self._gl.CULL_FACE)
 
@@ -134,18 +163,10 @@ class FaceRenderer:
             "still": gl.buffer(np.ascontiguousarray(still, dtype="f4").tobytes()),
             "triangles": gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()),
         }
-        attributes = [
-            (parts["positions"], "3f", "in_position"),
-            (parts["normals"], "3f", "in_normal"),
-            (parts["light"], "4f", "in_light"),
-            (parts["still"], "4f 2f 1f", "in_colour", "in_texture", "in_sway"),
-        ]
         parts["across"] = None
         if shape.across is not None:
             parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
-            attributes.append((parts["across"], "4f 4f", "in_across", "in_along"))
-        program = self._program(shape.smooth)
-        parts["array"] = gl.vertex_array(program, attributes, index_buffer=parts["triangles"])
+        parts["arrays"] = {}
         parts["pictures"] = Pictures(gl, shape, mesh.positions)
         parts["see_through"] = shape.see_through
         parts["lit"] = None
@@ -170,7 +191,9 @@ class FaceRenderer:
 
 
 def _release(parts: dict[str, Any]) -> None:
-    for name in ("array", "positions", "normals", "light", "still", "triangles", "across"):
+    for array in parts["arrays"].values():
+        array.release()
+    for name in ("positions", "normals", "light", "still", "triangles", "across"):
         if parts[name] is not None:
             parts[name].release()
     parts["pictures"].close()

@@ -5,18 +5,22 @@ Software OpenGL spends as long on looking for steps in a whole picture as on dra
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
-from fba.compiled import compiled, inlined
+from fba.compiled import compiled
 from player.shapes import FaceMesh
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
 
-HALF_WIDTH = 2.0
-"""Pixels on each side of an outline."""
+TILE = 8
+"""Pixels: the picture is smoothed in tiles of this size that an outline runs through."""
+BESIDE = 1.5
+"""Pixels on each side of an outline where there may be steps."""
 
 
 class Edges:
@@ -37,36 +41,55 @@ class Edges:
         uses = np.diff(np.append(start, len(ordered)))
         self.sides[uses == 2, 1] = owner[start[uses == 2] + 1]
         self.triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+        # Room to work in.
+        self.seen = np.empty((0, 3), dtype=np.float32)
+        self.facing = np.empty(len(triangles), dtype=np.int8)
+        self.sway: tuple[Float32, Float32] | None = None
 
 
 class Outliner:
-    """Finds outlines; remembers the edges of the shapes that it has seen."""
+    """Finds outlines; remembers the edges of the shapes that it has seen.
+
+    `begin` a picture, `add` meshes, and take its `tiles`.
+    """
 
     MOST_SHAPES = 64
 
     def __init__(self) -> None:
         self._edges: dict[int, tuple[object, Edges]] = {}
+        self._size = (1, 1)
+        self._marked = np.zeros((1, 1), dtype=np.uint8)
 
-    def outlines(self, meshes: list[FaceMesh], matrix: Float64, size: tuple[int, int]) -> Float32:
-        """(N, 2) corners of triangles along all outlines, -1..1 across the picture.
+    def begin(self, size: tuple[int, int]) -> None:
+        """A picture of this width and height in pixels, in which there is nothing yet."""
+        shape = (-(-size[1] // TILE), -(-size[0] // TILE))
+        if self._marked.shape != shape:
+            self._marked = np.zeros(shape, dtype=np.uint8)
+        self._marked[:] = 0
+        self._size = size
 
-        matrix: (4, 4), world to clip space. size: of the picture in pixels.
-        """
-        found = []
-        for mesh in meshes:
-            edges = self._edges_of(mesh)
-            angle = float(np.linalg.norm(mesh.turn))
-            axis = np.asarray(mesh.turn, dtype=np.float64) / max(angle, 1e-12)
-            seen = np.empty((len(mesh.positions), 3), dtype=np.float32)
-            clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
-            sway = np.ascontiguousarray(mesh.shape.sway, dtype=np.float32)
-            places = np.ascontiguousarray(mesh.positions, dtype=np.float32)
-            _project(places, sway, axis, angle, np.asarray(mesh.centre, dtype=np.float64), clip, size, seen)
-            facing = np.empty(len(edges.triangles), dtype=np.int8)
-            bands = np.empty((len(edges.ends) * 6, 2), dtype=np.float32)
-            count = _outline(seen, edges.triangles, edges.ends, edges.sides, size, HALF_WIDTH, facing, bands)
-            found.append(bands[:count])
-        return np.concatenate(found) if found else np.zeros((0, 2), dtype=np.float32)
+    def add(self, mesh: FaceMesh, matrix: Float64) -> None:
+        """The outlines of a mesh. matrix: (4, 4), world to clip space."""
+        if not len(mesh.positions):
+            return
+        edges = self._edges_of(mesh)
+        angle = math.sqrt(float(mesh.turn @ mesh.turn))
+        axis = np.asarray(mesh.turn, dtype=np.float64) / max(angle, 1e-12)
+        clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
+        if edges.sway is None or edges.sway[0] is not mesh.shape.sway:
+            edges.sway = (mesh.shape.sway, np.ascontiguousarray(mesh.shape.sway, dtype=np.float32))
+        if len(edges.seen) != len(mesh.positions):
+            edges.seen = np.empty((len(mesh.positions), 3), dtype=np.float32)
+        places = np.ascontiguousarray(mesh.positions, dtype=np.float32)
+        centre = np.asarray(mesh.centre, dtype=np.float64)
+        _project(places, edges.sway[1], axis, angle, centre, clip, self._size, edges.seen)
+        _outline(edges.seen, edges.triangles, edges.ends, edges.sides, self._size, edges.facing, self._marked)
+
+    def tiles(self) -> Float32:
+        """(N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the picture."""
+        corners = np.empty((6 * _runs(self._marked, self._size, np.empty((0, 2), dtype=np.float32)), 2), "f4")
+        _runs(self._marked, self._size, corners)
+        return corners
 
     def _edges_of(self, mesh: FaceMesh) -> Edges:
         key = id(mesh.shape)
@@ -115,12 +138,6 @@ def _project(
         seen[i, 2] = 1.0
 
 
-@inlined
-def _corner(bands: Float32, at: int, x: float, y: float, size: tuple[int, int]) -> None:
-    bands[at, 0] = 2.0 * x / size[0] - 1.0
-    bands[at, 1] = 2.0 * y / size[1] - 1.0
-
-
 @compiled
 def _outline(
     seen: Float32,
@@ -128,18 +145,15 @@ def _outline(
     ends: Int32,
     sides: Int32,
     size: tuple[int, int],
-    half: float,
     facing: npt.NDArray[np.int8],
-    bands: Float32,
-) -> int:
-    """A band of two triangles along every edge between what faces the camera and what does not, and along
-    borders; how many corners."""
+    marked: npt.NDArray[np.uint8],
+) -> None:
+    """Mark the tiles along every edge between what faces the camera and what does not, and along borders."""
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = seen[a, 0], seen[a, 1]
         area = (seen[b, 0] - ax) * (seen[c, 1] - ay) - (seen[c, 0] - ax) * (seen[b, 1] - ay)
         facing[t] = 2 if abs(area) < 1e-6 else (1 if area > 0.0 else 0)  # 2: edge on, faces neither way
-    count = 0
     wide, high = float(size[0]), float(size[1])
     for e in range(len(ends)):
         a, b = ends[e, 0], ends[e, 1]
@@ -150,26 +164,47 @@ def _outline(
             continue
         ax, ay = float(seen[a, 0]), float(seen[a, 1])
         bx, by = float(seen[b, 0]), float(seen[b, 1])
-        if (
-            max(ax, bx) < -half
-            or max(ay, by) < -half
-            or min(ax, bx) > wide + half
-            or min(ay, by) > high + half
-        ):
+        outside = (
+            max(ax, bx) < -BESIDE
+            or max(ay, by) < -BESIDE
+            or min(ax, bx) > wide + BESIDE
+            or min(ay, by) > high + BESIDE
+        )
+        length = max(abs(bx - ax), abs(by - ay))
+        if outside or not length < 4.0 * (wide + high):
             continue
-        dx, dy = bx - ax, by - ay
-        length = np.sqrt(dx * dx + dy * dy)
-        if not length < 4.0 * (wide + high):
-            continue
-        if length < 1e-6:
-            dx, dy, length = 1.0, 0.0, 1.0
-        dx, dy = dx / length * half, dy / length * half
-        ax, ay, bx, by = ax - dx, ay - dy, bx + dx, by + dy
-        _corner(bands, count, ax - dy, ay + dx, size)
-        _corner(bands, count + 1, ax + dy, ay - dx, size)
-        _corner(bands, count + 2, bx - dy, by + dx, size)
-        _corner(bands, count + 3, bx - dy, by + dx, size)
-        _corner(bands, count + 4, ax + dy, ay - dx, size)
-        _corner(bands, count + 5, bx + dy, by - dx, size)
-        count += 6
+        steps = int(length / BESIDE) + 1
+        for step in range(steps + 1):
+            x, y = ax + (bx - ax) * step / steps, ay + (by - ay) * step / steps
+            left, right = int(max(x - BESIDE, 0.0)) // TILE, int(min(x + BESIDE, wide - 1.0)) // TILE
+            low, top = int(max(y - BESIDE, 0.0)) // TILE, int(min(y + BESIDE, high - 1.0)) // TILE
+            for row in range(low, top + 1):
+                for column in range(left, right + 1):
+                    marked[row, column] = 1
+
+
+@compiled
+def _runs(marked: npt.NDArray[np.uint8], size: tuple[int, int], corners: Float32) -> int:
+    """Write two triangles for each row of marked tiles side by side, where there is room; how many rows."""
+    count = 0
+    for row in range(marked.shape[0]):
+        column = 0
+        while column < marked.shape[1]:
+            if marked[row, column] == 0:
+                column += 1
+                continue
+            first = column
+            while column < marked.shape[1] and marked[row, column] != 0:
+                column += 1
+            if len(corners):
+                left, right = 2.0 * first * TILE / size[0] - 1.0, 2.0 * column * TILE / size[0] - 1.0
+                low, top = 2.0 * row * TILE / size[1] - 1.0, 2.0 * (row + 1) * TILE / size[1] - 1.0
+                at = 6 * count
+                corners[at, 0], corners[at, 1] = left, low
+                corners[at + 1, 0], corners[at + 1, 1] = right, low
+                corners[at + 2, 0], corners[at + 2, 1] = left, top
+                corners[at + 3, 0], corners[at + 3, 1] = left, top
+                corners[at + 4, 0], corners[at + 4, 1] = right, low
+                corners[at + 5, 0], corners[at + 5, 1] = right, top
+            count += 1
     return count

@@ -24,7 +24,15 @@ def load_program(context: Any, name: str, *defined: str) -> Any:
 
 
 def set_uniform(program: Any, name: str, value: Any) -> None:
-    """Set what a program takes under a name; bytes are written as they are, unknown names passed over."""
+    """Set what a program takes under a name; bytes are written as they are, unknown names passed over.
+
+    What was set last is remembered: setting it again costs nothing.
+    """
+    if program.extra is None:
+        program.extra = {}
+    if program.extra.get(name) == value:
+        return
+    program.extra[name] = value
     member = program.get(name, None)
     if member is None:
         return

@@ -49,7 +49,7 @@ class Visibility:
     def towards(self, direction: npt.ArrayLike) -> tuple[Float32, Float32]:
         """What reaches each vertex from a direction (3,), and what comes through: float32 (V,), 0..1."""
         tables = (self.light, self.through)
-        basis = (harmonics(np.asarray(direction, dtype=np.float64)[None])[0] * _bands()).astype(np.float32)
+        basis = weights(np.asarray(direction, dtype=np.float64)[None])[0].astype(np.float32)
         light, through = (np.clip(np.einsum("ij,j->i", table, basis), 0, 1) for table in tables)
         return light, through
 
@@ -87,6 +87,11 @@ def bake(
     free = (above * visible).sum(axis=1) / np.maximum(above.sum(axis=1), 1e-9)
     basis = (harmonics(directions) * (4 * np.pi / len(directions))).astype(np.float32)
     return Visibility(visible @ basis, through @ basis, free.astype(np.float32))
+
+
+def weights(directions: Float64) -> Float64:
+    """(N, 16) what a row of `Visibility` is to be multiplied with, for large lights in directions (N, 3)."""
+    return harmonics(directions) * _bands()
 
 
 def harmonics(directions: Float64) -> Float64:

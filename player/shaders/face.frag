@@ -1,7 +1,6 @@
 #version 330 core
 //include lighting.glsl
 uniform sampler2D picture; // square roots of linear light
-uniform float textured;    // 1: the picture times the colour
 uniform sampler2D relief;  // noise of three channels
 uniform vec2 fine;         // strength of the skin's relief, 0 for none, and how often it repeats
 uniform float scatter;     // how far light goes below the surface: 1 skin, 0 cloth
@@ -25,19 +24,19 @@ void main() {
     }
     float opaque = coordinates.z;
     vec3 albedo = vec3(1.0);
-    if (textured > 0.5) {
-        vec4 texel = texture(picture, coordinates.xy);
-        albedo = texel.rgb * texel.rgb;
-        opaque *= texel.a;
-    }
+#ifdef TEXTURED
+    vec4 texel = texture(picture, coordinates.xy);
+    albedo = texel.rgb * texel.rgb;
+    opaque *= texel.a;
+#endif
 #ifdef SMOOTH
     vec3 n = upright.xyz;
     vec3 base = shade.rgb * albedo;
-    if (fine.x > 0.0) {
-        vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
-        base *= 1.0 + 0.40 * dot(grain, KEY_DIRECTION);
-        n += grain;
-    }
+#ifdef FINE
+    vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
+    base *= 1.0 + 0.40 * dot(grain, KEY_DIRECTION);
+    n += grain;
+#endif
     float cosine = dot(n, halfway.xyz);
     float nh2 = min(cosine * cosine / (dot(n, n) * dot(halfway.xyz, halfway.xyz)), 1.0);
     vec3 shown = base + KEY * (shade.a * lobes(nh2, coordinates.w)) + AROUND * halfway.w;
@@ -46,11 +45,11 @@ void main() {
     vec3 view = normalize(eye - place);
     albedo *= colour.rgb;
     vec3 rough = n;
-    if (fine.x > 0.0) {
-        vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
-        rough = normalize(n + grain);
-        n = normalize(n + grain * 0.45);
-    }
+#ifdef FINE
+    vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
+    rough = normalize(n + grain);
+    n = normalize(n + grain * 0.45);
+#endif
     float cosine = dot(rough, normalize(view + KEY_DIRECTION));
     vec3 shown = albedo * diffuse(n, albedo, light, scatter)
         + KEY * (mirrored_key(view, n, light) * lobes(cosine * cosine, coordinates.w))

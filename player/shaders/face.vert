@@ -1,5 +1,9 @@
 #version 330 core
-// Parts of faces and bodies. The head turns as a whole; the neck bends along, and where it stands it stays.
+// Parts of faces and bodies. Names that the preprocessor may know: SMOOTH, light is worked out here; HAIRS;
+// TEXTURED, the colour is multiplied by a picture; FINE, with the skin's relief. Software OpenGL takes both
+// ways of a condition, so that each of these is a program of its own.
+//
+// The head turns as a whole; the neck bends along, and where it stands it stays.
 //include lighting.glsl
 uniform mat4 world;
 uniform mat4 camera;
@@ -8,15 +12,16 @@ uniform vec3 centre;     // and the point it turns about
 uniform float pixel;     // size of a pixel at a distance of 1
 uniform float scatter;   // how far light goes below the surface: 1 skin, 0 cloth
 uniform float two_sided; // 0: what is seen from inside is a dark hollow
-uniform float textured;  // 1: the colour is multiplied by a picture
 in vec3 in_position;
 in vec3 in_normal;
 in vec4 in_colour;
 in vec2 in_texture;
 in vec4 in_light;       // what reaches the vertex: key light, open sky, through the skin, rim light
 in float in_sway;       // how far it goes with the head
+#ifdef HAIRS
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
+#endif
 out vec4 upright;       // normal, and its cosine with the direction to the eye
 out vec4 coordinates;   // in the picture; how much of its pixels a hair covers; width of the mirrored light
 #ifdef SMOOTH
@@ -38,6 +43,7 @@ void main() {
     vec3 at = in_position;
     vec3 out_ = in_normal;
     float cover = 1.0;
+#ifdef HAIRS
     if (in_across.w < 0.9) {
         // No hair is thinner than a pixel, however it is turned; it is fainter instead.
         vec3 look = eye - (world * vec4(at, 1.0)).xyz;
@@ -48,6 +54,7 @@ void main() {
         at += side * (abs(way) > 0.05 ? sign(way) : in_along.w) * max(least - in_across.w * abs(way), 0.0);
         cover = clamp(in_across.w / least, 0.25, 1.0);
     }
+#endif
     float angle = length(turn);
     if (angle > 1e-6) {
         vec3 axis = turn / angle;
@@ -68,7 +75,11 @@ void main() {
     coordinates = vec4(in_texture, cover, widths(in_colour.a));
     gl_Position = camera * stands;
 #ifdef SMOOTH
-    vec3 albedo = textured > 0.5 ? SKIN * in_colour.rgb : in_colour.rgb;
+#ifdef TEXTURED
+    vec3 albedo = SKIN * in_colour.rgb;
+#else
+    vec3 albedo = in_colour.rgb;
+#endif
     shade.rgb = in_colour.rgb * diffuse(n, albedo, in_light, scatter);
     shade.a = mirrored_key(view, n, in_light);
     halfway.xyz = normalize(view + KEY_DIRECTION);

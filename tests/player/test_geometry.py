@@ -14,7 +14,7 @@ from player.camera import Camera
 from player.extent import filled
 from player.eyeball import find_eyeball
 from player.face_parts import hairs
-from player.outline import Outliner
+from player.outline import TILE, Outliner
 from player.primitives import sphere_mesh
 from player.shapes import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
 
@@ -122,11 +122,21 @@ def test_the_outline_of_a_ball_is_a_circle() -> None:
     mesh = FaceMesh(shape, vertices * 0.1, vertices, light, np.eye(4), np.zeros(3), np.zeros(3))
     camera, size = Camera(distance=2.0), (200, 200)
     matrix = camera.projection_matrix(1.0) @ camera.view_matrix()
-    bands = Outliner().outlines([mesh], matrix, size)
-    assert len(bands) % 6 == 0
+    outliner = Outliner()
+    outliner.begin(size)
+    outliner.add(mesh, matrix)
+    corners = (outliner.tiles().reshape(-1, 6, 2) + 1) * 100
     # A sphere of radius r at a distance d is seen under the angle asin(r / d).
     radius = 100 * np.tan(np.arcsin(0.1 / 2.0)) / np.tan(np.radians(12))
-    away = np.linalg.norm(bands * 100, axis=1)
-    assert abs(np.median(away) - radius) < 1.5
-    assert away.max() < radius + 4
-    assert len(bands) // 6 < 4 * 48
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    np.testing.assert_allclose(high[:, 1] - low[:, 1], TILE, atol=1e-3)
+    for angle in np.linspace(0, 2 * np.pi, 60):  # all of the circle lies in tiles
+        x, y = 100 + radius * np.cos(angle), 100 + radius * np.sin(angle)
+        assert ((low <= (x, y)) & ((x, y) <= high)).all(axis=1).any()
+    away = np.linalg.norm(corners - 100, axis=2)  # and no tile lies aside from it
+    assert (away.max(axis=1) > radius - 3).all()
+    nearest = np.linalg.norm(np.clip(100, low, high) - 100, axis=1)
+    assert (nearest < radius + 3).all()
+    assert ((high - low).prod(axis=1)).sum() < 2 * np.pi * radius * TILE * 2
+    outliner.begin(size)
+    assert len(outliner.tiles()) == 0
