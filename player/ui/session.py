@@ -70,6 +70,7 @@ class Session:
 
     wishes: what the window is to do after this picture; see `wish`. recording: seconds recorded so far,
     None where nothing is being recorded. values: faps and baps of the last picture, after the hooks.
+    rolling: a hook changes the picture by itself, or counts on being called.
     """
 
     def __init__(
@@ -97,6 +98,7 @@ class Session:
         self.before_frame: list[Hook] = []
         self.wishes: deque[str] = deque()
         self.recording: float | None = None
+        self.rolling = False
         self.audio: Audio | None = None
         self.values: tuple[Faps, Baps] = (np.zeros(68, np.float32), np.zeros(296))
         self.clock = clock
@@ -138,7 +140,7 @@ class Session:
     @property
     def restless(self) -> bool:
         """Whether the picture changes without the user's doing."""
-        return self.transport.playing or self.viewpoint.gliding or bool(self._notices)
+        return self.transport.playing or self.viewpoint.gliding or self.rolling or bool(self._notices)
 
     def view(self, time: float) -> View:
         """What is drawn at a time, after `before_frame`."""
