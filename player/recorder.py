@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import math
 import queue
@@ -93,6 +94,7 @@ class Recorder:
             self._free.put(np.zeros((size[1], size[0], 4), dtype=np.uint8))
         self._thread = threading.Thread(target=self._encode, name="fba recorder", daemon=True)
         self._thread.start()
+        atexit.register(self.abort)  # whoever forgets to close leaves no temporary file
 
     @property
     def frames(self) -> int:
@@ -156,6 +158,7 @@ class Recorder:
             self.abort()
             return None
         self._closed = True
+        atexit.unregister(self.abort)
         self._full.put(None)
         try:
             self._thread.join()
@@ -169,6 +172,7 @@ class Recorder:
         """Give up; nothing is left, and an older file of that name stays. Safe at any time."""
         if not self._closed:
             self._closed = True
+            atexit.unregister(self.abort)
             self._end()
 
     def _end(self) -> None:
@@ -196,6 +200,7 @@ class Recorder:
     def _check(self) -> None:
         if self._error is not None:
             self._closed = True
+            atexit.unregister(self.abort)
             self._thread.join()
             raise self._error
 

@@ -158,6 +158,22 @@ def test_places_and_sizes_that_cannot_be(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["folder.mp4"]
 
 
+FORGET = """
+import sys
+import numpy as np
+from player.recorder import Recorder
+recorder = Recorder(sys.argv[1], (16, 16))
+recorder.add(np.zeros((16, 16, 4), dtype=np.uint8))
+"""
+
+
+def test_whoever_forgets_to_close_leaves_nothing(tmp_path: Path) -> None:
+    script = [sys.executable, "-c", FORGET, str(tmp_path / "a.mp4")]
+    done = subprocess.run(script, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stderr == ""
+    assert list(tmp_path.iterdir()) == []
+
+
 FILL = """
 import resource, signal, sys
 import numpy as np
