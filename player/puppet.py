@@ -1,0 +1,156 @@
+"""A figure moved by hand: FAPs, BAPs, visemes and expressions in the place of what is played."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.expressions import Definitions
+from fba.parameters import (
+    BAP_COUNT,
+    EXPRESSION_SELECT_MAX,
+    FAP_COUNT,
+    FIRST_LOW_LEVEL_FAP,
+    INTENSITY_MAX,
+    VISEME_SELECT_MAX,
+)
+
+Faps = npt.NDArray[np.float32]
+Baps = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Viseme:
+    """Two visemes, 0 none to 14, and the share of the first, 0 to 63; ValueError for others."""
+
+    select1: int = 0
+    select2: int = 0
+    blend: int = INTENSITY_MAX
+
+    def __post_init__(self) -> None:
+        _check("viseme", (self.select1, self.select2), VISEME_SELECT_MAX)
+        _check("viseme_blend", (self.blend,), INTENSITY_MAX)
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """Two expressions, 0 none to 6, each with an intensity, 0 to 63; ValueError for others."""
+
+    select1: int = 0
+    intensity1: int = INTENSITY_MAX
+    select2: int = 0
+    intensity2: int = 0
+
+    def __post_init__(self) -> None:
+        _check("expression", (self.select1, self.select2), EXPRESSION_SELECT_MAX)
+        _check("expression_intensity", (self.intensity1, self.intensity2), INTENSITY_MAX)
+
+
+class Puppet:
+    """What the user makes of a performance; a hook for `Session.before_frame`.
+
+    A FAP or BAP that was moved has that value until it is released; all others keep what is played. A
+    viseme takes the place of all FAPs that visemes move; an expression is added to what is played, as the
+    standard's init_face does. FAPs moved by hand win over both.
+
+    definitions: of visemes and expressions, by default the built-in ones. motion: FAPs (68,) and BAPs (296,)
+    that were played last, before this changed them; shown: the same afterwards.
+    """
+
+    def __init__(self, definitions: Definitions | None = None) -> None:
+        self._definitions = definitions or Definitions.default()
+        self._mouth = self._definitions.visemes.any(axis=0)
+        self._fap_values = np.zeros(FAP_COUNT, np.float32)
+        self._bap_values = np.zeros(BAP_COUNT)
+        self.fap_moved = np.zeros(FAP_COUNT, bool)
+        self.bap_moved = np.zeros(BAP_COUNT, bool)
+        self._viseme, self._expression = Viseme(), Expression()
+        self._spoken = np.zeros(FAP_COUNT, np.float32)
+        self._felt = np.zeros(FAP_COUNT, np.float32)
+        self.motion: tuple[Faps, Baps] = (np.zeros(FAP_COUNT, np.float32), np.zeros(BAP_COUNT))
+        self.shown: tuple[Faps, Baps] = (np.zeros(FAP_COUNT, np.float32), np.zeros(BAP_COUNT))
+
+    def __call__(self, faps: Faps, baps: Baps) -> None:
+        """Change FAPs (68,) and BAPs (296,) in place."""
+        self.motion = (faps.copy(), baps.copy())
+        if self.speaks:
+            np.copyto(faps, self._spoken, where=self._mouth)
+        if self.feels:
+            faps += self._felt
+        np.copyto(faps, self._fap_values, where=self.fap_moved)
+        np.copyto(baps, self._bap_values, where=self.bap_moved)
+        self.shown = (faps.copy(), baps.copy())
+
+    @property
+    def idle(self) -> bool:
+        """Whether it leaves everything as it is."""
+        return not (self.speaks or self.feels or self.fap_moved.any() or self.bap_moved.any())
+
+    @property
+    def speaks(self) -> bool:
+        """Whether a viseme is set."""
+        return bool(self._viseme.select1 or self._viseme.select2)
+
+    @property
+    def feels(self) -> bool:
+        """Whether an expression is set."""
+        return bool(self._expression.select1 or self._expression.select2)
+
+    @property
+    def viseme(self) -> Viseme:
+        """What it says; `Viseme()` for nothing."""
+        return self._viseme
+
+    @viseme.setter
+    def viseme(self, viseme: Viseme) -> None:
+        self._viseme = viseme
+        table, share = self._definitions.visemes, np.float32(viseme.blend / INTENSITY_MAX)
+        self._spoken = table[viseme.select1] * share + table[viseme.select2] * (1 - share)
+
+    @property
+    def expression(self) -> Expression:
+        """What it feels; `Expression()` for nothing."""
+        return self._expression
+
+    @expression.setter
+    def expression(self, expression: Expression) -> None:
+        self._expression = expression
+        first, second = expression.intensity1 / INTENSITY_MAX, expression.intensity2 / INTENSITY_MAX
+        if expression.select1 == expression.select2:
+            second = min(second, 1 - first)  # the same twice is never more than all of it
+        table = self._definitions.expressions
+        self._felt = table[expression.select1] * np.float32(first) + table[expression.select2] * np.float32(
+            second
+        )
+
+    def move_fap(self, number: int, value: float) -> None:
+        """Set a FAP, 3 to 68, in its unit; ValueError for another or a value that is not finite."""
+        if not FIRST_LOW_LEVEL_FAP <= number <= FAP_COUNT or not np.isfinite(value):
+            raise ValueError(f"there is no FAP {number} with the value {value}")
+        self._fap_values[number - 1], self.fap_moved[number - 1] = value, True
+
+    def move_bap(self, number: int, value: float) -> None:
+        """Set a BAP, 1 to 296, in 1e-5 rad or mm; ValueError for another or a value that is not finite."""
+        if not 1 <= number <= BAP_COUNT or not np.isfinite(value):
+            raise ValueError(f"there is no BAP {number} with the value {value}")
+        self._bap_values[number - 1], self.bap_moved[number - 1] = value, True
+
+    def release(self, faps: tuple[int, ...] = (), baps: tuple[int, ...] = ()) -> None:
+        """Give FAPs and BAPs, by number, back to what is played."""
+        for moved, numbers in ((self.fap_moved, faps), (self.bap_moved, baps)):
+            for number in numbers:
+                moved[number - 1] = False
+
+    def release_all(self) -> None:
+        """Give everything back, visemes and expressions too."""
+        self.fap_moved[:] = False
+        self.bap_moved[:] = False
+        self.viseme, self.expression = Viseme(), Expression()
+
+
+def _check(what: str, values: tuple[int, ...], most: int) -> None:
+    for value in values:
+        if not 0 <= value <= most:
+            raise ValueError(f"{what} must be a whole number from 0 to {most}, not {value}")

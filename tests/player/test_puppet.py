@@ -1,0 +1,206 @@
+"""Moving a figure by hand, and recording that, without a window."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba.errors import FormatError
+from fba.face import resolve
+from player.puppet import Expression, Puppet, Viseme
+from player.takes import LONGEST, TakeRecorder, Takes, take_rate
+
+
+def played() -> tuple[np.ndarray, np.ndarray]:
+    """FAPs 1000 + number, BAPs 2000 + number."""
+    return np.arange(1001, 1069, dtype=np.float32), np.arange(2001, 2297, dtype=np.float64)
+
+
+def test_untouched_it_changes_nothing() -> None:
+    puppet = Puppet()
+    faps, baps = played()
+    puppet(faps, baps)
+    assert puppet.idle
+    np.testing.assert_array_equal(faps, played()[0])
+    np.testing.assert_array_equal(baps, played()[1])
+
+
+def test_what_is_moved_stays_until_released() -> None:
+    puppet = Puppet()
+    puppet.move_fap(3, 400)
+    puppet.move_bap(32, -5e4)
+    faps, baps = played()
+    puppet(faps, baps)
+    assert (faps[2], faps[3], baps[31], baps[32]) == (400, 1004, -5e4, 2033)
+    assert (puppet.motion[0][2], puppet.motion[1][31]) == (1003, 2032)  # what is played is still known
+    assert puppet.shown[0][2] == 400
+    puppet.release(faps=(3,))
+    faps, baps = played()
+    puppet(faps, baps)
+    assert (faps[2], baps[31]) == (1003, -5e4)
+    puppet.release_all()
+    assert puppet.idle
+
+
+def test_a_viseme_takes_the_mouth_and_leaves_the_brows() -> None:
+    puppet = Puppet()
+    puppet.viseme = Viseme(10, 0, 63)  # A:
+    faps, baps = played()
+    puppet(faps, baps)
+    assert 0 < faps[2] < 1000  # open_jaw as the table has it
+    assert faps[30] == 1031  # raise_l_i_eyebrow
+    half = Puppet()
+    half.viseme = Viseme(10, 0, 21)
+    weaker, baps = played()
+    half(weaker, baps)
+    assert weaker[2] == pytest.approx(faps[2] / 3)
+
+
+def test_an_expression_is_added_and_a_slider_wins() -> None:
+    puppet = Puppet()
+    puppet.expression = Expression(6, 63)  # surprise
+    faps, baps = played()
+    puppet(faps, baps)
+    raised = faps[30]
+    assert raised > 1031
+    puppet.move_fap(31, -7)
+    faps, baps = played()
+    puppet(faps, baps)
+    assert (faps[30], faps[31]) == (-7, pytest.approx(raised + 1))
+    puppet.release(faps=(31,))
+    puppet.expression = Expression(6, 63, 6, 63)  # twice the same is not twice as much
+    faps, baps = played()
+    puppet(faps, baps)
+    assert faps[30] == pytest.approx(raised)
+
+
+@pytest.mark.parametrize("wrong", [lambda: Viseme(15), lambda: Viseme(1, 1, 64), lambda: Expression(7)])
+def test_there_are_no_other_visemes_and_expressions(wrong: object) -> None:
+    with pytest.raises(ValueError, match="whole number"):
+        wrong()  # type: ignore[operator]
+
+
+def test_there_are_no_other_parameters() -> None:
+    puppet = Puppet()
+    for number in (0, 1, 2, 69):
+        with pytest.raises(ValueError, match="no FAP"):
+            puppet.move_fap(number, 1)
+    for number, value in ((0, 1.0), (297, 1.0), (1, float("nan"))):
+        with pytest.raises(ValueError, match="no BAP"):
+            puppet.move_bap(number, value)
+    assert puppet.idle
+
+
+def ramp(recorder: TakeRecorder, moments: np.ndarray) -> None:
+    """open_jaw and l_shoulder_flexion go up by 100 and 10000 a second."""
+    for moment in moments:
+        faps, baps = np.zeros(68, np.float32), np.zeros(296)
+        faps[2], baps[31] = 100 * moment, 10000 * moment
+        recorder.add(float(moment), faps, baps)
+
+
+@pytest.mark.parametrize("pictures", [7, 25, 60, 144])
+def test_a_take_does_not_depend_on_how_often_it_is_drawn(pictures: int) -> None:
+    recorder = TakeRecorder(Fraction(25), body=True)
+    ramp(recorder, np.arange(2 * pictures + 1) / pictures)
+    take = recorder.take()
+    assert (len(take), take.rate) == (51, 25)
+    assert take.face is not None
+    assert take.body is not None
+    assert take.face.values[:, 2].tolist() == [4 * t for t in range(51)]
+    assert take.body.values[:, 31].tolist() == [400 * t for t in range(51)]
+
+
+def test_where_nothing_was_drawn_nothing_changed() -> None:
+    recorder = TakeRecorder(Fraction(25))
+    ramp(recorder, np.array([0.0, 2.0]))
+    face = recorder.take().face
+    assert face is not None
+    assert face.values[:, 2].tolist() == [0] * 50 + [200]
+
+
+def test_masks_say_all_faps_and_the_baps_that_moved() -> None:
+    recorder = TakeRecorder(Fraction(25), body=True)
+    ramp(recorder, np.arange(10) / 25)
+    take = recorder.take()
+    assert take.face is not None
+    assert take.body is not None
+    assert (np.flatnonzero(~take.face.mask.any(axis=0)) + 1).tolist() == [1, 2]
+    assert (np.flatnonzero(take.body.mask.all(axis=0)) + 1).tolist() == [32, 181, 182, 183, 184, 185, 186]
+    assert not take.body.mask[:, 32:180].any()
+
+
+def test_a_take_of_a_face_has_no_body() -> None:
+    recorder = TakeRecorder(Fraction(25))
+    ramp(recorder, np.arange(3) / 25)
+    assert recorder.take().body is None
+    with pytest.raises(ValueError, match="nothing was recorded"):
+        TakeRecorder(Fraction(25)).take()
+    with pytest.raises(ValueError, match="go back"):
+        recorder.add(0.0, np.zeros(68, np.float32), np.zeros(296))
+
+
+def test_an_endless_take_ends() -> None:
+    recorder = TakeRecorder(Fraction(5))
+    ramp(recorder, np.array([0.0, 1e9]))
+    assert recorder.full
+    assert len(recorder) == 5 * LONGEST + 1
+
+
+@pytest.mark.parametrize(
+    ("rate", "wanted"), [("30", "30"), ("24000/1001", "24000/1001"), ("1", "25"), ("500", "25")]
+)
+def test_the_rate_is_the_streams_where_it_is_one_for_motion(rate: str, wanted: str) -> None:
+    assert take_rate(Fraction(rate)) == Fraction(wanted)
+
+
+def test_a_take_comes_back_from_its_file(tmp_path: Path) -> None:
+    recorder = TakeRecorder(Fraction(30), body=True)
+    rng = np.random.default_rng(3)
+    wanted = np.zeros((40, 68), np.float32)
+    wanted[:, 2:] = np.cumsum(rng.integers(-4, 5, (40, 66)), axis=0)
+    turned = np.cumsum(rng.integers(-500, 500, (40, 186)), axis=0)
+    for frame in range(40):
+        recorder.add(frame / 30, wanted[frame], np.r_[turned[frame], np.zeros(110)])
+    takes = Takes(tmp_path)
+    takes.add(recorder.take())
+    path = takes.save("mine")
+    assert path == tmp_path / "mine.fba"
+    back = fba.read(path)
+    assert back.rate == 30
+    assert back.face is not None
+    assert back.body is not None
+    steps = fba.parameters.fap_steps()
+    # predictive coding with the finest quantiser errs by half a step, and one for what was not a whole step
+    assert (np.abs(resolve(back.face) - wanted).max(axis=0)[2:] <= steps[2:]).all()
+    assert (np.abs(back.body.values[:, :186] - turned) <= fba.parameters.bap_steps()[:186]).all()
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    takes = Takes(tmp_path)
+    with pytest.raises(FormatError, match="nothing was recorded"):
+        takes.save("mine")
+    for height in (100, 200):
+        recorder = TakeRecorder(Fraction(25))
+        recorder.add(0.0, np.full(68, height, np.float32), np.zeros(296))
+        takes.add(recorder.take())
+    path = takes.save("mine.fba")
+    before = path.read_bytes()
+    assert takes.free_name("mine") == "mine-2"
+    with pytest.raises(FormatError, match=r"exists already.*mine-2"):
+        takes.save("mine")
+    assert path.read_bytes() == before
+    undone = takes.undo()
+    assert undone is not None
+    assert undone.face is not None
+    assert undone.face.values[0, 2] == 200
+    assert takes.last is not None
+    assert takes.last.face is not None
+    assert takes.last.face.values[0, 2] == 100
+    for name in ("", "  ", "folder/", ".."):
+        with pytest.raises(FormatError, match="no name"):
+            takes.save(name)
