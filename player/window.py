@@ -43,6 +43,8 @@ IDLE = 0.05
 """Seconds between looks at the input while nothing moves."""
 FASTEST = 1 / 250
 """Least seconds a picture takes, where the display does not set the pace."""
+IDLE_MOUSE = 3.0
+"""Seconds after which the mouse hides itself on a full screen, while playing."""
 SETTLES = 4
 """Pictures drawn after an input, until panels have settled."""
 
@@ -318,6 +320,7 @@ class Window:
         elif self._overlay is not None and not session.bare:
             self._overlay.draw(self.controls)
         self._last = now
+        self.input.point(hidden=self.transport.playing and self._screen.whole and session.idle > IDLE_MOUSE)
         self._show_title()
 
     def _fulfil(self) -> None:

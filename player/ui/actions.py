@@ -85,6 +85,14 @@ def _points(session: Session) -> None:
     session.toggle_view()
 
 
+def _mute(session: Session) -> None:
+    if session.audio is None:
+        session.say("there is no sound", "warning")
+        return
+    session.audio.muted = not session.audio.muted
+    session.say("sound off" if session.audio.muted else "sound on")
+
+
 def _bare(session: Session) -> None:
     session.bare = not session.bare
 
@@ -121,6 +129,7 @@ _PLAIN: dict[str, Callable[[Session], None]] = {
     "reset_view": _reset_view,
     "follow": _follow,
     "points": _points,
+    "mute": _mute,
     "bare": _bare,
     "close": _close,
     **{name: _wish(name) for name in ("screenshot", "transparent", "record", "fullscreen")},

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 from imgui_bundle import imgui
 
 from player.times import clock_text
@@ -140,18 +139,14 @@ class Bar:
         return "head"
 
     def _draw_trace(self, session: Session, ruler: Ruler, top: float) -> None:
-        amounts = session.source.trace()
-        if amounts is None:
+        trace = session.source.trace
+        if trace is None:
             return
         scale = session.scale
         size = (max(round((ruler.right - ruler.left) * scale), 1), max(round((TRACK - 4) * scale), 1))
-        key = (id(session.source.info), size, ruler.low, ruler.high)
+        key = (trace, size, ruler.low, ruler.high)
         if self._trace[:-1] != key:
-            info = session.source.info
-            assert info.frame_index is not None
-            times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
-            shares = (times - ruler.low) / max(ruler.high - ruler.low, 1e-9)
-            picture = trace_picture(amounts, info.plane_intra, np.clip(shares, 0, 1), size)
+            picture = trace_picture(trace, ruler.low, ruler.high, size)
             self._trace = (*key, self._renderer.keep("trace", picture))
         image: Any = self._trace[-1]
         to = imgui.get_window_draw_list()
@@ -257,7 +252,8 @@ class Bar:
         if full:
             imgui.same_line(0, 16)
             imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + 4)
-            imgui.text_colored(theme.FAINT, f"frame {transport.frame + 1} / {session.scene.timeline.frames}")
+            text = f"frame {transport.frame + 1} / {session.scene.timeline.frames}"
+            imgui.text_colored(theme.FAINT, text + ("   waiting" if transport.waiting else ""))
 
     def _right(self, session: Session, wide: float, y: float, taken: float) -> None:
         transport = session.transport
@@ -273,6 +269,10 @@ class Bar:
                 False,
             ),
         ]
+        if session.audio is not None:
+            quiet = session.audio.muted
+            text = f"sound at {session.audio.volume:.0%}; turn the wheel here for more or less"
+            signs.append(("mute", icons.muted if quiet else icons.sound, text, False))
         x = wide - MARGIN + gap
         for action, sign, text, lit in signs:
             x -= size + gap
@@ -281,6 +281,9 @@ class Bar:
             imgui.set_cursor_screen_pos((x, y))
             if icon_button(action, sign, size, colour=theme.ALERT if lit else None):
                 act(session, action)
+            if action == "mute" and session.audio is not None and imgui.is_item_hovered():
+                louder = session.audio.volume + 0.05 * imgui.get_io().mouse_wheel
+                session.audio.volume = min(max(louder, 0.0), 1.0)
             tooltip(text, key_of(action))
         slider = min(118.0, x - taken - 26)
         if slider < 70:

@@ -31,7 +31,7 @@ def draw_name(session: Session, display: tuple[float, float], room: float) -> No
         _shaded(to, (x + 20, y), theme.packed(theme.TEXT), text)
         x += 40 + imgui.calc_text_size(text).x
     name = session.source.name or session.scene.title
-    facts = _facts(session)
+    facts = getattr(getattr(session.scene, "animation", None), "message", "") or _facts(session)
     if imgui.calc_text_size(name + facts).x + x > room:
         facts = ""
     while name and imgui.calc_text_size(name).x + x > room:
@@ -41,13 +41,15 @@ def draw_name(session: Session, display: tuple[float, float], room: float) -> No
 
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
-    """A button for each panel in the upper right corner; returns where they begin."""
-    if display[0] < 300 or display[1] < 200:
+    """A button for each panel in the upper right corner, or one for all; returns where they begin."""
+    if display[0] < 130 or display[1] < 200:
         return display[0]
-    wide = sum(imgui.calc_text_size(panel.label).x + 22 for panel in panels) + 4 * (len(panels) - 1) + 10
+    labels = [panel.label for panel in panels]
+    wide = _width(labels)
+    together = wide > display[0] - 2 * EDGE
+    if together:
+        wide = _width(["Panels"])
     left = display[0] - EDGE - wide
-    if left < EDGE:
-        return display[0]
     flags = imgui.WindowFlags_
     imgui.set_next_window_pos((left, EDGE))
     imgui.set_next_window_size((wide, 34))
@@ -60,18 +62,35 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
         flags.no_decoration | flags.no_move | flags.no_saved_settings | flags.no_bring_to_front_on_focus
         | flags.no_nav | flags.no_focus_on_appearing,
     )  # fmt: skip
-    for panel in panels:
-        lit = panel.name in session.open
-        imgui.push_style_color(imgui.Col_.button, (0.36, 0.68, 0.90, 0.22) if lit else (0, 0, 0, 0))
-        imgui.push_style_color(imgui.Col_.text, theme.TEXT if lit else theme.FAINT)
-        if imgui.button(panel.label):
-            session.toggle_panel(panel.name)
-        imgui.pop_style_color(2)
-        tooltip(panel.title, panel.key)
-        imgui.same_line()
-    imgui.end()
+    if together:
+        if _flat_button("Panels", lit=bool(session.open)):
+            imgui.open_popup("panels")
+    else:
+        for panel in panels:
+            if _flat_button(panel.label, lit=panel.name in session.open):
+                session.toggle_panel(panel.name)
+            tooltip(panel.title, panel.key)
+            imgui.same_line()
     imgui.pop_style_var(3)
+    if imgui.begin_popup("panels"):
+        for panel in panels:
+            if imgui.menu_item(panel.title, panel.key, panel.name in session.open)[0]:
+                session.toggle_panel(panel.name)
+        imgui.end_popup()
+    imgui.end()
     return left
+
+
+def _width(labels: list[str]) -> float:
+    return sum(imgui.calc_text_size(label).x + 22 for label in labels) + 4 * (len(labels) - 1) + 10
+
+
+def _flat_button(label: str, *, lit: bool) -> bool:
+    imgui.push_style_color(imgui.Col_.button, (0.36, 0.68, 0.90, 0.22) if lit else (0, 0, 0, 0))
+    imgui.push_style_color(imgui.Col_.text, theme.TEXT if lit else theme.FAINT)
+    pressed = imgui.button(label)
+    imgui.pop_style_color(2)
+    return bool(pressed)
 
 
 def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:

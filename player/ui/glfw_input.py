@@ -8,6 +8,13 @@ from typing import Any
 from player.controls import Controls
 from player.ui.session import Session
 
+SHAPES = {
+    "text_input": "IBEAM_CURSOR",
+    "hand": "HAND_CURSOR",
+    "resize_ew": "HRESIZE_CURSOR",
+    "resize_ns": "VRESIZE_CURSOR",
+}
+"""glfw's name of imgui's cursors; an arrow for all others."""
 BUTTONS = ("left", "right", "middle")
 NAMED = {
     "SPACE": "space", "LEFT": "left", "RIGHT": "right", "UP": "up", "DOWN": "down", "HOME": "home",
@@ -46,6 +53,8 @@ class GlfwInput:
         self._heard = heard
         self._named = {getattr(glfw, f"KEY_{name}"): word for name, word in NAMED.items()}
         self._places = {getattr(glfw, f"KEY_{name}"): word for name, word in PLACES.items()}
+        self._shape = "arrow"
+        self._cursors: dict[str, Any] = {}
         self._imgui_keys: dict[int, Any] = _imgui_keys(glfw) if gui is not None else {}
         glfw.set_key_callback(window, self.on_key)
         glfw.set_char_callback(window, self.on_character)
@@ -120,6 +129,22 @@ class GlfwInput:
         """The window got the keyboard or lost it."""
         if self._gui is not None:
             self._gui.io.add_focus_event(bool(focused))
+
+    def point(self, *, hidden: bool) -> None:
+        """Give the mouse the shape that fits what is under it, or hide it."""
+        glfw = self._glfw
+        shape = "hidden" if hidden else self._gui.cursor if self._gui is not None else "arrow"
+        if shape == self._shape:
+            return
+        self._shape = shape
+        mode = glfw.CURSOR_HIDDEN if hidden else glfw.CURSOR_NORMAL
+        glfw.set_input_mode(self._window, glfw.CURSOR, mode)
+        if hidden:
+            return
+        kind = SHAPES.get(shape)
+        if kind is not None and shape not in self._cursors:
+            self._cursors[shape] = glfw.create_standard_cursor(getattr(glfw, kind))
+        glfw.set_cursor(self._window, self._cursors.get(shape))
 
     def name(self, key: int, code: int, modifiers: int) -> str | None:
         """A key's name in the table of keys: "space", "l", "shift+left", "ctrl+s"; None for none."""

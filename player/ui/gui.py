@@ -58,6 +58,13 @@ class Gui:
         imgui.set_current_context(self._context)
         return imgui.get_io()
 
+    @property
+    def cursor(self) -> str:
+        """What the mouse looks like over what is under it: imgui's name, such as "arrow"."""
+        imgui.set_current_context(self._context)
+        shape = imgui.get_mouse_cursor()
+        return imgui.MouseCursor_(shape).name or "arrow"
+
     def draw(self, delta: float) -> None:
         """Draw over the bound framebuffer, of the session's size; delta: seconds since the last time.
 
@@ -114,6 +121,9 @@ class Gui:
         for panel in self.panels:
             if panel.name in gone:
                 panel.closed(session)
+            elif panel.name in session.open and not panel.available(session):
+                session.open.discard(panel.name)
+                session.say(f"{panel.title}: there is nothing to show here", "warning")
         there = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
         self._places.draw(there, session, display, below if self.shown > 0 else 0.0)
         self._open = set(session.open)

@@ -104,6 +104,23 @@ def record(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> N
     to.add_circle_filled((x, y), 0.48 * r, colour)
 
 
+def sound(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
+    """A loudspeaker with waves."""
+    _loudspeaker(to, x, y, r, colour)
+    for radius in (0.42, 0.8):
+        to.path_clear()
+        to.path_arc_to((x + 0.12 * r, y), radius * r, -0.75, 0.75)
+        to.path_stroke(colour, thickness=0.18 * r)
+
+
+def muted(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
+    """A loudspeaker with a cross."""
+    _loudspeaker(to, x, y, r, colour)
+    for way in (-1, 1):
+        low, high = (x + 0.38 * r, y - way * 0.28 * r), (x + 0.94 * r, y + way * 0.28 * r)
+        to.add_line(low, high, colour, thickness=0.18 * r)
+
+
 def whole(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
     """Full screen: four corners."""
     for side, way in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
@@ -117,6 +134,14 @@ def whole(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> No
 def _arrow(to: imgui.ImDrawList, x: float, y: float, half: float, length: float, colour: int) -> None:
     """A triangle with its upright side at x, pointing right, or left for a negative length."""
     to.add_triangle_filled((x, y - half), (x, y + half), (x + length, y), colour)
+
+
+def _loudspeaker(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
+    _box(to, x - 0.95 * r, y - 0.32 * r, x - 0.5 * r, y + 0.32 * r, colour)
+    to.add_quad_filled(
+        (x - 0.55 * r, y - 0.32 * r), (x + 0.05 * r, y - 0.8 * r), (x + 0.05 * r, y + 0.8 * r),
+        (x - 0.55 * r, y + 0.32 * r), colour,
+    )  # fmt: skip
 
 
 def _bracket(to: imgui.ImDrawList, x: float, y: float, r: float, way: float, colour: int) -> None:

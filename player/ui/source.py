@@ -6,14 +6,13 @@ import os
 import threading
 from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.animation import Animation
 from fba.errors import FbaError
 
 if TYPE_CHECKING:
     from fba.codec import StreamInfo
     from player.showable import Showable
+    from player.ui.trace import Trace
 
 
 class Source:
@@ -38,6 +37,7 @@ class Source:
         self._scene = scene
         self._probed: StreamInfo | None = None
         self._own: StreamInfo | None = None
+        self._trace: Trace | None = None
         self._thread: threading.Thread | None = None
 
     @property
@@ -57,7 +57,7 @@ class Source:
 
     def look(self, *, wait: bool = False) -> None:
         """Read what the file holds, in the background unless `wait`: the window need not wait for it."""
-        if self.path is None or self._thread is not None:
+        if self._thread is not None:
             return
         self._thread = threading.Thread(target=self._probe, name="fba source", daemon=True)
         self._thread.start()
@@ -69,13 +69,12 @@ class Source:
         """Whether that is still going on."""
         return self._thread is not None and self._thread.is_alive()
 
-    def trace(self) -> npt.NDArray[np.float64] | None:
-        """(T,) bits of each plane, or None where there are no planes."""
-        bits = self.info.plane_bits
-        return None if bits is None else bits.astype(np.float64)
+    @property
+    def trace(self) -> Trace | None:
+        """What is behind the timeline, once `look` has found it: the planes' bits, or how much moves."""
+        return self._trace
 
     def _of_scene(self) -> StreamInfo:
-        from fba.animation import Animation
         from fba.codec import StreamInfo
 
         animation, times = getattr(self._scene, "animation", None), self._scene.timeline
@@ -95,9 +94,15 @@ class Source:
 
     def _probe(self) -> None:
         from fba.formats import probe
+        from player.ui.trace import trace_of_motion, trace_of_planes
 
-        assert self.path is not None
         try:
-            self._probed = probe(self.path, bap_steps=self.bap_steps)
+            if self.path is not None:
+                self._probed = probe(self.path, bap_steps=self.bap_steps)
         except (FbaError, OSError) as error:
             self.warnings.append(f"what the file holds cannot be read: {error}")
+        trace = trace_of_planes(self.info)
+        animation = getattr(self._scene, "animation", None)
+        if trace is None and isinstance(animation, Animation):
+            trace = trace_of_motion(animation)
+        self._trace = trace

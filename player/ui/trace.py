@@ -1,9 +1,14 @@
-"""The picture behind the timeline: how many bits each plane took, I planes in another colour."""
+"""What is behind the timeline: the bits of each plane, I planes in another colour; else how much moves."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.codec import StreamInfo
 
 Float64 = npt.NDArray[np.float64]
 UInt8 = npt.NDArray[np.uint8]
@@ -14,22 +19,61 @@ LEAST = 0.06
 """Height that even the smallest plane has, as a share of the whole."""
 GAP = 5
 """From so many pixels on, planes have a gap between them."""
+ROWS = 4096
+"""Frames looked at together."""
 
 
-def trace_picture(
-    amounts: Float64,
-    intra: npt.NDArray[np.bool_] | None,
-    shares: Float64,
-    size: tuple[int, int],
-) -> UInt8:
-    """uint8 (H, W, 4), transparent but for a column for each plane.
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """(T,) amounts, 0 or more, at (T,) times in seconds; of them, which are I planes.
 
-    amounts: (T,) of each plane, at least 0; heights go with its square root, so that small planes are
-    seen beside large ones. intra: (T,), which are I planes. shares: (T,) ascending, where on the line each
-    plane is, 0 to 1. size: width and height. A pixel that several planes share shows the largest.
+    bits: whether amounts are the bits of planes, else they are how much moves, without a unit.
+    """
+
+    amounts: Float64
+    intra: npt.NDArray[np.bool_]
+    times: Float64
+    bits: bool
+
+
+def trace_of_planes(info: StreamInfo) -> Trace | None:
+    """The bits of a stream's planes; None where it has none."""
+    if info.plane_bits is None or info.plane_intra is None or info.frame_index is None:
+        return None
+    times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
+    return Trace(info.plane_bits.astype(np.float64), info.plane_intra, times, True)
+
+
+def trace_of_motion(animation: Animation) -> Trace | None:
+    """How much each frame differs from the one before: parameters as shares of their range, added up.
+
+    None where nothing moves.
+    """
+    moved = np.zeros(len(animation))
+    for track in (animation.face, animation.body):
+        if track is None or not len(animation):
+            continue
+        values = np.asarray(track.values)
+        spread = values.max(axis=0).astype(np.float64) - values.min(axis=0)
+        used = np.flatnonzero(spread)
+        for start in range(0, len(moved) - 1, ROWS):
+            part = values[start : start + ROWS + 1][:, used].astype(np.float64)
+            moved[start + 1 : start + len(part)] += (np.abs(np.diff(part, axis=0)) / spread[used]).sum(axis=1)
+    if not moved.any():
+        return None
+    times = animation.index / float(animation.rate)
+    return Trace(moved, np.zeros(len(moved), dtype=bool), times, False)
+
+
+def trace_picture(trace: Trace, low: float, high: float, size: tuple[int, int]) -> UInt8:
+    """uint8 (H, W, 4), transparent but for a column for each plane, or frame, from time low to high.
+
+    size: width and height. Heights go with the square root of the amounts, so that small planes are seen
+    beside large ones. A pixel that several planes share shows the largest.
     """
     width, height = size
     picture = np.zeros((height, width, 4), dtype=np.uint8)
+    amounts, shares = trace.amounts, np.clip((trace.times - low) / max(high - low, 1e-9), 0.0, 1.0)
     if not len(amounts) or amounts.max() <= 0:
         return picture
     starts = np.clip(np.floor(shares * (width - 1)).astype(int), 0, width - 1)
@@ -37,9 +81,8 @@ def trace_picture(
     np.maximum.at(tall, starts, amounts)
     owner = np.maximum.accumulate(np.where(tall > 0, np.arange(width), 0))
     key = np.zeros(width, dtype=bool)
-    if intra is not None:
-        key[starts[intra]] = True
-        key = key[owner]
+    key[starts[trace.intra]] = True
+    key = key[owner]
     tall = np.sqrt(tall[owner] / amounts.max())
     tall[tall > 0] = LEAST + (1 - LEAST) * tall[tall > 0]
     filled = np.bincount(starts, minlength=width) > 0
@@ -48,5 +91,5 @@ def trace_picture(
     level = tall * height
     cover = np.clip(level[None, :] - (height - 1 - np.arange(height))[:, None], 0.0, 1.0)
     picture[..., :3] = np.where(key[:, None], INTRA, PREDICTED)
-    picture[..., 3] = np.round(cover * np.where(key, 235, 150))
+    picture[..., 3] = np.round(cover * np.where(key, 235, 150 if trace.bits else 90))
     return picture
