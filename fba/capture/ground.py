@@ -49,20 +49,21 @@ def found(lowest: Float, points: Float) -> Ground:
     heights, places = lowest[lower, frames], points[lower, frames]
     level = float(np.percentile(heights, LOWEST))
     flat = Ground(level if abs(level) <= FAR else 0.0)
-    across = places[:, [0, 2]] - places[:, [0, 2]].mean(axis=0)
-    if np.ptp(across, axis=0).max() < LONG or flat.height != level:
+    middle = places[:, [0, 2]].mean(axis=0)
+    across = places[:, [0, 2]] - middle
+    if np.ptp(across, axis=0).max() < LONG:
         return flat
     plane = _plane(heights, across)
     rise = across @ plane[1:]
     if np.linalg.norm(plane[1:]) > STEEPEST or np.ptp(np.percentile(rise, [5, 95])) < SLIGHT:
         return flat
-    over = heights - rise - plane[0]
-    sloping = plane[0] + float(np.percentile(over, LOWEST))
+    over = heights - rise
+    sloping = float(np.percentile(over, LOWEST))
     # feet stand at one height above a plane that is the ground
-    if np.percentile(over, 60) - np.percentile(over, 5) > 0.6 * (np.percentile(heights, 60) - level):
+    spread = [np.ptp(np.percentile(values, [LOWEST / 2, 60])) for values in (over, heights)]
+    if abs(sloping) > FAR or spread[0] > 0.6 * spread[1]:
         return flat
-    start = sloping - float(places[:, [0, 2]].mean(axis=0) @ plane[1:])
-    return Ground(start, (float(plane[1]), float(plane[2])))
+    return Ground(sloping - float(middle @ plane[1:]), (float(plane[1]), float(plane[2])))
 
 
 def _plane(heights: Float, across: Float) -> Float:

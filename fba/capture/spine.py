@@ -6,7 +6,8 @@ interpolation, from the pelvis up to the skull base. Then all vertebrae of a sou
 by the little that their line still lacks, so that it points exactly where the source's bone points.
 
 With fewer groups of the standard (Spine1, the simple spine of four joints, to Spine5, all of them), the
-vertebrae that may turn take over the bones: each carries the line to the next one, along the source's.
+vertebrae that may turn take over the bones: each carries the line to the next one, along the source's, and
+then all turn a little more, so that the bones of the source are missed by as little as these few can.
 """
 
 from __future__ import annotations
@@ -24,6 +25,11 @@ Float = npt.NDArray[np.float64]
 
 GROUPS = 5
 """Groups Spine1 to Spine5."""
+CHUNK = 2048
+"""Frames worked on at a time."""
+STEPS = 5
+KEEP = 0.05
+"""Weight of turning a part no further than it must, against a bone's direction."""
 
 
 def joints(skeleton: Skeleton) -> list[str]:
@@ -94,14 +100,63 @@ def spread(
         low, high = chain.index(low_joint), chain.index(high_joint)
         inside = [n for n in range(low, high) if n == low or chain[n] in free]
         ends = [*inside[1:], high]
-        part = {n: rotation((height[n] + height[end]) / 2) for n, end in zip(inside, ends, strict=True)}
+        bent = {n: rotation((height[n] + height[end]) / 2) for n, end in zip(inside, ends, strict=True)}
         line = sum(
-            (part[n] @ (centres[end] - centres[n]) for n, end in zip(inside, ends, strict=True)),
+            (bent[n] @ (centres[end] - centres[n]) for n, end in zip(inside, ends, strict=True)),
             np.zeros(3),
         )
-        course = place(height[high]) - place(height[low])
-        length = np.linalg.norm(course, axis=1).min()
-        turn = rotations.between_all(line, course) if length > 1e-9 else np.eye(3)
+        way = place(height[high]) - place(height[low])
+        length = np.linalg.norm(way, axis=1).min()
+        turn = rotations.between_all(line, way) if length > 1e-9 else np.eye(3)
         for n in inside:
-            wanted[chain[n]] = turn @ part[n]
+            wanted[chain[n]] = turn @ bent[n]
     wanted[anchors[-1]] = head
+    if pinned != anchors:
+        lines = [places[above] - places[below] for below, above in pairwise(anchors)]
+        at_ends = [chain.index(joint) for joint in anchors]
+        own = sorted({first, *(chain.index(joint) for joint in free if joint != anchors[-1])})
+        before = np.stack([wanted[chain[n]] for n in own])
+        course = np.stack(lines)
+        for begin in range(0, before.shape[1], CHUNK):  # matrices of a whole capture would not fit
+            few = slice(begin, begin + CHUNK)
+            before[:, few] = _settled(list(before[:, few]), own, centres, at_ends, list(course[:, few]))
+        wanted.update({chain[n]: part for n, part in zip(own, before, strict=True)})
+
+
+def _settled(
+    parts: list[Float], own: list[int], centres: Float, ends: list[int], lines: list[Float]
+) -> list[Float]:
+    """Parts of the spine, turned a little more, so that all source bones together are missed by the least.
+
+    parts: rotations (T, 3, 3) of the vertebrae own, and of those above them up to the next. centres: (N, 3)
+    of the chain. ends: numbers of the anchors in it; lines: (T, 3), the source's from each to the next.
+    """
+    count, frames = len(parts), len(parts[0])
+    below = np.searchsorted(own, np.arange(len(centres) - 1), side="right") - 1
+    steps = np.diff(centres, axis=0)
+    pieces = np.zeros((len(lines), count, 3))
+    for bone, (low, high) in enumerate(pairwise(ends)):
+        for segment in range(low, high):
+            pieces[bone, below[segment]] += steps[segment]
+    wanted = [line / np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-12) for line in lines]
+    for _ in range(STEPS):
+        normal = np.zeros((frames, 3 * count, 3 * count)) + KEEP * KEEP * np.eye(3 * count)
+        pull = np.zeros((frames, 3 * count))
+        for bone, direction in enumerate(wanted):
+            if np.linalg.norm(lines[bone], axis=1).min() < 1e-9:
+                continue
+            arms = [part @ piece for part, piece in zip(parts, pieces[bone], strict=True)]
+            line = np.sum(arms, axis=0)
+            length = np.maximum(np.linalg.norm(line, axis=1), 1e-9)[:, None]
+            slopes = np.concatenate(
+                [-np.tensordot(arm / length, rotations.LEVI_CIVITA, axes=1) for arm in arms], axis=2
+            )
+            across = np.eye(3) - line[:, :, None] * line[:, None, :] / (length * length)[:, :, None]
+            slopes = across @ slopes
+            normal += np.swapaxes(slopes, 1, 2) @ slopes
+            pull += (np.swapaxes(slopes, 1, 2) @ (direction - line / length)[:, :, None])[:, :, 0]
+        turns = np.linalg.solve(normal, pull[:, :, None])[:, :, 0].reshape(frames, count, 3)
+        angle = np.linalg.norm(turns, axis=2)
+        axis = turns / np.maximum(angle, 1e-12)[:, :, None]
+        parts = [rotations.turn(axis[:, k], angle[:, k]) @ part for k, part in enumerate(parts)]
+    return parts

@@ -275,3 +275,45 @@ def test_bones_without_length() -> None:
     assert not bones & {"vl5", "l_ankle", "r_elbow"}
     assert {"l_elbow", "l_knee", "r_ankle"} <= bones
     assert report.worst < 0.5
+
+
+def test_few_vertebrae_keep_neck_and_chest() -> None:
+    """The simple spine's four vertebrae point neck and chest as the source's; nine, all bones."""
+    count = 12
+    generator = np.random.default_rng(8)
+    turns = {
+        name: Rotation.from_rotvec(generator.uniform(-0.3, 0.3, (count, 3)))
+        for name in ("Spine", "Spine1", "Neck", "Head")
+    }
+    captured = motion("standing", count, turns=turns)
+    for spine, worst in (("simple", 0.1), (2, 0.1), ("full", 0.01)):
+        bones = {
+            bone.joint: bone.worst
+            for bone in retarget_report(captured, from_skeleton(captured, spine=spine)).bones
+        }
+        assert bones["vc7"] < worst, spine  # neck to head
+        assert bones["vl1"] < worst, spine
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 0, 1), (0.3, 0.6, 0.7)])
+def test_thumbs_follow(axis: tuple[float, float, float]) -> None:
+    """A T-posed hand's thumb curls by 120 degrees in all, about any of the axes that rigs have."""
+    count = 30
+    along = np.array([0.6, -0.35, 0.72]) / np.linalg.norm([0.6, -0.35, 0.72])
+    about = np.array(axis) - along * (along @ axis)
+    about /= np.linalg.norm(about)
+    hand = with_hands(motion("T", count), 0)
+    names = tuple(name.replace("Index", "Thumb") for name in hand.names)
+    offsets = np.array(hand.offsets)
+    first = names.index("LeftHandThumb1")
+    offsets[first:] = [[0.03, -0.01, 0.03], along * 0.045, along * 0.035, along * 0.03]
+    turned = np.array(hand.rotations)
+    for joint, share in ((first, 0.4), (first + 1, 1.0), (first + 2, 1.0)):
+        curl = Rotation.from_rotvec(np.outer(np.radians(np.linspace(0, 50, count)) * share, about))
+        turned[:, joint] = curl.as_quat()[:, [3, 0, 1, 2]]
+    captured = replace(hand, names=names, offsets=offsets, rotations=turned)
+    report = retarget_report(captured, from_skeleton(captured))
+    thumb = [bone for bone in report.bones if "thumb" in bone.joint]
+    assert len(thumb) == 2
+    assert max(bone.worst for bone in thumb) < 5.0
+    assert max(bone.mean for bone in thumb) < 3.0

@@ -1,0 +1,173 @@
+"""Feet on the ground: heights, slip, slopes, and what that costs the legs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from capture_bodies import bone_errors, limb_bones, motion
+from scipy.spatial.transform import Rotation
+from test_from_skeleton import NAMES
+
+from fba.body import BapSolver, Skeleton
+from fba.capture import SkeletonMotion, from_skeleton, ground, legs, retarget_report
+
+THIGH, SHANK = 0.36, 0.54
+"""Metres: a body of quite other proportions than the default's, whose thigh and shank are of one length."""
+
+
+def squats(slide: bool = False) -> SkeletonMotion:
+    """Someone with short thighs bends both knees by up to 70 degrees, three times, feet flat on the ground.
+
+    The hips are placed such that the ankles stay where they are, so the source's feet do not move at all.
+    With slide, she meanwhile moves forward by 30 cm, feet and all.
+    """
+    count = 240
+    bend = np.radians(35) * (1 - np.cos(np.linspace(0, 6 * np.pi, count)))
+    # the ankle stays below the hips where sin(lean) thigh = sin(bend - lean) shank
+    lean = np.arctan2(SHANK * np.sin(bend), THIGH + SHANK * np.cos(bend))
+    across = np.array([1.0, 0.0, 0.0])
+    turns = {}
+    for side in ("Left", "Right"):
+        turns[f"{side}UpLeg"] = Rotation.from_rotvec(np.outer(-lean, across))
+        turns[f"{side}Leg"] = Rotation.from_rotvec(np.outer(bend, across))
+        turns[f"{side}Foot"] = Rotation.from_rotvec(np.outer(lean - bend, across))
+    captured = motion("standing", count, turns=turns)
+    offsets = np.array(captured.offsets)
+    for side in ("Left", "Right"):
+        offsets[captured.names.index(f"{side}Leg")] = [0.0, -THIGH, 0.0]
+        offsets[captured.names.index(f"{side}Foot")] = [0.0, -SHANK, 0.0]
+    high = THIGH * np.cos(lean) + SHANK * np.cos(bend - lean)
+    places = np.array(captured.positions)
+    places[:, 1] = high + 0.05
+    if slide:
+        places[:, 2] += np.linspace(0, 0.3, count)
+    return replace(captured, offsets=offsets, positions=places)
+
+
+def walk(rise: float = 0.0) -> SkeletonMotion:
+    """Strides on stiff legs over 4 m of ground that rises by a share of the way; the lower foot stands."""
+    count = 480
+    time = np.linspace(0, 4, count)
+    swing = np.radians(18) * np.sin(np.pi * time)
+    lift = np.radians(30) * np.maximum(0, np.cos(np.pi * time)) ** 2
+    other = np.radians(30) * np.maximum(0, -np.cos(np.pi * time)) ** 2
+    across = np.array([1.0, 0.0, 0.0])
+
+    def turn(angle: np.ndarray) -> Rotation:
+        return Rotation.from_rotvec(np.outer(angle, across))
+
+    turns = {
+        "LeftUpLeg": turn(-swing - lift), "LeftLeg": turn(2 * lift), "LeftFoot": turn(swing - lift),
+        "RightUpLeg": turn(swing - other), "RightLeg": turn(2 * other), "RightFoot": turn(-swing - other),
+    }  # fmt: skip
+    captured = motion("standing", count, turns=turns)
+    places = np.array(captured.positions)
+    places[:, 2] = time
+    _, joints = replace(captured, positions=places).world()
+    toes = [captured.names.index(f"{side}ToeBase") for side in ("Left", "Right")]
+    places[:, 1] -= (joints[:, toes, 1] - rise * joints[:, toes, 2]).min(axis=1)
+    return replace(captured, positions=places)
+
+
+def posed(captured: SkeletonMotion, **options: object) -> dict[str, np.ndarray]:
+    """(T, 3): places of the body's joints."""
+    matrices = BapSolver().pose(from_skeleton(captured, **options).body.values)  # type: ignore[arg-type]
+    return {name: matrices[:, number, :3, 3] for number, name in enumerate(Skeleton.default().names)}
+
+
+def steady(places: np.ndarray) -> float:
+    """Metres between the farthest places."""
+    return float(np.linalg.norm(np.ptp(places, axis=0)))
+
+
+def test_feet_do_not_slip_in_squats() -> None:
+    captured = squats()
+    free, planted = (posed(captured, plant=plant) for plant in (False, True))
+    for side in "lr":
+        ball = f"{side}_metatarsal"
+        assert steady(free[ball]) > 0.02  # other proportions carry the feet along
+        assert steady(planted[ball]) < 0.006
+        heights = planted[ball][:, 1]
+        assert np.ptp(heights) < 0.006
+    errors = bone_errors(captured, from_skeleton(captured).body.values, limb_bones(NAMES))
+    assert max(float(e.max()) for e in errors.values()) < 5.0
+    assert max(float(e.mean()) for e in errors.values()) < 1.0
+
+
+def test_feet_that_slide_still_slide() -> None:
+    scale = (0.42695 + 0.43398) / (THIGH + SHANK)
+    ball = posed(squats(slide=True))["l_metatarsal"]
+    assert ball[-1, 2] - ball[0, 2] == pytest.approx(0.3 * scale, abs=0.01)
+
+
+def test_one_foot_on_a_step() -> None:
+    """Feet in the air are left alone: the right one, held 10 cm up, keeps all its bones."""
+    bent = {
+        "RightUpLeg": Rotation.from_euler("x", -40, degrees=True),
+        "RightLeg": Rotation.from_euler("x", 55, degrees=True),
+        "RightFoot": Rotation.from_euler("x", -15, degrees=True),
+    }
+    captured = motion("standing", 30, turns=bent)
+    for plant in (False, True):
+        errors = bone_errors(captured, from_skeleton(captured, plant=plant).body.values, limb_bones(NAMES))
+        assert float(errors["r_hip", "r_knee"].max()) < 0.01
+        assert float(errors["r_knee", "r_ankle"].max()) < 0.01
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.03, -0.05])
+def test_sloping_ground_is_levelled(rise: float) -> None:
+    captured = walk(rise)
+    places = posed(captured)
+    low = np.minimum(places["l_metatarsal"][:, 1], places["r_metatarsal"][:, 1])
+    assert np.percentile(low, 95) - np.percentile(low, 5) < 0.01
+    assert np.median(low) == pytest.approx(0.0092, abs=0.008)
+    kept = posed(captured, ground="source")
+    low = np.minimum(kept["l_metatarsal"], kept["r_metatarsal"])[:, 1]
+    assert low[-60:].mean() - low[:60].mean() == pytest.approx(rise * 3.5 * 0.9566, abs=0.015)
+    report = retarget_report(captured, from_skeleton(captured))
+    assert report.feet is not None
+    assert report.feet.within > 0.99
+
+
+def test_ground_from_points() -> None:
+    """A plane under feet that hang above it in part of the frames, stairs, and feet that do not walk."""
+    generator = np.random.default_rng(5)
+    x, z = generator.uniform(-0.3, 0.3, 400), np.linspace(-2, 2, 400)
+    points = np.stack([x, 0.05 + 0.02 * z, z], axis=1)
+    points[::3, 1] += generator.uniform(0, 0.1, len(points[::3]))
+    feet = np.stack([points, points + np.array([0.0, 0.2, 0.0])])
+    found = ground.found(feet[..., 1], feet)
+    assert found.slope[1] == pytest.approx(0.02, abs=0.003)
+    assert found.under(np.array([0.0, 9.0, 1.0])) == pytest.approx(0.07, abs=0.006)
+    stairs = feet.copy()
+    stairs[..., 1] = 0.5 * stairs[..., 2]
+    assert ground.found(stairs[..., 1], stairs).slope == (0.0, 0.0)
+    still = feet * [0.1, 1.0, 0.1]
+    assert ground.found(still[..., 1], still).slope == (0.0, 0.0)
+
+
+def test_leg_reaches_by_the_law_of_cosines() -> None:
+    """A leg bent by 80 degrees goes where it is asked to, and keeps the lengths of its bones."""
+    bend = np.radians(80)
+    hip, knee = np.zeros((1, 3)), np.array([[0.0, -0.43, 0.0]])
+    ankle = knee + 0.42 * np.array([[0.0, -np.cos(bend), -np.sin(bend)]])
+    leg = legs.Leg(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))
+    move = np.array([[0.01, 0.015, -0.02]])
+    thigh, shank = legs.reach(leg, move)
+    reached = (thigh @ knee[0]) + (shank @ (ankle - knee)[0])
+    np.testing.assert_allclose(reached[0], (ankle + move)[0], atol=5e-4)
+
+
+def test_straight_leg_is_not_broken_for_a_millimetre() -> None:
+    """A leg that is straight within a degree would bend by 12 degrees to be 5 mm shorter: it does not."""
+    bend = np.radians(np.array([1.0, 0.5, 0.0, -0.5, -1.0]))
+    hip, knee = np.zeros((5, 3)), np.tile([0.0, -0.43, 0.0], (5, 1))
+    ankle = knee + 0.42 * np.stack([0 * bend, -np.cos(bend), -np.sin(bend)], axis=1)
+    leg = legs.Leg(hip, knee, ankle, np.tile([1.0, 0.0, 0.0], (5, 1)))
+    thigh, shank = legs.reach(leg, np.tile([0.0, 0.005, 0.0], (5, 1)))
+    turned = np.degrees(Rotation.from_matrix(shank).magnitude())
+    assert turned.max() < 2.0
+    assert np.degrees(Rotation.from_matrix(thigh).magnitude()).max() < 1.0
+    assert legs.pliancy(leg).max() < 0.05
