@@ -45,7 +45,7 @@ class Soundtrack:
         self._av = import_av()
         self._path = Path(path)
         try:
-            self._container = self._av.open(str(path))
+            self._container = self._av.open(str(path), metadata_errors="replace")
         except (self._av.error.FFmpegError, OSError) as error:
             reason = getattr(error, "strerror", None) or error
             raise FormatError(f"cannot be read as sound: {reason}", path=path) from error
@@ -53,6 +53,9 @@ class Soundtrack:
             self._container.close()
             raise FormatError("holds no sound", path=path)
         stream = self._container.streams.audio[0]
+        if stream.codec_context is None:
+            self._container.close()
+            raise FormatError("holds sound in a coding that is not known here", path=path)
         self.rate = stream.rate if stream.rate in AAC_RATES else 48000
         self.channels = 1 if stream.channels == 1 else 2
         self.layout = "mono" if self.channels == 1 else "stereo"
@@ -105,7 +108,7 @@ class Soundtrack:
                 frame.pts = None  # sound is what follows: times of damaged files do not matter
                 yield from resampler.resample(frame)
             yield from resampler.resample(None)
-        except self._av.error.FFmpegError as error:
+        except (self._av.error.FFmpegError, ValueError) as error:  # or its format changes on the way
             raise FormatError(f"the sound is damaged: {error}", path=self._path) from error
 
 

@@ -108,7 +108,7 @@ class SoundFile:
                 raise FormatError("is empty (0 bytes), not a sound file", path=self.path)
             if self._container is not None:
                 self._container.close()
-            self._container = av.open(str(self.path))
+            self._container = av.open(str(self.path), metadata_errors="replace")
         except (av.error.FFmpegError, OSError) as error:
             if isinstance(error, FormatError):
                 raise
@@ -118,6 +118,9 @@ class SoundFile:
             self._container.close()
             raise FormatError("holds no sound", path=self.path)
         self._stream = self._container.streams.audio[0]
+        if self._stream.codec_context is None:
+            self._container.close()
+            raise FormatError("holds sound in a coding that is not known here", path=self.path)
 
     def _rate(self, rate: int) -> int:
         if rate < 1:
@@ -143,9 +146,7 @@ class SoundFile:
     def _decoded(self) -> Iterator[Int16]:
         """Parts (N, 2) one after the other from where the container is; the first one's place is `_first`."""
         stream = self._stream
-        sides = 1 if stream.channels == 1 else CHANNELS  # mixing would make mono softer
-        layout = "mono" if sides == 1 else "stereo"
-        resampler = self._av.AudioResampler(format="s16", layout=layout, rate=self.rate)
+        convert = _Converter(self._av, self.rate, mono=stream.channels == 1)
         begun, at = stream.start_time or 0, None
         for frame in self._frames():
             told = None
@@ -157,11 +158,16 @@ class SoundFile:
                 yield np.zeros((told - at, CHANNELS), dtype=np.int16)
                 at = told
             frame.pts = None
-            for part in _parts(resampler, frame, sides):
+            try:
+                parts = convert(frame)
+            except (self._av.error.FFmpegError, ValueError) as error:
+                self._warn(error)
+                continue
+            for part in parts:
                 at += len(part)
                 yield part
         if at is not None:
-            yield from _parts(resampler, None, sides)
+            yield from convert(None)
 
     def _frames(self) -> Iterator[Any]:
         """Decoded frames; what is damaged is left out, with a warning the first time."""
@@ -193,8 +199,29 @@ class SoundFile:
             )
 
 
-def _parts(resampler: Any, frame: Any, sides: int) -> Iterator[Int16]:
-    """A decoded frame as samples (N, 2)."""
-    for piece in resampler.resample(frame):
-        samples = np.asarray(piece.to_ndarray(), dtype=np.int16).reshape(-1, sides)
-        yield np.broadcast_to(samples, (len(samples), CHANNELS))
+class _Converter:
+    """Decoded frames as samples (N, 2) at one rate; frames may change their own format."""
+
+    def __init__(self, av: Any, rate: int, *, mono: bool) -> None:
+        self._av = av
+        self._rate = rate
+        self._sides = 1 if mono else CHANNELS  # mixing would make mono softer
+        self._resampler = self._made()
+
+    def __call__(self, frame: Any) -> list[Int16]:
+        """The samples of a frame, or what is still held back for None."""
+        try:
+            pieces = self._resampler.resample(frame)
+        except ValueError:  # another format than before
+            held = self._resampler.resample(None)
+            self._resampler = self._made()
+            pieces = held + self._resampler.resample(frame)
+        found = []
+        for piece in pieces:
+            samples = np.asarray(piece.to_ndarray(), dtype=np.int16).reshape(-1, self._sides)
+            found.append(np.broadcast_to(samples, (len(samples), CHANNELS)))
+        return found
+
+    def _made(self) -> Any:
+        layout = "mono" if self._sides == 1 else "stereo"
+        return self._av.AudioResampler(format="s16", layout=layout, rate=self._rate)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import tracemalloc
+import warnings
 import wave
 from fractions import Fraction
 from pathlib import Path
@@ -122,6 +123,29 @@ def test_no_sound_at_all_says_so(tmp_path: Path) -> None:
         with pytest.raises(FormatError, match=words) as caught:
             SoundFile(path)
         assert str(path) in str(caught.value)
+
+
+def test_tags_that_are_not_utf_8_do_not_matter(tmp_path: Path) -> None:
+    path = write_wav(tmp_path / "a.wav", tone(1000))
+    tag = b"INFOINAM" + (8).to_bytes(4, "little") + b"caf\xe9 bar"
+    data = path.read_bytes() + b"LIST" + len(tag).to_bytes(4, "little") + tag
+    path.write_bytes(data[:4] + (len(data) - 8).to_bytes(4, "little") + data[8:])
+    with SoundFile(path) as file:
+        np.testing.assert_array_equal(file.read(0, 1000)[:, 0], tone(1000))
+
+
+def test_a_format_that_changes_on_the_way_is_followed(tmp_path: Path) -> None:
+    parts = [
+        encode(tmp_path / f"{layout}.mp3", "libmp3lame", tone(50_000), rate, layout).read_bytes()
+        for layout, rate in (("mono", 44100), ("stereo", 32000))
+    ]
+    path = tmp_path / "both.mp3"
+    path.write_bytes(b"".join(parts))
+    with SoundFile(path) as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        samples = file.read(0, 10**6)
+    assert len(samples) > 80_000  # FFmpeg believes the first part's own length for some of the second
+    assert np.abs(samples[60_000:80_000].astype(float)).mean() > 500
 
 
 def test_a_damaged_part_is_left_out_with_a_warning(tmp_path: Path) -> None:
