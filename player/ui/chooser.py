@@ -1,0 +1,80 @@
+"""Choosing FAPs and BAPs from a list that can be searched."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from imgui_bundle import imgui
+
+from fba.parameters import BAP_STANDARD_COUNT, FIRST_LOW_LEVEL_FAP, baps, faps
+from player.ui import theme
+from player.ui.session import Session
+
+MOST = 24
+"""Curves at once."""
+
+
+@cache
+def listed() -> tuple[tuple[str, int, str, str], ...]:
+    """(kind, number, text shown, text searched) of all parameters, FAPs first."""
+    rows = []
+    for fap in faps()[FIRST_LOW_LEVEL_FAP - 1 :]:
+        words = f"fap {fap.number} {fap.name} {fap.name.replace('_', ' ')} {fap.group_name}".lower()
+        rows.append(("fap", fap.number, f"{fap.number} {fap.name}", words))
+    for bap in baps()[:BAP_STANDARD_COUNT]:
+        words = f"bap {bap.number} {bap.name} {bap.name.replace('_', ' ')} {bap.group_name}".lower()
+        rows.append(("bap", bap.number, f"{bap.number} {bap.name}", words))
+    return tuple(rows)
+
+
+@cache
+def found(query: str, *, face: bool, body: bool) -> tuple[tuple[str, int, str], ...]:
+    """(kind, number, text) of those that have all the words: a number alone, a name, a group."""
+    words = query.lower().split()
+    rows = []
+    for kind, number, text, searched in listed():
+        if not (face if kind == "fap" else body):
+            continue
+        if all(word == str(number) if word.isdecimal() else word in searched for word in words):
+            rows.append((kind, number, text))
+    return tuple(rows)
+
+
+class Chooser:
+    """A button that opens the list; what is ticked there is the session's selection."""
+
+    def __init__(self) -> None:
+        self.query = ""
+        self.place = (0.0, 0.0)
+        """The middle of the first row, in points; for tests."""
+
+    def draw(self, session: Session, *, face: bool, body: bool) -> None:
+        """Draw the button, and the list where it is open."""
+        if imgui.button("Choose..."):
+            imgui.open_popup("choose")
+        imgui.set_next_window_size((330, 360))
+        if not imgui.begin_popup("choose"):
+            return
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()
+        imgui.set_next_item_width(-1)
+        _, self.query = imgui.input_text_with_hint("##query", "number, name or group", self.query)
+        rows = found(self.query.strip(), face=face, body=body)
+        imgui.begin_child("list", (0, 0))
+        chosen = session.selection
+        clipper = imgui.ListClipper()
+        clipper.begin(len(rows))
+        while clipper.step():
+            for kind, number, text in rows[clipper.display_start : clipper.display_end]:
+                on = number in (chosen.faps if kind == "fap" else chosen.baps)
+                full = len(chosen.faps) + len(chosen.baps) >= MOST
+                changed, _ = imgui.checkbox(f"{text}##{kind}{number}", on)
+                if (kind, number, text) == rows[0]:
+                    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+                    self.place = (low.x + 10, (low.y + high.y) / 2)
+                if changed and (on or not full):
+                    chosen.toggle(kind, number)
+        if not rows:
+            imgui.text_colored(theme.FAINT, "nothing of that name")
+        imgui.end_child()
+        imgui.end_popup()
