@@ -37,6 +37,7 @@ class Source:
         self._scene = scene
         self._probed: StreamInfo | None = None
         self._own: StreamInfo | None = None
+        self._of = ("animation", 0)
         self._trace: Trace | None = None
         self._thread: threading.Thread | None = None
 
@@ -79,7 +80,7 @@ class Source:
 
         animation, times = getattr(self._scene, "animation", None), self._scene.timeline
         if isinstance(animation, Animation) and len(animation) == times.frames:
-            return StreamInfo.of_animation(animation, "animation", 0)
+            return StreamInfo.of_animation(animation, *self._of)
         return StreamInfo(
             format="stream",
             size=0,
@@ -93,12 +94,15 @@ class Source:
         )
 
     def _probe(self) -> None:
-        from fba.formats import probe
+        from fba.formats import format_of, probe
         from player.ui.trace import trace_of_motion, trace_of_planes
 
         try:
-            if self.path is not None:
+            if self.path is not None and (found := format_of(self.path).name) == "fba":
                 self._probed = probe(self.path, bap_steps=self.bap_steps)
+            elif self.path is not None:  # what was read of it counts: at the rate that was asked for
+                self._of = (found, os.stat(self.path).st_size)
+                self._own = None
         except (FbaError, OSError) as error:
             self.warnings.append(f"what the file holds cannot be read: {error}")
         trace = trace_of_planes(self.info)

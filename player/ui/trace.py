@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,10 +51,10 @@ def trace_of_motion(animation: Animation) -> Trace | None:
     None where nothing moves.
     """
     moved = np.zeros(len(animation))
-    for track in (animation.face, animation.body):
-        if track is None or not len(animation):
-            continue
-        values = np.asarray(track.values)
+    face, body = animation.face, animation.body
+    tables: list[npt.NDArray[Any]] = [] if face is None else [face.values, face.viseme, face.expression]
+    tables += [] if body is None else [body.values]
+    for values in tables if len(animation) else []:
         spread = values.max(axis=0).astype(np.float64) - values.min(axis=0)
         used = np.flatnonzero(spread)
         for start in range(0, len(moved) - 1, ROWS):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from player_tracks import face_track
 
-from fba.animation import Animation
+from fba.animation import Animation, FaceTrack
 from player.ui.ruler import Ruler, label
 from player.ui.trace import INTRA, Trace, trace_of_motion, trace_picture
 
@@ -62,11 +62,21 @@ def test_many_planes_on_few_pixels_show_the_largest() -> None:
     assert tall[:24].max() < 30
 
 
+def still_values(frames: int) -> np.ndarray:
+    return np.zeros((frames, 68), dtype=int)
+
+
 def test_motion_is_added_up_over_parameters() -> None:
     face = face_track([{3: 0, 5: 0}, {3: 50, 5: 0}, {3: 100, 5: 10}, {3: 100, 5: 10}])
     trace = trace_of_motion(Animation(25, np.array([0, 1, 2, 5]), face=face))  # type: ignore[arg-type]
     assert trace is not None
     np.testing.assert_allclose(trace.amounts, [0.0, 0.5, 1.5, 0.0])
     np.testing.assert_allclose(trace.times, [0.0, 0.04, 0.08, 0.2])
+    joy = np.zeros((3, 6), dtype=int)
+    joy[1:, 0], joy[1:, 1] = 1, [30, 60]
+    smile = FaceTrack(still_values(3), np.ones((3, 68), bool), expression=joy)
+    trace = trace_of_motion(Animation(25, np.arange(3), face=smile))  # type: ignore[arg-type]
+    assert trace is not None
+    np.testing.assert_allclose(trace.amounts, [0.0, 1.5, 0.5])  # the expression is chosen and half there
     still = face_track([{3: 7}, {3: 7}])
     assert trace_of_motion(Animation(25, np.arange(2), face=still)) is None  # type: ignore[arg-type]
