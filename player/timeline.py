@@ -87,15 +87,15 @@ class Timeline:
         """
         if not math.isfinite(time):
             raise ValueError(f"the time must be a finite number of seconds, not {time}")
-        if not self.frames:
-            raise ValueError("the animation has no frames")
         index = self.animation.index
+        if not len(index):
+            raise ValueError("the animation has no frames")
         at = time * self.rate.numerator / self.rate.denominator
         nearest = round(at)
         if abs(at - nearest) < FRAME_ROUNDING:
             at = float(nearest)  # a frame's own time shows that frame, whatever the rounding
-        before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), self.frames - 1)
-        after = min(before + 1, self.frames - 1)
+        before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), len(index) - 1)
+        after = min(before + 1, len(index) - 1)
         gap = int(index[after]) - int(index[before])
         share = min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
         return before, after, share
