@@ -42,7 +42,8 @@ def offscreen_context() -> Any:
         raise DisplayError(NO_LIBRARY.format(reason=text))
     raise DisplayError(
         f"no OpenGL 3.3 context could be made ({text}). Install libegl1 and libgl1 with a driver "
-        "(Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri), or update the graphics driver"
+        "(Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri), or update the graphics driver; "
+        "where the variable DISPLAY names a display that is not there, unset it: none is needed"
     )
 
 

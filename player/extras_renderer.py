@@ -11,7 +11,7 @@ from player.camera import Camera
 from player.extras import Dots, Extras, Grid, Lines
 from player.placing import directions, places
 from player.programs import load_program, matrix_bytes, set_uniform
-from player.shapes import FaceMesh
+from player.shapes import FaceMesh, FaceShape
 from player.words import MOST_NAMES, SMALLEST, legend_picture, names_picture, placed_names
 
 Float64 = npt.NDArray[np.float64]
@@ -24,6 +24,8 @@ HIDDEN = 0.2
 NAME_SIZE, SMALLEST_NAME = 13, 10
 LEAST_LEGEND = 0.65
 MARGIN = 14
+MOST_SHELLS = 48
+"""Shells whose triangles are remembered; the longest unused goes first."""
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
 
 
@@ -53,6 +55,7 @@ class ExtrasRenderer:
         self._square: Any = None
         self._buffers: dict[str, Any] = {}
         self._textures: dict[str, tuple[object, Any, Any]] = {}
+        self._indices: dict[int, tuple[FaceShape, Any]] = {}
 
     def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
         """Over what the bound framebuffer shows from that camera, its depths known."""
@@ -97,12 +100,15 @@ class ExtrasRenderer:
         """Free everything allocated on the graphics card."""
         for _, texture, _ in self._textures.values():
             texture.release()
+        for _, triangles in self._indices.values():
+            triangles.release()
         for part in (*self._buffers.values(), *self._programs.values()):
             part.release()
         if self._square is not None:
             self._square.release()
         self._square = None
         self._textures.clear()
+        self._indices.clear()
         self._buffers.clear()
         self._programs.clear()
 
@@ -123,14 +129,13 @@ class ExtrasRenderer:
         array.release()
 
     def _draw_shells(self, shells: tuple[FaceMesh, ...]) -> None:
-        gl, arrays, parts = self._gl, [], []
+        gl, arrays = self._gl, []
         for number, mesh in enumerate(shells):
             at = np.concatenate([places(mesh), directions(mesh)], axis=1).astype("f4")
             vertices = self._filled(f"shell {number}", at)
-            triangles = gl.buffer(np.ascontiguousarray(mesh.shape.triangles, dtype="i4").tobytes())
             content = [(vertices, "3f 3f", "in_position", "in_normal")]
+            triangles = self._triangles(mesh.shape)
             arrays.append(gl.vertex_array(self._programs["shell"], content, index_buffer=triangles))
-            parts.append(triangles)
         # Depths first, so that only the nearest skin is seen.
         gl.blend_func = gl.ZERO, gl.ONE
         for array in arrays:
@@ -140,8 +145,19 @@ class ExtrasRenderer:
         for array in arrays:
             array.render()
         gl.depth_func = "<"
-        for part in (*arrays, *parts):
-            part.release()
+        for array in arrays:
+            array.release()
+
+    def _triangles(self, shape: FaceShape) -> Any:
+        """Those of a shell, kept."""
+        held = self._indices.pop(id(shape), None)
+        if held is None:
+            data = np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()
+            held = (shape, self._gl.buffer(data))
+        self._indices[id(shape)] = held  # now the latest used
+        while len(self._indices) > MOST_SHELLS:
+            self._indices.pop(next(iter(self._indices)))[1].release()
+        return held[1]
 
     def _draw_grid(self, grid: Grid) -> None:
         program = self._programs["grid"]

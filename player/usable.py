@@ -32,9 +32,7 @@ def usable(model: FaceModel) -> FaceModel:
     apart = model.fapu.ES * 1024
     if SIZES[0] <= apart <= SIZES[1]:
         return model
-    _warn(
-        f"{named} is in other units than metres: {apart:.3g} between its eyes; shown as large as a person"
-    )
+    _warn(f"{named} is in other units than metres: {apart:.3g} between its eyes; shown as large as a person")
     return resized(model, EYES_APART / apart)
 
 
@@ -66,4 +64,4 @@ def _resized(table: FaceDefTables, factor: float) -> FaceDefTables:
 
 
 def _warn(text: str) -> None:
-    warnings.warn(text, FbaWarning, stacklevel=4)  # whoever made the scene
+    warnings.warn(text, FbaWarning, stacklevel=5)  # whoever made the scene

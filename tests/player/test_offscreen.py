@@ -141,22 +141,6 @@ class TestPictures:
         wild_body = {n: 10**6 * (-1) ** n for n in range(1, 187)}
         assert picture(still({}, wild_body)).shape == (240, 320, 4)
 
-    @pytest.mark.slow
-    def test_memory_stays_over_500_pictures(self, walking: Animation) -> None:
-        def resident() -> int:
-            with open("/proc/self/statm", encoding="ascii") as file:
-                return int(file.read().split()[1]) * 4096
-
-        if sys.platform != "linux":
-            pytest.skip("resident memory is read from /proc")
-        with Offscreen(walking, (160, 90)) as offscreen:
-            for t in range(60):
-                offscreen.frame(t / 100)
-            before = resident()
-            for t in range(500):
-                offscreen.frame(t / 1000)
-            assert resident() - before < 4e6
-
 
 def test_sizes_and_times_are_checked(talking: Animation) -> None:
     with pytest.raises(ValueError, match="1x1"):
