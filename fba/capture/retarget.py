@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from fba.body import BapSolver, wrapped
 from fba.body.solving import joint_angles
-from fba.capture import aiming, feet, ground, hinges, legs, rest, rotations, spine
+from fba.capture import aiming, hinges, rest, rotations, spine
+from fba.capture.footing import Footing
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning
 from fba.parameters import BAP_COUNT, baps
@@ -27,9 +28,6 @@ STIFF = 0.1
 """The same for fingers, which are often straight: their knuckles then turn no further than this lets them."""
 FOREARM_SHARE = 0.5
 """Of the hand's twist against the forearm, what the forearm takes: radius and ulna turn about each other."""
-FOOT_STEPS = 4
-ROUNDS = 2
-"""How often legs move for what their feet still lack."""
 CLAVICLE_SHARE = 0.5
 """Of the clavicle's turn, what the joint at the breastbone takes; the one at the shoulder blade has the
 rest."""
@@ -65,17 +63,17 @@ class Retarget:
             world = upright @ rotations.matrices(turned[:, source]) @ upright.T
             self.wanted[joint] = world @ correction
         self.aims = alignment.aims
-        self.feet: dict[str, Float] = {}
         anchors = [joint for joint in spine.joints(self.skeleton) if joint in mapped]
         if groups and len(anchors) > 1:
             at = {joint: self.places[:, mapped[joint]] for joint in anchors}
             spine.spread(self.skeleton, self.wanted, at, anchors, groups, with_anchors)
+        self.footing = footing = Footing(self)
         for side in "lr":
             self._clavicle(side)
             self._forearm(side)
             for upper, lower in HINGES:
                 self._hinge(f"{side}_{upper}", f"{side}_{lower}")
-            self._foot(side)
+            footing.turn(side)
             for finger in FINGERS:
                 self._finger(f"{side}_{finger}")
         self.scale = self._unit() if scale is None else float(scale)
@@ -89,7 +87,7 @@ class Retarget:
         result = np.zeros((count, BAP_COUNT), dtype=np.int32)
         root = self._root_places()
         if floor != "none":
-            self._stand(root, floor, plant)
+            self.footing.stand(root, floor, plant)
         if origin != "source":
             place = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
             root[:, [0, 2]] -= (place - self.skeleton.centres[0])[[0, 2]]
@@ -105,7 +103,7 @@ class Retarget:
             previous = result[end - 1]
         return wrapped(result)
 
-    def _bone(self, joint: str, aim: str) -> Float:
+    def bone(self, joint: str, aim: str) -> Float:
         vector = (
             self.skeleton.centres[self.skeleton.number(aim)]
             - self.skeleton.centres[self.skeleton.number(joint)]
@@ -115,9 +113,9 @@ class Retarget:
 
     def _direction(self, joint: str) -> Float:
         """(T, 3): where the bone that begins at a joint is to point."""
-        return self.wanted[joint] @ self._bone(joint, self.aims[joint])
+        return self.wanted[joint] @ self.bone(joint, self.aims[joint])
 
-    def _turns(self, joint: str) -> tuple[Float, npt.NDArray[np.int64], Float]:
+    def turns(self, joint: str) -> tuple[Float, npt.NDArray[np.int64], Float]:
         """Signed axes (K, 3) of a joint's turns, outermost first, and their numbers (3,) and signs (3,)."""
         rules = self.solver.convention
         row = rules.joints.index(joint)
@@ -125,7 +123,7 @@ class Retarget:
         axes = np.eye(3)[rules.axis[row]] * rules.sign[row][:, None]
         return axes[:count], rules.axis[row], rules.sign[row]
 
-    def _before(self, joint: str) -> Float:
+    def before(self, joint: str) -> Float:
         """Wanted rotation (T, 3, 3) of the closest joint above that is turned."""
         number = self.skeleton.number(joint)
         while (number := int(self.skeleton.parents[number])) >= 0:
@@ -134,7 +132,7 @@ class Retarget:
         return np.broadcast_to(np.eye(3), (len(self.motion), 3, 3))
 
     def _closest(self, joint: str, local: Float) -> Float:
-        axes, numbers, signs = self._turns(joint)
+        axes, numbers, signs = self.turns(joint)
         angles = np.zeros((3, len(local)))
         frames_last = np.ascontiguousarray(np.moveaxis(local, 0, -1))
         joint_angles(frames_last, len(axes), numbers[None], signs[None], angles)
@@ -144,20 +142,20 @@ class Retarget:
         """Joints with two freedoms: the bone's direction comes before its twist."""
         if joint not in self.aims:
             return
-        axes, *_ = self._turns(joint)
-        above = self._before(joint)
-        wanted = _in(above, self._direction(joint))
+        axes, *_ = self.turns(joint)
+        above = self.before(joint)
+        wanted = rotations.inside(above, self._direction(joint))
         start = self._closest(joint, np.swapaxes(above, 1, 2) @ self.wanted[joint])
         if bone is None:
-            bone = self._bone(joint, self.aims[joint])
+            bone = self.bone(joint, self.aims[joint])
         angles = aiming.aim(axes, start, bone, wanted, np.full(len(axes), LOOSE))
         self.wanted[joint] = above @ aiming.product(axes, angles)
 
     def _hinge(self, upper: str, lower: str) -> None:
         if self.aims.get(upper) != lower or lower not in self.aims:
             return
-        upper_bone, lower_bone = self._bone(upper, lower), self._bone(lower, self.aims[lower])
-        axes, *_ = self._turns(lower)
+        upper_bone, lower_bone = self.bone(upper, lower), self.bone(lower, self.aims[lower])
+        axes, *_ = self.turns(lower)
         if abs(axes[0] @ lower_bone) > abs(axes[1] @ lower_bone):
             self._swing(lower)  # a twist outside the flexion swings the bone anywhere by itself
             return
@@ -165,7 +163,9 @@ class Retarget:
         hinge = hinges.Hinge(upper_bone, lower_bone, axes[0], axes[1], 1.0 if sum(limits) > 0 else -1.0)
         frame = self.wanted[upper]
         local = np.swapaxes(frame, 1, 2) @ self.wanted[lower]
-        angles = hinges.solve(hinge, _in(frame, self._direction(lower)), local, float(self.motion.rate))
+        angles = hinges.solve(
+            hinge, rotations.inside(frame, self._direction(lower)), local, float(self.motion.rate)
+        )
         turn, bend = hinges.matrices(hinge, angles)
         self.wanted[upper] = frame @ turn
         self.wanted[lower] = self.wanted[upper] @ bend
@@ -181,12 +181,14 @@ class Retarget:
         centres = [self.skeleton.centres[self.skeleton.number(j)] for j in (inner, outer, shoulder)]
         length = float(np.linalg.norm(centres[2] - centres[0]))
         pieces = [(b - a) / length for a, b in pairwise(centres)]
-        axes = np.concatenate([self._turns(inner)[0], self._turns(outer)[0]])
-        above = self._before(inner)
+        axes = np.concatenate([self.turns(inner)[0], self.turns(outer)[0]])
+        above = self.before(inner)
         turn = self._closest(inner, np.swapaxes(above, 1, 2) @ self.wanted[inner])
         start = np.concatenate([turn * CLAVICLE_SHARE, turn * (1 - CLAVICLE_SHARE)], axis=1)
         own = turn.shape[1]
-        target = aiming.Target(((pieces[0], own), (pieces[1], len(axes))), _in(above, self._direction(inner)))
+        target = aiming.Target(
+            ((pieces[0], own), (pieces[1], len(axes))), rotations.inside(above, self._direction(inner))
+        )
         angles = aiming.aim_all(axes, start, (target,), np.full(len(axes), LOOSE))
         self.wanted[inner] = above @ aiming.product(axes[:own], angles[:, :own])
         self.wanted[outer] = self.wanted[inner] @ aiming.product(axes[own:], angles[:, own:])
@@ -196,7 +198,7 @@ class Retarget:
         elbow, wrist = f"{side}_elbow", f"{side}_wrist"
         if elbow not in self.wanted or wrist not in self.mapped or wrist not in self.skeleton:
             return
-        bone = self._bone(elbow, wrist)
+        bone = self.bone(elbow, wrist)
         twist = hinges.turn_about(np.swapaxes(self.wanted[elbow], 1, 2) @ self.wanted[wrist], bone)
         self.wanted[elbow] = self.wanted[elbow] @ rotations.turn(bone, FOREARM_SHARE * twist)
 
@@ -208,19 +210,19 @@ class Retarget:
             if joints:
                 self._swing(joints[0])
             return
-        above = self._before(joints[0])
+        above = self.before(joints[0])
         axes: list[Float] = []
         starts: list[Float] = []
         targets = []
         pieces: tuple[tuple[Float, int], ...]
         before = above
         for joint in joints:
-            own, *_ = self._turns(joint)
+            own, *_ = self.turns(joint)
             axes.extend(own)
             starts.append(self._closest(joint, np.swapaxes(before, 1, 2) @ self.wanted[joint]))
             before = self.wanted[joint]
-            pieces = ((self._bone(joint, self.aims[joint]), len(axes)),)
-            targets.append(aiming.Target(pieces, _in(above, self._direction(joint))))
+            pieces = ((self.bone(joint, self.aims[joint]), len(axes)),)
+            targets.append(aiming.Target(pieces, rotations.inside(above, self._direction(joint))))
         turned = np.array(axes)
         start = np.concatenate(starts, axis=1)
         angles = aiming.aim_all(turned, start, targets, np.full(len(turned), STIFF))
@@ -231,37 +233,6 @@ class Retarget:
             frame = frame @ aiming.product(turned[used : used + count], angles[:, used : used + count])
             self.wanted[joint] = frame
             used += count
-
-    def _foot(self, side: str) -> None:
-        """The ankle lacks the roll of the foot: the subtalar joint, a little lower, takes it."""
-        ankle, subtalar, toe = f"{side}_ankle", f"{side}_subtalar", f"{side}_metatarsal"
-        if ankle not in self.wanted or subtalar not in self.skeleton:
-            return
-        foot = self.feet.setdefault(side, self.wanted[ankle])
-        if self.aims.get(ankle) != toe:
-            self._split(ankle, subtalar, foot)
-            return
-        places = {j: self.skeleton.centres[self.skeleton.number(j)] for j in (ankle, subtalar, toe)}
-        heel, sole = places[subtalar] - places[ankle], places[toe] - places[subtalar]
-        direction = foot @ self._bone(ankle, toe)
-        for _ in range(FOOT_STEPS):  # what lies between the two joints turns with the ankle only
-            self._split(ankle, subtalar, foot)
-            foot = rotations.between_all(self.wanted[ankle] @ heel + foot @ sole, direction) @ foot
-        self._split(ankle, subtalar, foot)
-
-    def _split(self, ankle: str, subtalar: str, foot: Float) -> None:
-        """Both joints together take the foot's rotation: flexion, twisting and roll make any of them."""
-        above = self._before(ankle)
-        own = self._turns(ankle)[0]
-        axes = np.concatenate([own, self._turns(subtalar)[0]])
-        self.wanted[subtalar] = foot
-        handed = np.linalg.det(axes) if len(axes) == 3 else 0.0
-        if abs(handed) < 0.5:
-            return
-        last = _in(above, foot @ axes[2]) @ axes.T  # the last axis, as the foot turns it
-        outer = np.arctan2(-handed * last[:, 1], last[:, 2])
-        inner = np.arctan2(handed * last[:, 0], np.hypot(last[:, 1], last[:, 2]))
-        self.wanted[ankle] = above @ aiming.product(own, np.stack([outer, inner], axis=1))
 
     def _unit(self) -> float:
         """Metres of the body for one unit of the source."""
@@ -276,61 +247,6 @@ class Retarget:
             return 0.01
         return unit
 
-    def _stand(self, root: Float, floor: str, plant: bool) -> None:
-        """Raises root (T, 3) until feet stand as the source's do; plant: legs move for what is lacking."""
-        toes = "l_metatarsal" in self.mapped
-        rate = float(self.motion.rate)
-        source = feet.source_soles(
-            self.motion, self.mapped, self.upright, self.turned, self.places, self.scale
-        )
-        body = feet.body_soles(self.skeleton, self.wanted, root, toes)
-        if source is None or body is None:
-            return
-        middles = source.points.mean(axis=1)
-        level = ground.found(source.lowest, middles).under(middles)
-        above = source.lowest - level
-        under = np.zeros_like(level) if floor == "floor" else level
-        stiff = np.ones_like(above)
-        if plant and all(self.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):
-            pliant = np.array([legs.pliancy(self._leg(side, root)) for side in "lr"])
-            stiff = 1.1 - pliant
-            raised = feet.lift(above, body.lowest - under, stiff, rate)
-            whole, along = feet.slips(source.points, body.points, level, rate)
-            root[:, [0, 2]] += whole
-            ups = feet.heights(above, body.lowest - under + raised, rate)
-            for side, pitch in zip("lr", feet.pitches(body.points, ups), strict=True):
-                self.feet[side] = pitch @ self.feet[side]
-                self._foot(side)
-            for _ in range(ROUNDS):
-                body = feet.body_soles(self.skeleton, self.wanted, root, toes) or body
-                ups = feet.heights(above, body.lowest - under + raised, rate)
-                for side, up, course in zip("lr", ups, along, strict=True):
-                    self._move(side, root, np.stack([course[:, 0], up, course[:, 1]], axis=1))
-                along = np.zeros_like(along)
-            body = feet.body_soles(self.skeleton, self.wanted, root, toes) or body
-        root[:, 1] += feet.lift(above, body.lowest - under, stiff, rate)
-
-    def _move(self, side: str, root: Float, move: Float) -> None:
-        """A leg takes its foot elsewhere, by move (T, 3), metres."""
-        thigh, shank = legs.reach(self._leg(side, root), move)
-        self.wanted[f"{side}_hip"] = thigh @ self.wanted[f"{side}_hip"]
-        self.wanted[f"{side}_knee"] = shank @ self.wanted[f"{side}_knee"]
-        self._foot(side)
-
-    def _leg(self, side: str, root: Float) -> legs.Leg:
-        """Where the joints of a leg are."""
-        knee = f"{side}_knee"
-        found = {
-            name: (place, frame)
-            for name, place, frame in feet.followed(self.skeleton, self.wanted, root, f"{side}_ankle")
-        }
-        axes, *_ = self._turns(knee)
-        bone = self._bone(knee, f"{side}_ankle")
-        outermost = abs(axes[0] @ bone) < abs(axes[-1] @ bone)
-        axis = found[f"{side}_hip"][1] @ axes[0] if outermost else found[knee][1] @ axes[-1]
-        hip, middle, ankle = (found[f"{side}_{joint}"][0] for joint in ("hip", "knee", "ankle"))
-        return legs.Leg(hip, middle, ankle, axis)
-
     def _root_places(self) -> Float:
         """(T, 3): where the root must be for the middle of the hips to be where the source's is."""
         centres, number = self.skeleton.centres, self.skeleton.number
@@ -344,9 +260,3 @@ class Retarget:
             return place
         start: Float = self.places[:, self.mapped["HumanoidRoot"]] * self.scale
         return start
-
-
-def _in(frame: Float, direction: Float) -> Float:
-    """World directions (T, 3) as seen in frames (T, 3, 3)."""
-    result: Float = np.einsum("tji,tj->ti", frame, direction)
-    return result

@@ -121,3 +121,9 @@ def between_all(start: Float, end: Float) -> Float:
     angle = np.arctan2(sine, np.sum(a * b, axis=-1))
     axis = np.where(sine[..., None] > 1e-12, axis / np.maximum(sine, 1e-300)[..., None], [1.0, 0.0, 0.0])
     return turn(axis, angle)
+
+
+def inside(frame: Float, direction: Float) -> Float:
+    """World directions (T, 3) as seen in frames (T, 3, 3)."""
+    result: Float = np.einsum("tji,tj->ti", frame, direction)
+    return result
