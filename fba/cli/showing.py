@@ -16,7 +16,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FbaError, FbaWarning, FormatError
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
@@ -130,7 +130,13 @@ def _spooled(
             file.write(head)
             while chunk := source.read(1 << 20):
                 file.write(chunk)
-        animation = options.read_input(path, bap_steps=bap_steps, header_fps=fps, name=name, salvage=salvage)
+        try:
+            animation = options.read_input(
+                path, bap_steps=bap_steps, header_fps=fps, name=name, salvage=salvage
+            )
+        except FbaError as error:
+            error.args = (str(error).replace(str(path), name),)  # nobody knows that file
+            raise
     if animation.name != path.name:
         return animation
     return Animation(animation.rate, animation.index, animation.face, animation.body, name)

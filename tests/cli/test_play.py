@@ -230,6 +230,10 @@ def test_nothing_on_standard_input(run: Run, window: Window, monkeypatch: pytest
     rubbish = run("play", "-")
     assert rubbish.code == 1
     assert "plane" in rubbish.err
+    pipe_in(monkeypatch, b"neither numbers nor bits\n")
+    words = run("play", "-")
+    assert words.code == 1
+    assert "error: standard input: is in no format known here" in words.err
     pipe_in(monkeypatch, b"", terminal=True)
     keyboard = run("play", "-")
     assert (keyboard.code, "keyboard" in keyboard.err) == (2, True)
