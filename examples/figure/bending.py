@@ -20,16 +20,18 @@ HINGES = (
 skin changes from one to the other, on the side that folds and on that which stretches."""
 LIMB = 0.06
 """Metres from the bone to the skin, about."""
-ARMHOLE = (0.050, 0.060)
+ARMHOLE = (0.026, 0.060)
 """Metres to both sides of where a sleeve is set in, over which skin changes from trunk to arm: at the armpit,
 and at the top."""
-SET = (-0.005, 0.030)
+SET = (0.020, 0.030)
 """Metres out from the shoulder where that is."""
 BEHIND = 0.022
 """How much further out it is at the back of the armpit, which an arm in front would carry downwards."""
+PIT = (-0.01, -0.13, 0.01)
+"""Where the armpit is, from the left shoulder."""
 ARMPIT = (-0.24, -0.12)
 """Heights from the shoulder between which the side of the trunk comes to go with the arm at all."""
-BLADE = (-0.20, -0.06)
+BLADE = (-0.13, -0.01)
 """Heights from the shoulder between which the trunk comes to go with the blade."""
 EASED = 10
 """How often the weights of trunk, arms and legs are drawn to those of their neighbours."""
@@ -56,6 +58,9 @@ def evened(person: Person, places: dict[str, Float64], weights: Float64) -> Floa
     body = np.linalg.norm(person.vertices[:, None] - [places[f"{s}_wrist"] for s in "lr"], axis=2).min(axis=1)
     free = _smooth((body - 0.12) / 0.08) * _smooth((1.45 - person.vertices[:, 1]) / 0.06)
     free *= _smooth((person.vertices[:, 1] - 0.14) / 0.06)
+    for side in "lr":  # an armpit keeps its fold
+        pit = places[f"{side}_shoulder"] + np.array(PIT) * (1 if side == "l" else -1, 1, 1)
+        free *= 1 - 0.7 * np.exp(-((np.linalg.norm(person.vertices - pit, axis=1) / 0.06) ** 2))
     mesh = Cloth(person.vertices, person.vertices, weights, weights, person.triangles)
     return mesh.smoothed(weights, free, EASED)
 

@@ -59,7 +59,7 @@ class Skinner:
         self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
         self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
         self._twists = twists(skeleton, bind, self._modelled, self._joints, self._weights)
-        self._girdle = girdle(skeleton, bind)
+        self._girdle = girdle(skeleton, bind, self._modelled, self._joints, self._weights)
         self._wrung = self._vertices.copy()
         faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
         self._around, self._numbers = rings(self._modelled, self._upright_modelled, faces)

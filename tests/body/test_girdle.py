@@ -127,3 +127,20 @@ def test_the_built_in_person_has_no_notch_with_raised_arms() -> None:
         tops.append(at[near, 1].max())
     fall = np.maximum.accumulate(tops) - tops
     assert fall.max() < 0.015
+
+
+def test_an_armpit_is_stretched_straight() -> None:
+    """Between ribs and arm, 10 cm below the shoulder: seven tenths of the way from the arc to the chord."""
+    whole = half("l")
+    dots = whole.parts[0]
+    vertices, joints, weights = dots.vertices.copy(), dots.joints.copy(), dots.weights.copy()
+    vertices[TRUNK] = whole.bind[SHOULDER, :3, 3] - (0, 0.1, 0)
+    joints[TRUNK] = (TRUNK, SHOULDER, 0, 0)
+    weights[TRUNK] = (0.5, 0.5, 0, 0)
+    part = BodyPart("dots", "skin", vertices, dots.triangles, joints, weights)
+    body = BodyModel((part,), whole.skeleton, whole.bind)
+    shoulder, dot = body.bind[SHOULDER, :3, 3], vertices[TRUNK].astype(np.float64)
+    full, halfway = (Rotation.from_euler("z", angle, degrees=True) for angle in (120, 60))
+    arc, chord = about(shoulder, halfway, dot), (dot + about(shoulder, full, dot)) / 2
+    found = body.skin(posed(body, {SHOULDER: full}))[TRUNK]
+    np.testing.assert_allclose(found, 0.3 * arc + 0.7 * chord, atol=2e-6)
