@@ -70,6 +70,7 @@ class Scene:
         self._person: Person | None = None
         self._dressing: Dressing | None = None
         self._extent: Extent | None = None
+        self._fitted = 0  # frames there were when the extent was looked up
         if animation.body is not None:
             from fba.body import BapSolver
             from fba.body.model import BodyModel
@@ -259,8 +260,9 @@ class Scene:
         return np.eye(4) if joints is None else self.person.frame(joints)
 
     def _framed(self) -> Extent:
-        if self._extent is None:
-            frames = self.timeline.frames
+        frames = self.timeline.frames
+        if self._extent is None or frames >= 2 * self._fitted:  # much more of a stream has arrived
+            self._fitted = frames
             chosen = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in chosen])
             self._extent = body_extent(self._solver.pose(baps)[:, :, :3, 3], self._skeleton.names)

@@ -232,6 +232,20 @@ def test_a_scene_of_a_stream_is_the_scene_of_its_file(wire: Wire) -> None:
         np.testing.assert_allclose(one.positions, other.positions, atol=1e-6)
 
 
+def test_the_camera_follows_who_walks_away_later(wire: Wire) -> None:
+    steps = [{183: 0 if t < 20 else 100 * (t - 20)} for t in range(100)]  # BAP 183: forwards, mm
+    data, ends = stream(Animation(Fraction(25), np.arange(100), body=body_track(steps)))
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[19]])
+    assert live.wait(20)
+    scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
+    assert scene.travel(0.5) == (0.0, 0.0, 0.0)
+    wire.send(data[ends[19] :])
+    wire.end()
+    until(lambda: not live.growing)
+    assert scene.travel(3.96)[2] == pytest.approx(7.9, abs=0.3)
+
+
 def test_closing_ends_it_though_the_sender_goes_on(wire: Wire) -> None:
     data, ends = stream(performance(100))
     live = LiveAnimation(wire.out)
