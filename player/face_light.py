@@ -55,7 +55,7 @@ class FaceLight:
         self._deformer = deformer
         self._sway = sway
         self._baked: _Baked | None = None
-        self._lit: tuple[tuple[float, ...], Float32] | None = None
+        self._lit: tuple[tuple[object, ...], Float32] | None = None
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
         self._teeth = [self._rows(part) for part in model.of_kind("teeth")]
@@ -84,7 +84,7 @@ class FaceLight:
             basis = np.concatenate([_basis(turned), _basis(still)]).astype(np.float32)
             bent = not np.array_equal(turned, still)
             shut, wide = self._baked.shut, self._baked.wide
-            _reaching(*shut.arrays, *wide.arrays, np.float32(share), basis, self._sway, bent, light)
+            _reaching(*shut.arrays, *wide.arrays, share, basis, self._sway, bent, light)
             for rows in self._teeth:  # as a photographer would have it
                 light[rows, :2] += (1 - light[rows, :2]) * np.float32(ON_TEETH * share)
             for rows, outside in zip(self._tongues, out, strict=True):

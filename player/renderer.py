@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from player.camera import Camera
+from player.cast_shadow import ShadowCaster
 from player.detail import Details
 from player.extent import Steps, steps
 from player.extras_renderer import ExtrasRenderer
@@ -40,7 +41,8 @@ class Renderer:
     def __init__(self, context: Any) -> None:
         self._gl = context
         self._programs = {
-            name: load_program(context, name) for name in ("mesh", "capsule", "eye", "studio", "shadow")
+            name: load_program(context, name)
+            for name in ("mesh", "capsule", "eye", "studio", "shadow", "cast")
         }
         self._faces = FaceRenderer(context)
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
@@ -51,6 +53,9 @@ class Renderer:
         self._shadow = context.vertex_array(
             self._programs["shadow"], [(self._square, "2f", "in_corner"), (self._blobs, "4f/i", "in_blob")]
         )
+        self._caster = ShadowCaster()
+        self._cast = context.vertex_array(self._programs["cast"], [(self._square, "2f", "in_corner")])
+        self._darkness: Any = None
         self._backdrop: tuple[tuple[object, ...], Any, Any] | None = None
         self._studio = context.vertex_array(
             self._programs["studio"], [(self._studio_buffer, "2f", "in_corner")]
@@ -86,7 +91,7 @@ class Renderer:
             set_uniform(program, "eye", eye)
             set_uniform(program, "camera", matrix_bytes(matrix))
             set_uniform(program, "pixel", pixel)
-        self._draw_studio(view, matrix, size)
+        self._draw_studio(view, matrix, size, (float(camera.target[0]), float(camera.target[2])))
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
             self._draw_mesh(mesh)
@@ -109,6 +114,9 @@ class Renderer:
                 part.release()
         self._shapes.clear()
         self._faces.close()
+        if self._darkness is not None:
+            self._darkness.release()
+        self._cast.release()
         self._extras.close()
         for part in (
             *(self._backdrop[:0:-1] if self._backdrop else ()), self._shadow, self._square, self._blobs,
@@ -132,24 +140,25 @@ class Renderer:
             index_buffer=self._capsule_parts[1],
         )
 
-    def _draw_studio(self, view: View, matrix: npt.NDArray[np.float64], size: tuple[int, int]) -> None:
-        """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs."""
+    def _draw_studio(
+        self, view: View, matrix: npt.NDArray[np.float64], size: tuple[int, int], centre: tuple[float, float]
+    ) -> None:
+        """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs. centre: x
+        and z of where the ground is brightest."""
         gl = self._gl
         if view.background is not None:
             gl.clear(*view.background, 1.0, depth=1.0)
             self._draw_shadows(view)
             return
         target = gl.fbo
-        blobs = view.blobs[:MOST_BLOBS]
-        middle = np.round(blobs[:, :2].mean(axis=0), 1) if len(blobs) else np.zeros(2)
-        key = (size, view.ground, matrix.tobytes(), *middle)
+        key = (size, view.ground, matrix.tobytes(), centre)
         if self._backdrop is None or self._backdrop[0] != key:
             texture, kept = self._kept_backdrop(size)
             self._backdrop = (key, texture, kept)
             program = self._programs["studio"]
             set_uniform(program, "unproject", matrix_bytes(np.linalg.inv(matrix)))
             set_uniform(program, "ground", 1.0 if view.ground else 0.0)
-            set_uniform(program, "centre", (float(middle[0]), float(middle[1])))
+            set_uniform(program, "centre", centre)
             kept.use()
             gl.viewport = (0, 0, *size)
             gl.enable_only(gl.NOTHING)
@@ -163,11 +172,28 @@ class Renderer:
         """Soft shadows on the ground."""
         gl = self._gl
         blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
-        if view.ground and len(blobs):
+        if not view.ground or not len(blobs):
+            return
+        gl.enable_only(gl.BLEND)
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+        middle = blobs[:, :2].mean(axis=0)
+        cast = self._caster.cast(view.faces, (float(middle[0]), float(middle[1]))) if view.faces else None
+        if cast is None:
             self._blobs.write(blobs)
-            gl.enable_only(gl.BLEND)
-            gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
             self._shadow.render(gl.TRIANGLE_STRIP, instances=len(blobs))
+            return
+        height, width = cast.darkness.shape
+        if self._darkness is None or self._darkness.size != (width, height):
+            if self._darkness is not None:
+                self._darkness.release()
+            self._darkness = gl.texture((width, height), 1, alignment=1)
+            self._darkness.filter = (gl.LINEAR, gl.LINEAR)
+            self._darkness.repeat_x = self._darkness.repeat_y = False
+        self._darkness.write(np.ascontiguousarray(cast.darkness), alignment=1)
+        self._darkness.use(0)
+        set_uniform(self._programs["cast"], "low", cast.low)
+        set_uniform(self._programs["cast"], "high", cast.high)
+        self._cast.render(gl.TRIANGLE_STRIP)
 
     def _kept_backdrop(self, size: tuple[int, int]) -> tuple[Any, Any]:
         if self._backdrop is not None:
