@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 import time as wall
 from collections.abc import Callable
+from typing import Protocol
 
 from player.motion import Motion
-from player.timeline import Timeline
+from player.showable import Times
 from player.times import clock_text, timecode
 
 SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
@@ -20,6 +21,21 @@ BUFFER = 0.25
 """Seconds of a stream that still arrives which must be there before it plays, and plays on after a gap."""
 AT_ONCE = 0.1
 """A mark set so shortly (s) before where the player is was meant to be there."""
+
+
+class Played(Times, Protocol):
+    """The frames of a performance that is played."""
+
+    interpolate: bool
+    """Whether what is shown between two frames lies between them."""
+
+    @property
+    def growing(self) -> bool:
+        """Whether more frames may arrive."""
+
+    @property
+    def arrived(self) -> int:
+        """Changes whenever some did, and when no more will."""
 
 
 class Transport:
@@ -38,7 +54,7 @@ class Transport:
     """
 
     def __init__(
-        self, timeline: Timeline, *, loop: bool = True, clock: Callable[[], float] = wall.monotonic
+        self, timeline: Played, *, loop: bool = True, clock: Callable[[], float] = wall.monotonic
     ) -> None:
         self._timeline = timeline
         self._clock = clock
