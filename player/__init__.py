@@ -14,9 +14,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from player.audio import Audio, open_audio
     from player.camera import Camera, Subject
+    from player.compare import CompareScene
     from player.contact_sheet import contact_sheet
     from player.film_sheet import film_sheet
+    from player.live import LiveAnimation, LiveTimeline
     from player.notebook import Preview
     from player.offscreen import Offscreen
     from player.pyrender_bridge import to_pyrender
@@ -29,7 +32,11 @@ if TYPE_CHECKING:
     from player.window import play
 
 _PLACES = {
+    "Audio": "player.audio",
     "Camera": "player.camera",
+    "CompareScene": "player.compare",
+    "LiveAnimation": "player.live",
+    "LiveTimeline": "player.live",
     "Offscreen": "player.offscreen",
     "Preview": "player.notebook",
     "Recorder": "player.recorder",
@@ -41,6 +48,7 @@ _PLACES = {
     "contact_sheet": "player.contact_sheet",
     "default_camera": "player.scene",
     "film_sheet": "player.film_sheet",
+    "open_audio": "player.audio",
     "play": "player.window",
     "record": "player.recording",
     "render": "player.recording",
@@ -48,7 +56,11 @@ _PLACES = {
 }
 
 __all__ = [
+    "Audio",
     "Camera",
+    "CompareScene",
+    "LiveAnimation",
+    "LiveTimeline",
     "Offscreen",
     "Preview",
     "Recorder",
@@ -60,6 +72,7 @@ __all__ = [
     "contact_sheet",
     "default_camera",
     "film_sheet",
+    "open_audio",
     "play",
     "record",
     "render",
