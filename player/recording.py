@@ -81,7 +81,7 @@ def render(
             scene, path, fps=fps, size=size, camera=camera, start=start, end=end, audio=audio,
             transparent=transparent, replace=replace, progress=progress,
         )  # fmt: skip
-    transparent = transparent or _clear(scene, path)
+    transparent = transparent or _clear(scene)
     check_picture(target, transparent=transparent)
     if fps is not None or end is not None or (start is not None and time is not None):
         raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
@@ -119,7 +119,7 @@ def record(
     shown = as_scene(scene)
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     gif, numbered = suffix == ".gif", is_sequence(path)
-    transparent = transparent or (numbered and _clear(shown, path))
+    transparent = transparent or _clear(shown)
     if transparent and not numbered:
         raise UnsupportedError(
             f"{path}: a film cannot be transparent; write numbered pictures, frames/%05d.png",
@@ -197,10 +197,9 @@ def _check_name(path: PathLike) -> None:
         )
 
 
-def _clear(scene: Any, path: PathLike) -> bool:
-    """Whether the scene is switched to no background, and a picture of that name can have none."""
-    jpeg = os.fspath(path).lower().endswith((".jpg", ".jpeg"))
-    return not jpeg and scene.switches["background"] == "transparent"
+def _clear(scene: Showable) -> bool:
+    """Whether the scene is switched to no background."""
+    return scene.switches["background"] == "transparent"
 
 
 @contextmanager

@@ -124,3 +124,5 @@ class TestDrawn:
             render(talking, tmp_path / "a.jpg", size=SMALL, transparent=True)
         with pytest.raises(UnsupportedError, match="numbered pictures"):
             render(talking, tmp_path / "a.mp4", size=SMALL, transparent=True)
+        with pytest.raises(UnsupportedError, match="numbered pictures"):
+            render(scene, tmp_path / "a.gif", size=SMALL)
