@@ -24,7 +24,7 @@ Int32 = npt.NDArray[np.int32]
 
 CELLS, CELL = 96, 0.05
 """The grid: so many squares each way, of this size (m)."""
-SPACING = 0.042
+SPACING = 0.036
 """Metres between the points."""
 WITHIN = ("teeth", "tongue", "mouth", "eye")
 """Kinds of parts that lie within others."""
@@ -190,18 +190,22 @@ def _throw(
             facing = nx * rays[ray, 0] + ny * rays[ray, 1] + nz * rays[ray, 2]
             if facing <= 0.0:
                 continue
-            down = y / rays[ray, 1]
-            column = (x - rays[ray, 0] * down - low_x) / CELL - 0.5
-            row = (z - rays[ray, 2] * down - low_z) / CELL - 0.5
+            fall = y / rays[ray, 1]
+            column = (x - rays[ray, 0] * fall - low_x) / CELL - 0.5
+            row = (z - rays[ray, 2] * fall - low_z) / CELL - 0.5
             if not (1.0 <= column < cells - 2.0 and 1.0 <= row < cells - 2.0):
                 continue
-            left, bottom = int(column), int(row)
-            fx, fy = column - left, row - bottom
+            # Over three cells each way, as a quadratic spline spreads it: the points are not quite even.
+            middle, centre = int(column + 0.5), int(row + 0.5)
+            fx, fy = column - middle, row - centre
             amount = piece * facing / rays[ray, 1]
-            layers[ray, bottom, left] += np.float32(amount * (1.0 - fx) * (1.0 - fy))
-            layers[ray, bottom, left + 1] += np.float32(amount * fx * (1.0 - fy))
-            layers[ray, bottom + 1, left] += np.float32(amount * (1.0 - fx) * fy)
-            layers[ray, bottom + 1, left + 1] += np.float32(amount * fx * fy)
+            for k in range(3):
+                down = 0.75 - fy * fy if k == 1 else 0.5 * (0.5 + (fy if k == 2 else -fy)) ** 2
+                down *= amount
+                line = layers[ray, centre + k - 1]
+                line[middle - 1] += np.float32(down * 0.5 * (0.5 - fx) ** 2)
+                line[middle] += np.float32(down * (0.75 - fx * fx))
+                line[middle + 1] += np.float32(down * 0.5 * (0.5 + fx) ** 2)
 
 
 @compiled
