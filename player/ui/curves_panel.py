@@ -15,7 +15,7 @@ from player.ui.panel import Panel, tooltip
 from player.ui.session import Session
 from player.ui.stretch import Stretch
 
-BEGINS_WITH = 4
+BEGINS_WITH = 3
 """Curves that are there at first: those that move most."""
 MOVERS = 8
 
@@ -25,7 +25,7 @@ class CurvesPanel(Panel):
 
     name, title, label = "curves", "Curves", "Curves"
     side = "left"
-    width, height = 430.0, 348.0
+    width, height = 430.0, 276.0
 
     def __init__(self) -> None:
         self._columns: Columns | None = None

@@ -42,10 +42,10 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
     places = np.r_[places[1:] - 1, columns - 1]
     kept = starts < last
     starts, places = starts[kept], places[kept]
-    part = values[: int(last)]
-    least, largest = np.minimum.reduceat(part, starts), np.maximum.reduceat(part, starts)
+    seen = values[: int(last)]
+    least, largest = np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)
     any_sent = np.logical_or.reduceat(sent[: int(last)], starts)
     # there and back, so that neighbours are joined
     up = (np.arange(len(starts)) % 2).astype(bool)
-    pairs = np.where(up[:, None], np.c_[largest, least], np.c_[least, largest])
+    pairs = np.where(up, [largest, least], [least, largest]).T
     return Envelope(np.repeat((places + 0.5) / columns, 2), pairs.ravel(), np.repeat(any_sent, 2))

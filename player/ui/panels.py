@@ -8,6 +8,8 @@ from player.ui.differences_panel import DifferencesPanel
 from player.ui.file_panel import FilePanel
 from player.ui.help_panel import HelpPanel
 from player.ui.panel import Panel
+from player.ui.puppet_panel import PuppetPanel
+from player.ui.rate_panel import RatePanel
 from player.ui.view_panel import ViewPanel
 
 PANELS: tuple[type[Panel], ...] = (
@@ -15,6 +17,8 @@ PANELS: tuple[type[Panel], ...] = (
     ViewPanel,
     CameraPanel,
     CurvesPanel,
+    RatePanel,
+    PuppetPanel,
     DifferencesPanel,
     HelpPanel,
 )

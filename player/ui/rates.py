@@ -1,0 +1,94 @@
+"""Bit rates of a stream over time, and what its planes take together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.codec import StreamInfo
+
+Float64 = npt.NDArray[np.float64]
+
+WINDOW = 1.0
+"""Seconds over which a rate is taken."""
+MOST_VALUES = 3_000_000
+"""Values that are encoded only to see what they would take: well under a second."""
+
+
+@dataclass(frozen=True)
+class Total:
+    """Planes of a kind together. planes: None for bits that belong to none. share: of all bits."""
+
+    name: str
+    planes: int | None
+    bits: int
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """What a stream takes.
+
+    times: seconds of the planes (T,). bits, intra (T,): of each. rate: kbit/s (N,) in the second that ends
+    with each of the last N planes; those before have no whole second behind them. totals: I planes, P planes
+    and what is around them. mean: kbit/s.
+    """
+
+    times: Float64
+    bits: Float64
+    intra: npt.NDArray[np.bool_]
+    rate: Float64
+    totals: tuple[Total, ...]
+    mean: float
+
+
+def rates(info: StreamInfo) -> Rates | None:
+    """Of a stream; None where there are no planes."""
+    if info.plane_bits is None or info.plane_intra is None or info.frame_index is None or not info.frames:
+        return None
+    times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
+    bits, intra = info.plane_bits.astype(np.float64), info.plane_intra
+    until = np.r_[0.0, np.cumsum(bits)]
+    before = np.searchsorted(times, times - WINDOW + 1e-9, side="left")
+    rate = (until[1:] - until[before]) / WINDOW / 1000
+    first = min(int(np.searchsorted(times, times[0] + WINDOW - 1 / float(info.rate) - 1e-9)), len(times) - 1)
+    whole = max(8 * info.size, int(bits.sum()), 1)
+    rows = [
+        Total(name, int(chosen.sum()), int(bits[chosen].sum()), float(bits[chosen].sum()) / whole)
+        for name, chosen in (("I planes", intra), ("P planes", ~intra))
+    ]
+    rest = 8 * info.size - int(bits.sum())
+    if rest > 0:
+        rows.append(Total("around them", None, rest, rest / whole))
+    return Rates(times, bits, intra, rate[first:], tuple(rows), info.bits_per_second / 1000)
+
+
+def encoded(animation: Animation) -> StreamInfo | None:
+    """What a performance would be as a stream; None where it is long, or where no stream holds its values."""
+    tracks = [track for track in (animation.face, animation.body) if track is not None]
+    if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MOST_VALUES:
+        return None
+    from fba.codec import encode, probe_stream
+    from fba.errors import FbaError
+
+    try:
+        return probe_stream(encode(animation))
+    except (FbaError, ValueError):
+        return None
+
+
+def columns(times: Float64, bits: Float64, intra: npt.NDArray[np.bool_], low: float, high: float,
+            count: int) -> tuple[Float64, npt.NDArray[np.bool_]]:  # fmt: skip
+    """(count,) the largest plane in each of so many equal parts of a time, 0 for none, and whether it has an
+    I plane."""
+    tall, key = np.zeros(count), np.zeros(count, bool)
+    if not high > low:
+        return tall, key
+    seen = (times >= low - 1e-9) & (times <= high + 1e-9)
+    places = np.clip(((times[seen] - low) / (high - low) * count).astype(int), 0, count - 1)
+    np.maximum.at(tall, places, bits[seen])
+    key[places[intra[seen]]] = True
+    return tall, key
