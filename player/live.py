@@ -128,6 +128,11 @@ class LiveAnimation:
             self._frames.settle()
         return True
 
+    def wait_end(self, timeout: float | None = None) -> bool:
+        """Wait until all has arrived. False where time, seconds, ran out before."""
+        with self._news:
+            return self._news.wait_for(lambda: not self.growing, timeout)
+
     def close(self) -> None:
         """Take in nothing more; the thread ends with the next bytes."""
         self._closing = True

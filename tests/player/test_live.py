@@ -213,9 +213,10 @@ def test_bytes_that_were_looked_at_before_count(wire: Wire) -> None:
     data, _ = stream(animation)
     live = LiveAnimation(wire.out, head=data[:7])
     wire.send(data[7:])
+    assert not live.wait_end(0.0)
     wire.end()
-    assert live.wait(20)
-    until(lambda: not live.growing)
+    assert live.wait_end(20)
+    assert live.wait()
     assert len(live) == 30
 
 
