@@ -36,6 +36,7 @@ class Studio:
         self._target: Target | None = None
         self._renderer: Renderer | None = None
         self._screen: Any = None
+        self._colour: Any = None
         try:
             with self._gl:
                 self._renderer = Renderer(self._gl)
@@ -70,8 +71,7 @@ class Studio:
             for part in (getattr(self, "gui", None), self._renderer, self._target):
                 if part is not None:
                     part.close()
-            if self._screen is not None:
-                self._screen.release()
+            self._release_screen()
         self._gl.release()
         self._gl = None
 
@@ -93,9 +93,16 @@ class Studio:
     def _resize(self) -> None:
         if self._target is not None:
             self._target.close()
-            self._screen.release()
+        self._release_screen()
         self._target = Target(self._gl, self.session.size, samples=0)
-        self._screen = self._gl.simple_framebuffer(self.session.size)
+        self._colour = self._gl.renderbuffer(self.session.size, 4)
+        self._screen = self._gl.framebuffer([self._colour])
+
+    def _release_screen(self) -> None:
+        if self._screen is not None:
+            self._screen.release()
+            self._colour.release()
+            self._screen = None
 
 
 def picture(session: Session, panels: tuple[str, ...] = ()) -> UInt8:

@@ -224,6 +224,14 @@ def test_resizing_while_playing(window: Window, hand: Hand) -> None:
     assert window.transport.playing
 
 
+def test_full_screen_and_back(window: Window, hand: Hand) -> None:
+    hand.key("f", lambda: window.session.size == (1000, 800))
+    settle(window)
+    assert shown(window).shape == (800, 1000, 3)
+    assert window._gui.bar.place[2] == 1000 - 18
+    hand.key("F11", lambda: window.session.size == (900, 600))
+
+
 def test_the_window_is_closed_by_its_key(window: Window, hand: Hand) -> None:
     hand.do("key", "Escape")
     for _ in range(200):
