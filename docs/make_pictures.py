@@ -23,6 +23,8 @@ IMAGES = Path(__file__).with_name("images")
 SAMPLES = Path(fba.__file__).with_name("samples")
 MOMENTS = (1.9, 2.6, 4.4, 6.6)
 """Seconds of the sample performance that the first picture shows."""
+SWITCHED = 2.6
+"""Seconds of it that the picture of switches shows."""
 FACES = (
     # yaw and pitch of the camera, degrees; expression with its intensity, or 0; FAPs on top
     (-28.0, 2.0, 0, 0, {}),
@@ -94,11 +96,33 @@ def fitted() -> Image.Image:
     return Image.fromarray(np.concatenate([strip(pictures[:columns]), strip(pictures[columns:])]))
 
 
+def switches() -> UInt8:
+    """Six switches of the player, two rows."""
+    animation = performance()
+    face = player.Scene(Animation(animation.rate, animation.index, animation.face))
+    whole = player.Scene(animation)
+    shown: list[UInt8] = []
+    for scene, name, value, size in (
+        (face, "wireframe", True, (400, 440)),
+        (face, "points", True, (400, 440)),
+        (face, "influence", "open_jaw", (400, 440)),
+        (whole, "skeleton", "through", (400, 440)),
+        (whole, "grid", True, (400, 440)),
+        (face, "normals", True, (400, 440)),
+    ):
+        scene.show(name, value)
+        with player.Offscreen(scene, size, "body" if scene is whole else "three-quarter", samples=4) as view:
+            shown.append(view.frame(SWITCHED))
+        scene.show(name, False)
+    return np.concatenate([strip(shown[:3]), strip(shown[3:])])
+
+
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
     fitted().save(IMAGES / "fitted.jpg", quality=88)
     Image.fromarray(hello()).save(IMAGES / "hello.png", optimize=True)
     write_picture(IMAGES / "faces.jpg", faces())
+    write_picture(IMAGES / "switches.jpg", switches())
     write_picture(IMAGES / "expressions.jpg", player.contact_sheet("expressions", tile=(320, 320)))
     write_picture(IMAGES / "visemes.jpg", player.contact_sheet("visemes", tile=(200, 200)))
     write_picture(IMAGES / "faps.jpg", player.contact_sheet("faps", tile=(150, 150)))
