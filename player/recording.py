@@ -17,7 +17,7 @@ from player.offscreen import Offscreen
 from player.picture_files import PICTURES, check_picture, write_picture
 from player.recorder import FILMS, Recorder, exact_rate
 from player.scene import Scene
-from player.sequence import Numbered, Sequence, is_sequence
+from player.sequence import Numbered, Sequence, is_film, is_sequence
 from player.showable import Showable
 from player.whole import PathLike
 
@@ -180,11 +180,6 @@ def film_rate(rate: Fraction) -> Fraction:
     if rate < low:
         return rate * math.ceil(low / rate)
     return rate / math.ceil(rate / high)
-
-
-def is_film(path: PathLike) -> bool:
-    """Whether a name means many pictures: a film, or numbered ones."""
-    return os.path.splitext(os.fspath(path))[1].lower() in FILMS or is_sequence(path)
 
 
 def _check_name(path: PathLike) -> None:

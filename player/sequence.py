@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from fba.errors import FormatError, UnsupportedError
 from player.picture_files import QUICK, check_picture, write_picture
+from player.recorder import FILMS
 from player.whole import PathLike, cannot
 
 UInt8 = npt.NDArray[np.uint8]
@@ -68,6 +69,11 @@ def is_sequence(path: PathLike) -> bool:
     """Whether a name means numbered pictures: it has a % in its last part, or ends with a slash."""
     text = os.fspath(path)
     return text.endswith(("/", os.sep)) or "%" in os.path.basename(text)
+
+
+def is_film(path: PathLike) -> bool:
+    """Whether a name means many pictures: a film, or numbered ones."""
+    return os.path.splitext(os.fspath(path))[1].lower() in FILMS or is_sequence(path)
 
 
 class Sequence:

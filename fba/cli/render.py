@@ -150,7 +150,7 @@ def command(
 
     Needs OpenGL through EGL, but no display.
     """
-    from player.recording import is_film
+    from player.sequence import is_film
 
     given = [name for name, value in (("--fap", faps), ("--viseme", visemes), ("--expression", expressions),
                                       ("--contact-sheet", isinstance(sheet, str))) if value]  # fmt: skip
