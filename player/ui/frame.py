@@ -146,7 +146,8 @@ class Places:
         next_free: dict[tuple[str, int], float],
     ) -> tuple[float, float]:
         """The first place in the columns of its side with room for it, else over the last column."""
-        high = min(self._sizes.get(panel.name, (wide, panel.height or 120.0))[1], room)
+        opens = min(panel.height or 120.0, room * panel.share)
+        high = min(self._sizes.get(panel.name, (wide, opens))[1], room)
         if panel.name in self._moved:
             return 0.0, 0.0
         if panel.side == "middle":
@@ -175,7 +176,7 @@ class Places:
         wide, high = room
         flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_collapse
         if panel.height:
-            imgui.set_next_window_size((wide, min(panel.height, high)), imgui.Cond_.appearing)
+            imgui.set_next_window_size((wide, min(panel.height, high * panel.share)), imgui.Cond_.appearing)
             imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], high))
         else:
             flags |= imgui.WindowFlags_.always_auto_resize

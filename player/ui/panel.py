@@ -17,7 +17,9 @@ class Panel:
 
     name: in the table of keys ("panel NAME" is its action) and in `Session.open`. title: for people. label:
     on its button above the picture. side: "right", "left" or "middle", where it opens. width, height: points;
-    height 0 for as much as it needs. One object of each panel lives as long as the window.
+    height 0 for as much as it needs. share: of the room above the timeline, what it takes at most when it
+    opens, so that those which are looked at together fit. One object of each panel lives as long as the
+    window.
     """
 
     name: ClassVar[str]
@@ -26,6 +28,7 @@ class Panel:
     side: ClassVar[str] = "right"
     width: ClassVar[float] = 300.0
     height: ClassVar[float] = 0.0
+    share: ClassVar[float] = 1.0
 
     def draw(self, session: Session) -> None:
         """Draw the content with imgui; called for each picture while the panel is open."""

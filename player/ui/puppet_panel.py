@@ -13,15 +13,15 @@ from player.ui.panel import Panel, heading, tooltip
 from player.ui.puppet_rows import Group, Row, groups
 from player.ui.session import Session
 
-TITLE, RELEASE = 146.0, 18.0
-"""Points that a row's name takes, and the button that gives it back."""
+TITLE, VALUE, RELEASE = 140.0, 68.0, 18.0
+"""Points that a row's name takes, its value, and the button that gives it back."""
 
 
 class PuppetPanel(Panel):
     """Sliders for FAPs, visemes, expressions and the body; takes of what they do."""
 
     name, title, label = "puppet", "Puppeteer", "Puppet"
-    width, height = 348.0, 530.0
+    width, height = 372.0, 530.0
 
     def __init__(self) -> None:
         self._performer: Performer | None = None
@@ -165,13 +165,14 @@ class PuppetPanel(Panel):
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if touched else theme.FAINT, title)
         imgui.same_line(TITLE)
-        wide = imgui.get_content_region_avail().x - RELEASE
+        right = x + imgui.get_content_region_avail().x + TITLE - RELEASE
+        wide = imgui.get_content_region_avail().x - RELEASE - VALUE
         imgui.set_next_item_width(wide)
         if touched:
             imgui.push_style_color(imgui.Col_.slider_grab, theme.ACCENT)
         name = f"##{group.name}{place}"
         changed, value = imgui.slider_float(
-            name, value, row.low, row.high, f"%.0f {row.unit}", imgui.SliderFlags_.always_clamp
+            name, value, row.low, row.high, "", imgui.SliderFlags_.always_clamp
         )
         if touched:
             imgui.pop_style_color()
@@ -185,8 +186,15 @@ class PuppetPanel(Panel):
                 self._zeroed = ""
         if changed:
             self._move(performer, group, row, value)
+        text = f"{value:.0f} {row.unit}"
+        imgui.get_window_draw_list().add_text(
+            (right - 4 - imgui.calc_text_size(text).x, y + 3),
+            theme.packed(theme.TEXT if touched else theme.FAINT),
+            text,
+        )
         if touched:
-            imgui.same_line(0, 2)
+            imgui.same_line()
+            imgui.set_cursor_screen_pos((right, y))
             imgui.push_style_color(imgui.Col_.button, (0, 0, 0, 0))
             imgui.push_style_var(imgui.StyleVar_.frame_padding, (4, 3))
             if imgui.button(f"\u00d7{name}"):

@@ -22,6 +22,8 @@ from player.ui.stretch import Stretch
 
 BARS = 34.0
 """Points of height of the largest plane."""
+LITTLE = 0.02
+"""What is around the planes is told from this share on."""
 STEP = 3.0
 """Points that a bar takes with the gap beside it, at least."""
 
@@ -31,7 +33,7 @@ class RatePanel(Panel):
 
     name, title, label = "rate", "Bit rate", "Bit rate"
     side = "left"
-    width, height = 430.0, 244.0
+    width, height, share = 430.0, 234.0, 0.44
 
     def __init__(self) -> None:
         self._rates: tuple[StreamInfo, Rates | None, list[Lane]] | None = None
@@ -50,16 +52,14 @@ class RatePanel(Panel):
             return
         if self._rates is None or self._rates[0] is not info:
             found = rates(info)
-            self._rates = (info, found, _lanes(found) if found is not None else [])
+            self._rates = (info, found, _lanes(found, own) if found is not None else [])
         _, found, lanes = self._rates
         if found is None:
             imgui.text_colored(theme.FAINT, "There are no planes.")
             return
         transport = session.transport
         self.stretch.bound(transport.start, max(float(found.times[-1]), transport.start))
-        if own:
-            imgui.text_colored(theme.WARM, own)
-        high = BARS + 6 + imgui.get_text_line_height_with_spacing() * (len(found.totals) + 0.5)
+        high = BARS + 6 + imgui.get_text_line_height_with_spacing() * 2.5
         imgui.begin_child("rate", (0, max(imgui.get_content_region_avail().y - high, WORDS + CURVE + 24)))
         row = _row(found, transport.time) - (len(found.times) - len(found.rate))
         now = {("rate", 0): float(found.rate[row])} if row >= 0 else {}
@@ -87,7 +87,7 @@ class RatePanel(Panel):
         if not self._would[1]:
             return None, "Encoding, to see what it would take..."
         would = self._would[1][0]
-        return would, "No stream yet: what `fba encode` would make of it" if would else "No stream."
+        return would, "if encoded" if would else "No stream."
 
     def _planes(self, session: Session, found: Rates) -> None:
         """The bars; a click seeks."""
@@ -137,10 +137,10 @@ class RatePanel(Panel):
         return bars
 
 
-def _lanes(found: Rates) -> list[Lane]:
+def _lanes(found: Rates, word: str) -> list[Lane]:
     count = len(found.rate)
     course = Course("rate", 0, found.times[-count:], found.rate, np.ones(count, bool))
-    title = f"in one second; {found.mean:.2f} on average"
+    title = f"{word or 'in one second'}; {found.mean:.2f} on average"
     return [Lane(course, title, lambda value: (f"{value:.2f}", "kbit/s"), theme.ACCENT)]
 
 
@@ -153,6 +153,8 @@ def _table(found: Rates) -> None:
     if not imgui.begin_table("totals", 5, imgui.TableFlags_.sizing_fixed_fit):
         return
     for total in found.totals:
+        if total.planes is None and total.share < LITTLE:
+            continue
         imgui.table_next_row()
         count = "" if total.planes is None else f"{total.planes} plane{'s' * (total.planes != 1)}"
         mean = f"{total.bits / total.planes:.0f} bits each" if total.planes else ""
