@@ -43,8 +43,8 @@ class LiveAnimation:
     that were already read from it. name: of the stream. bap_steps: see `fba.Decoder`. at_end: called when
     nothing more is read, to close the source.
 
-    Damage is stepped over to the next I plane behind a start code. `message` says what is wrong, "" where
-    nothing is. Whether there are a face and a body is decided when `wait` returns.
+    Damage is stepped over to the next I plane behind a start code. `message` says in few words what is wrong,
+    `details` exactly; "" where nothing is. Whether there is a face, or a body, is settled as `wait` returns.
     """
 
     def __init__(
@@ -58,6 +58,7 @@ class LiveAnimation:
     ) -> None:
         self.name = name
         self.message = ""
+        self.details = ""
         self.growing = True
         self._source = source
         self._at_end = at_end
@@ -153,7 +154,7 @@ class LiveAnimation:
                 self._take(self._decoder.finish_blocks())
         except (FbaError, OSError, ValueError) as error:
             self._failure = error
-            self.message = f"the stream ended early: {error}"
+            self.message, self.details = "the stream broke off", f"the stream broke off: {error}"
         finally:
             if self._at_end is not None:
                 self._at_end()
@@ -169,13 +170,13 @@ class LiveAnimation:
                 closed = damage[-1]
                 self._losses += len(damage) - 1
                 del damage[:-1]  # an endless stream may have any number
-                lost = f"{closed.stop - closed.start} bytes from byte {closed.start} on were lost"
-                before = f" (after {self._losses} losses before)" if self._losses else ""
-                self.message = f"{lost}{before}: {closed.error}"
+                lost = f"{closed.stop - closed.start} bytes lost at byte {closed.start}"
+                before = f" ({self._losses} losses before)" if self._losses else ""
+                self.message = lost + before
+                self.details = f"{lost}{before}: {closed.error}"
             if self._frames.left_out:
-                self.message = (
-                    f"the stream brings {self._frames.left_out} that it had not at first: not shown"
-                )
+                self.message = f"{self._frames.left_out} came too late to be shown"
+                self.details = f"{self.message}: the stream brings it, but had none when playing started"
             self._news.notify_all()
 
     def _end(self) -> None:

@@ -24,9 +24,10 @@ MOST = 8
         "fba play walk.bvh --loop --speed 0.5",
         "fba play original.fap decoded.fba --compare",
         "nc host 7000 | fba play -",
+        "fba play --model face.glb",
     )
 )
-@click.argument("files", type=options.EXISTING, nargs=-1, required=True, metavar="FILE...")
+@click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")
 @click.option(
     "--compare",
     is_flag=True,
@@ -96,8 +97,15 @@ def command(
     """Play files in a window: space plays and pauses, arrows step, F1 shows all keys.
 
     - is standard input: an FBA stream is shown while it arrives, as it is from a FIFO. Several files are
-    shown together. Without a display, use `fba render`.
+    shown together. Without a file, --model or --body opens a neutral figure with sliders to move it by hand.
+    Without a display, use `fba render`.
     """
+    if not files:
+        if model is None and body is None:
+            raise click.UsageError("give a file to play, or a --model or --body to move by hand")
+        _check(files, compare=compare, arrange=arrange, audio=audio, no_audio=no_audio)
+        _puppet(model, body, axes=axes, view=view, shows=shows, size=size, camera=camera)
+        return
     _check(files, compare=compare, arrange=arrange, audio=audio, no_audio=no_audio)
     import player
     from fba.cli import showing
@@ -147,7 +155,32 @@ def command(
         )
     finally:
         for stream in streams:
+            if stream.details:  # type: ignore[union-attr]
+                click.echo(f"fba: warning: {stream.name}: {stream.details}", err=True)  # type: ignore[union-attr]
             stream.close()  # type: ignore[union-attr]
+
+
+def _puppet(
+    model: Path | None, body: Path | None, *, shows: tuple[tuple[str, object], ...], **how: Any
+) -> None:
+    """A window with a neutral figure and the sliders that move it."""
+    import player
+    from fba.cli import showing
+    from player.performing import neutral
+
+    face, figure = options.read_model(model), showing.read_body(body)
+    scene = showing.scene_of(
+        neutral(body=body is not None),
+        False,
+        model=face,
+        body=figure,
+        axes=how.pop("axes"),
+        view=how.pop("view"),
+    )
+    for switch, state in shows:
+        scene.show(switch, state)
+    title = " ".join(file.name for file in (model, body) if file is not None)
+    player.play(scene, title=title, loop=True, paused=True, panels=("puppet",), **how)
 
 
 def _check(
@@ -156,9 +189,11 @@ def _check(
     """Raises click.UsageError for options that contradict each other or the files."""
     if audio is not None and no_audio:
         raise click.UsageError("--audio and --no-audio contradict each other")
-    if len(files) == 1 and (compare or arrange):
+    if len(files) < 2 and (compare or arrange):
         option = "--compare" if compare else "--arrange"
-        raise click.UsageError(f"{option} needs two files or more; {files[0]} is one")
+        raise click.UsageError(f"{option} needs two files or more{f'; {files[0]} is one' if files else ''}")
+    if not files and audio is not None:
+        raise click.UsageError("--audio goes with a file to play")
     if len(files) > MOST:
         raise click.UsageError(f"{len(files)} files are too many for one window; at most {MOST}")
     if [str(file) for file in files].count("-") > 1:

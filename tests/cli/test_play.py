@@ -179,6 +179,18 @@ def test_a_stream_on_standard_input(
     assert window.scene.animation.snapshot() == fba.read(talk)
 
 
+def test_a_stream_that_is_cut_off_says_so(
+    run: Run, window: Window, talk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pipe_in(monkeypatch, talk.read_bytes()[:-20])
+    window.meanwhile = lambda scene: scene.animation.wait_end(20)
+    cut = run("play", "-")
+    assert cut.code == 0
+    assert "warning: standard input: " in cut.err
+    assert "cut off" in cut.err
+    assert 20 < window.scene.timeline.frames < 50
+
+
 def test_a_stream_from_a_fifo_is_shown_while_it_arrives(
     run: Run, window: Window, talk: Path, tmp_path: Path
 ) -> None:
