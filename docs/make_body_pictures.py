@@ -26,6 +26,20 @@ CLIPS = (
 )
 """Clip, the camera's yaw, and the moments shown, as shares of the clip."""
 SIZE = (240, 340)
+POSTURES = (
+    ({"?_shoulder_abduct": 165}, 20.0, (0.0, 1.45, 0.0), 2.1),
+    ({"?_shoulder_flexion": 90, "?_elbow_flexion": 30}, 140.0, (0.0, 1.25, 0.1), 2.1),
+    ({"?_elbow_flexion": 140, "?_shoulder_abduct": 25}, 40.0, (0.15, 1.2, 0.0), 1.9),
+    ({"skullbase_tilt": 15, "vc2_tilt": 10, "vc4_tilt": 10, "vc6_tilt": 10}, 60.0, (0.0, 1.5, 0.0), 1.2),
+    ({"?_hip_flexion": 90, "?_knee_flexion": -90, "?_elbow_flexion": 55}, 50.0, (0.0, 0.75, 0.2), 3.2),
+    ({"?_hip_flexion": 120, "?_knee_flexion": -140, "?_hip_abduct": 20, "?_shoulder_flexion": 70,
+      "vl3_tilt": -12, "vl1_tilt": -12, "?_ankle_flexion": 20}, 35.0, (0.1, 0.8, 0.1), 2.9),
+    ({"l_hip_flexion": 90, "l_knee_flexion": -75, "r_hip_flexion": -12, "r_elbow_flexion": 80,
+      "r_shoulder_flexion": 35, "l_shoulder_flexion": -40, "l_elbow_flexion": 60}, 60.0, (0, 0.85, 0.1), 3.6),
+    ({"vl1_tilt": -12, "vl3_tilt": -12, "vl5_tilt": -12, "vt11_tilt": -8, "?_hip_flexion": 35,
+      "?_shoulder_flexion": 60}, 60.0, (0.0, 0.95, 0.2), 3.4),
+)  # fmt: skip
+"""Degrees of BAPs by name (of both sides where it begins with ?), the camera's yaw, target and distance."""
 TWISTS = ({}, {"l_elbow_twisting": 90}, {"l_elbow_twisting": -150}, {"l_wrist_twisting": 90},
           {"l_wrist_twisting": -150})  # fmt: skip
 """Degrees of BAPs by name."""
@@ -46,6 +60,28 @@ def clips() -> Image.Image:
                 view.camera = player.Camera(target, yaw=yaw, pitch=8.0, distance=5.0)
                 picture = Image.fromarray(view.frame(time)).convert("RGB")
                 sheet.paste(picture, (column * SIZE[0], row * SIZE[1]))
+    return sheet
+
+
+def postures() -> Image.Image:
+    """Raised arms, bent elbows, the head thrown back, sitting, squatting, striding, bowing."""
+    number = {bap.name: bap.number for bap in baps()}
+    values = np.zeros((len(POSTURES), 296), dtype=np.int32)
+    for frame, (degrees, *_) in enumerate(POSTURES):
+        for name, angle in degrees.items():
+            for side in "lr" if name.startswith("?") else " ":
+                # limbs of the right side open to the other side
+                sign = -1 if side == "r" and name.endswith("_abduct") else 1
+                values[frame, number[name.replace("?", side)] - 1] = round(np.radians(sign * angle) * 1e5)
+    scene = player.Scene(
+        Animation(1, np.arange(len(values)), body=BodyTrack(values, np.ones(values.shape, dtype=bool)))
+    )
+    sheet = Image.new("RGB", (SIZE[0] * 4, SIZE[1] * 2))
+    with player.Offscreen(scene, SIZE, samples=4) as view:
+        for frame, (_, yaw, target, distance) in enumerate(POSTURES):
+            view.camera = player.Camera(target, yaw=yaw, pitch=8.0, distance=distance)
+            picture = Image.fromarray(view.frame(float(frame))).convert("RGB")
+            sheet.paste(picture, (frame % 4 * SIZE[0], frame // 4 * SIZE[1]))
     return sheet
 
 
@@ -71,6 +107,7 @@ def twists() -> Image.Image:
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
     clips().save(IMAGES / "clips.jpg", quality=88)
+    postures().save(IMAGES / "postures.jpg", quality=88)
     twists().save(IMAGES / "twists.jpg", quality=88)
 
 

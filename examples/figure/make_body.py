@@ -38,6 +38,8 @@ DARKEST = 0.55
 """What is left of a colour where no light of the sky falls."""
 UNDER = 0.02
 """Skin stays this far (m) under the edges of clothes."""
+TUCKED = 0.011
+"""The neck under the collar, metres: with more of it, it shows through when the head is thrown back."""
 EVENED = 1.46
 """Height above which weights are, metres."""
 SKULL_WHOLE = 0.9
@@ -143,7 +145,7 @@ def _skull(person: Person, bones: rig.Rig) -> Float64:
 def _neck(whole: Cloth, of_head: npt.NDArray[np.bool_], bones: rig.Rig) -> Cloth:
     """The head's part of the surface from below the collar up to where the skull carries it alone."""
     head = whole.kept(of_head)
-    head = head.above(clothes.collar(head.vertices) * -1 + UNDER)
+    head = head.above(clothes.collar(head.vertices) * -1 + TUCKED)
     skull = bones.names.index("skullbase")
     neck = head.above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
     rim = np.unique(neck.border)
