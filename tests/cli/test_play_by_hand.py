@@ -1,0 +1,56 @@
+"""`fba play` without a file: a neutral figure to move by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import player
+from fba.body.model import BodyModel
+from fba.face import FaceModel
+
+Run = Callable[..., Any]
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, dict[str, Any]]]:
+    """What windows were to show, and how."""
+    found: list[tuple[Any, dict[str, Any]]] = []
+    monkeypatch.setattr(player, "play", lambda scene, **options: found.append((scene, options)))
+    return found
+
+
+def test_a_face_alone(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
+    FaceModel.default().save(tmp_path / "mine.glb")
+    assert run("play", "--model", tmp_path / "mine.glb", "--size", "640x480").code == 0
+    scene, options = opened[0]
+    assert not scene.has_body
+    assert not np.any(scene.timeline.faps(0.0))
+    assert (options["panels"], options["paused"], options["size"]) == (("puppet",), True, (640, 480))
+    assert options["title"] == "mine.glb"
+
+
+def test_a_body_with_a_face(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
+    BodyModel.default().save(tmp_path / "body.glb")
+    assert run("play", "--body", tmp_path / "body.glb", "--show", "grid").code == 0
+    scene, _ = opened[0]
+    assert scene.has_body
+    assert scene.switches["grid"]
+    assert scene.of(scene.timeline.faps(0.0), scene.timeline.baps(0.0)).faces
+
+
+def test_what_needs_a_file(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
+    (tmp_path / "mine.glb").write_bytes(b"")
+    for words, said in (
+        ((), "--model or --body"),
+        (("--compare", "--model", tmp_path / "mine.glb"), "--compare needs two files"),
+        (("--model", tmp_path / "mine.glb", "--audio", tmp_path / "mine.glb"), "--audio goes with a file"),
+    ):
+        refused = run("play", *words)
+        assert refused.code == 2
+        assert said in refused.err
+    assert not opened
