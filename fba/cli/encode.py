@@ -14,7 +14,7 @@ from fba.animation import Animation
 from fba.cli import capture_report, options
 from fba.errors import FbaWarning, FormatError
 
-CAPTURE = ("spine", "ground", "origin")
+CAPTURE = ("spine", "ground", "plant", "origin")
 """Options that say how motion capture becomes BAPs."""
 
 
@@ -89,6 +89,12 @@ CAPTURE = ("spine", "ground", "origin")
     default="floor",
     show_default=True,
     help="Motion capture: feet stand at height 0, at the height of the source's ground, or uncorrected.",
+)
+@click.option(
+    "--plant/--no-plant",
+    default=True,
+    show_default=True,
+    help="Motion capture: bend legs a little where feet would else miss the ground, or slip on it.",
 )
 @click.option(
     "--origin",
