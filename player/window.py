@@ -133,6 +133,8 @@ class Window:
         self._window: Any = None
         self._problems: list[str] = []
         self._due = SETTLES
+        self._timeline = timeline
+        self._arrived: int = timeline.arrived
         self._last = wall.perf_counter()
         self._glfw = self._started_glfw()
         try:
@@ -157,8 +159,9 @@ class Window:
         """Handle the input and draw one picture, or wait where nothing moves. False once closed."""
         glfw, session = self._glfw, self.session
         begun = wall.perf_counter()
-        if session.restless or session.source.looking:
-            self._due = max(self._due, 1)
+        arrived = self._timeline.arrived  # more of a stream makes the line longer, while paused too
+        if session.restless or session.source.looking or arrived != self._arrived:
+            self._due, self._arrived = max(self._due, 1), arrived
         if self._due:
             glfw.poll_events()
         else:
