@@ -21,7 +21,9 @@ from player.whole import PathLike
 UInt8 = npt.NDArray[np.uint8]
 
 WAITING = 6
-"""Pictures that may wait for the encoder."""
+"""Pictures that may wait for the encoder,"""
+WAITING_BYTES = 96 << 20
+"""and bytes of them: of large pictures fewer wait, but two."""
 FASTEST = 1000
 """Frames a second that no film exceeds."""
 FILMS = (".mp4", ".gif")
@@ -90,7 +92,7 @@ class Recorder:
         self._closed = self._stop = False
         self._free: queue.SimpleQueue[UInt8] = queue.SimpleQueue()
         self._full: queue.SimpleQueue[tuple[UInt8, int] | None] = queue.SimpleQueue()
-        for _ in range(WAITING):
+        for _ in range(min(max(WAITING_BYTES // (size[0] * size[1] * 4 or 1), 2), WAITING)):
             self._free.put(np.zeros((size[1], size[0], 4), dtype=np.uint8))
         self._thread = threading.Thread(target=self._encode, name="fba recorder", daemon=True)
         self._thread.start()
