@@ -58,6 +58,7 @@ def read(
     scale: float | None = None,
     origin: str = "source",
     ground: str = "floor",
+    plant: bool = True,
     spine: str | int = "spread",
 ) -> Animation:
     """A BVH file as BAPs (see `fba.capture.from_skeleton` for the options).
@@ -67,7 +68,9 @@ def read(
     """
     motion = read_motion(path)
     try:
-        return from_skeleton(motion, rate, scale=scale, origin=origin, ground=ground, spine=spine)
+        return from_skeleton(
+            motion, rate, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
+        )
     except ModelError as error:
         raise FormatError(str(error), path=path) from error
 

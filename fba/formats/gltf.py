@@ -44,6 +44,7 @@ def read(
     scale: float | None = None,
     origin: str = "source",
     ground: str = "floor",
+    plant: bool = True,
     spine: str | int = "spread",
     clip: str | int | None = None,
 ) -> Animation:
@@ -57,7 +58,7 @@ def read(
     """
     try:
         gltf = read_gltf(path)
-        plain = (scale, origin, ground, spine) == (None, "source", "floor", "spread")
+        plain = (scale, origin, ground, plant, spine) == (None, "source", "floor", True, "spread")
         if plain and gltf.animations:
             own = gltf.animations[0] if clip is None else _clip(gltf, clip, set(range(len(gltf.nodes))))
             note = note_of(gltf, own)
@@ -65,7 +66,7 @@ def read(
                 animation = read_note(gltf, own, note)
                 return animation if rate is None else animation.resample(Fraction(rate))
         motion = motion_of(gltf, clip=clip, rate=rate)
-        return from_skeleton(motion, scale=scale, origin=origin, ground=ground, spine=spine)
+        return from_skeleton(motion, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine)
     except ModelError as error:
         raise FormatError(str(error), path=path) from error
 

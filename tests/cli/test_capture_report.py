@@ -111,3 +111,17 @@ def test_fps_resamples_by_rotation(tmp_path: Path) -> None:
     flexion = next(b.number - 1 for b in baps() if b.name == "l_hip_flexion")
     assert len(body.values) == 5
     assert np.degrees(body.values[3, flexion] * 1e-5) == pytest.approx(105, abs=4)
+
+
+def test_legs_that_stay_as_they_are_retargeted(tmp_path: Path, shared: Path) -> None:
+    """This walker's legs have other proportions: planted feet cost directions of its bones, and gain ground."""
+    out, path = tmp_path / "out.fba", shared / "data" / "vreng" / "cmu_walk.bvh"
+    found = {}
+    for plant in ("--plant", "--no-plant"):
+        result = run(path, "-o", out, "--bap-steps", "visage", plant, "--report", "--json")
+        assert result.returncode == 0, result.stderr
+        (capture,) = json.loads(result.stdout)["captures"]
+        thigh = next(bone for bone in capture["bones"] if bone["joint"] == "r_hip")
+        found[plant] = thigh["mean"], capture["feet"]["within"]
+    assert found["--no-plant"][0] < 0.01 < found["--plant"][0] < 2
+    assert found["--no-plant"][1] < 0.9 < found["--plant"][1]
