@@ -115,6 +115,10 @@ def draw_notices(session: Session, display: tuple[float, float], above: float) -
         y -= 8
 
 
+Rectangle = tuple[float, float, float, float]
+"""Left, top, width, height in points."""
+
+
 class Places:
     """Where panels are: one below the other at their side, until the user moves them."""
 
@@ -127,40 +131,43 @@ class Places:
         room = display[1] - TOP - below - GAP
         if room < 60 or display[0] < 120:
             return
-        next_free: dict[tuple[str, int], float] = {}
+        placed: list[Rectangle] = []
         for panel in panels:
             wide = min(panel.width, display[0] - 2 * EDGE)
-            place = self._place(panel, wide, room, display, next_free)
-            self._draw_one(panel, session, (wide, room), place, display)
+            self._draw_one(
+                panel, session, (wide, room), self._place(panel, wide, room, display, placed), display
+            )
 
     def forget(self, names: set[str]) -> None:
         """These have been closed, and open where they belong again."""
         self._moved -= names
 
     def _place(
-        self,
-        panel: Panel,
-        wide: float,
-        room: float,
-        display: tuple[float, float],
-        next_free: dict[tuple[str, int], float],
+        self, panel: Panel, wide: float, room: float, display: tuple[float, float], placed: list[Rectangle]
     ) -> tuple[float, float]:
-        """The first place in the columns of its side with room for it, else over the last column."""
-        opens = min(panel.height or 120.0, room * panel.share)
-        high = min(self._sizes.get(panel.name, (wide, opens))[1], room)
+        """The first place with room: at its side, at the other side, beside what is there; else over it."""
         if panel.name in self._moved:
             return 0.0, 0.0
+        opens = min(panel.height or 120.0, room * panel.share)
+        wide, high = self._sizes.get(panel.name, (wide, opens))
+        high = min(high, room)
         if panel.side == "middle":
             return (display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2
-        for column in range(4):
-            away = EDGE + column * (wide + GAP)
-            y = next_free.get((panel.side, column), TOP)
-            last = away + 2 * (wide + GAP) > display[0]
-            if y + high <= TOP + room + 1 or last:
-                y = min(y, TOP + room - high)
-                next_free[panel.side, column] = y + high + GAP
-                return (display[0] - away - wide if panel.side == "right" else away), y
-        return EDGE, TOP
+        ends = [EDGE, display[0] - EDGE - wide]
+        own, other = ends if panel.side == "left" else reversed(ends)
+        beside = [left + width + GAP for left, _, width, _ in placed] if panel.side == "left" else []
+        beside += [left - GAP - wide for left, *_ in placed] if panel.side == "right" else []
+        for x in (own, other, *beside):
+            y = TOP
+            for left, top, width, height in sorted(placed, key=lambda one: one[1]):
+                if x < left + width + GAP and left < x + wide + GAP and top < y + high + GAP:
+                    y = max(y, top + height + GAP)
+            if ends[0] <= x <= ends[1] and y + high <= TOP + room + 1:
+                break
+        else:
+            x, y = own, TOP + room - high
+        placed.append((x, y, wide, high))
+        return x, y
 
     def _draw_one(
         self,
