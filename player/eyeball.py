@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fba.compiled import compiled
 from fba.face.model import FaceModel, Part, point_row
 from player.shapes import Eye
 
@@ -45,9 +46,10 @@ class Eyeball:
     def posed(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
         """The eye for moved vertices of its part (V, 3) and of the face, in the world by matrix (4, 4)."""
         moved = part[self.rows].astype(np.float64)
-        middle, start = moved.mean(axis=0), self.neutral.mean(axis=0)
-        turn = _rotation(self.neutral - start, moved - middle)
-        centre = middle + turn @ (self.centre - start)
+        turn, centre = _placed(self.neutral, moved, self.centre)
+        if not np.isfinite(turn).all():  # squeezed flat
+            turn = _rotation(self.neutral - self.neutral.mean(axis=0), moved - moved.mean(axis=0))
+            centre = moved.mean(axis=0) + turn @ (self.centre - self.neutral.mean(axis=0))
         frame = np.eye(4)
         frame[:3, :3] = turn * self.radius
         frame[:3, 3] = centre
@@ -101,6 +103,48 @@ def _sphere(points: Float64) -> tuple[Float64, float]:
     a = np.column_stack([2 * p, np.ones(len(p))])
     found = np.linalg.lstsq(a, (p * p).sum(axis=1), rcond=None)[0]
     return found[:3] + middle, float(np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
+
+
+@compiled
+def _placed(before: Float64, after: Float64, centre: Float64) -> tuple[Float64, Float64]:
+    """(3, 3) the rotation that best takes places (N, 3) to others, and where it takes `centre`; NaN where it
+    is not found: the orthogonal part of their covariance, by Newton's iteration (Higham 1986)."""
+    start, middle = np.zeros(3), np.zeros(3)
+    for i in range(len(before)):
+        for k in range(3):
+            start[k] += before[i, k] / len(before)
+            middle[k] += after[i, k] / len(before)
+    x = np.zeros((3, 3))
+    for i in range(len(before)):
+        for j in range(3):
+            for k in range(3):
+                x[j, k] += (after[i, j] - middle[j]) * (before[i, k] - start[k])
+    y = np.zeros((3, 3))  # cofactors: the inverse transposed, times the determinant
+    for _ in range(60):
+        for j in range(3):
+            j1, j2 = (j + 1) % 3, (j + 2) % 3
+            for k in range(3):
+                k1, k2 = (k + 1) % 3, (k + 2) % 3
+                y[j, k] = x[j1, k1] * x[j2, k2] - x[j1, k2] * x[j2, k1]
+        determinant = x[0, 0] * y[0, 0] + x[0, 1] * y[0, 1] + x[0, 2] * y[0, 2]
+        if not determinant > 1e-300:
+            x[:] = np.nan
+            break
+        scale = determinant ** (-1.0 / 3.0)
+        change = 0.0
+        for j in range(3):
+            for k in range(3):
+                new = 0.5 * (scale * x[j, k] + y[j, k] / (scale * determinant))
+                change = max(change, abs(new - x[j, k]))
+                x[j, k] = new
+        if change < 1e-12:
+            break
+    placed = np.zeros(3)
+    for j in range(3):
+        placed[j] = middle[j]
+        for k in range(3):
+            placed[j] += x[j, k] * (centre[k] - start[k])
+    return x, placed
 
 
 def _rotation(before: Float64, after: Float64) -> Float64:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.compiled import compiled, inlined, is_compiled
+from fba.compiled import is_compiled
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from player.kept import kept
@@ -80,11 +80,7 @@ class FaceLight:
         turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
         if self._lit is None or self._lit[0] != key:
-            light = np.empty((len(self._sway), 4), dtype=np.float32)
-            basis = np.concatenate([_basis(turned), _basis(still)]).astype(np.float32)
-            bent = not np.array_equal(turned, still)
-            shut, wide = self._baked.shut, self._baked.wide
-            _reaching(*shut.arrays, *wide.arrays, share, basis, self._sway, bent, light)
+            light = _reaching(self._baked, share, turned, still, self._sway)
             for rows in self._teeth:  # as a photographer would have it
                 light[rows, :2] += (1 - light[rows, :2]) * np.float32(ON_TEETH * share)
             for rows, outside in zip(self._tongues, out, strict=True):
@@ -116,14 +112,14 @@ class FaceLight:
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
         faps = np.zeros(68, dtype=np.float32)
         still, normals = self._posed(faps)
-        shut = _kept_visibility(still, normals, triangles, self._sway > MOVES)
+        shut = kept_visibility(still, normals, triangles, self._sway > MOVES)
         if self._lips is None:
             return _Baked(shut, shut, (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():
             faps[fap - 1] = value
         moved, normals = self._posed(faps)
         near = self._near_mouth(still)
-        wide = _kept_visibility(moved, normals, triangles, near)
+        wide = kept_visibility(moved, normals, triangles, near)
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut.arrays, wide.arrays, strict=True)
@@ -141,8 +137,8 @@ class FaceLight:
         return np.asarray(away < 1.1 * self._model.fapu.ENS * 1024)
 
 
-def _kept_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
-    """Baked once, and kept: it is half a second of every start."""
+def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
+    """`bake`, but done once and kept on disk: it is half a second of every start."""
 
     def make() -> list[npt.NDArray[np.float16]]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
@@ -161,48 +157,37 @@ def _basis(into: Float64) -> Float64:
     return weights(np.stack([_unit(into @ KEY_DIRECTION), _unit(into @ RIM_DIRECTION)]))
 
 
-@inlined
-def _product(table: Float32, row: int, basis: Float32, light: int) -> np.float32:
-    found = np.float32(0.0)
-    for k in range(HARMONICS):
-        found += table[row, k] * basis[light, k]
-    return min(max(found, np.float32(0.0)), np.float32(1.0))
+def _reaching(baked: _Baked, share: float, turned: Float64, still: Float64, sway: Float32) -> Float32:
+    """(V, 4) key light, sky, through, rim light. turned: (3, 3) by which the lights are turned for what goes
+    with the head; still: for what stands. share: how far the mouth is wide open."""
+    bent = not np.array_equal(turned, still)
+    basis = np.concatenate([_basis(turned), _basis(still)] if bent else [_basis(turned)]).astype(np.float32)
+    shut = _products(baked.shut, basis)
+    if share > 0:
+        wide = _products(baked.wide, basis)
+        shut += (wide - shut) * np.float32(share)
+    found = np.empty((len(sway), 4), dtype=np.float32)
+    for column, row in ((0, 0), (3, 1), (2, 2)):
+        if bent:
+            shut[row] -= shut[row + 3]
+            shut[row] *= sway
+            shut[row] += shut[row + 3]
+        found[:, column] = shut[row]
+    found[:, 1] = baked.shut.open
+    if share > 0:
+        found[:, 1] += (baked.wide.open - baked.shut.open) * np.float32(share)
+    return found
 
 
-@compiled
-def _reaching(
-    light: Float32,
-    through: Float32,
-    open_: Float32,
-    wide_light: Float32,
-    wide_through: Float32,
-    wide_open: Float32,
-    share: float,
-    basis: Float32,
-    sway: Float32,
-    bent: bool,
-    out: Float32,
-) -> None:
-    """out (V, 4): key light, sky, through, rim light. basis (4, 16): for key and rim light of what goes with
-    the head, then of what stands; bent: whether they differ. share: of the mouth wide open."""
-    for i in range(len(out)):
-        part = sway[i] if bent else np.float32(1.0)
-        for turned in range(2):
-            weight = part if turned == 0 else np.float32(1.0) - part
-            if turned == 0:
-                out[i, 0] = out[i, 2] = out[i, 3] = 0.0
-                out[i, 1] = open_[i] + (wide_open[i] - open_[i]) * share
-            if weight == 0.0:
-                continue
-            key, rim = _product(light, i, basis, 2 * turned), _product(light, i, basis, 2 * turned + 1)
-            thin = _product(through, i, basis, 2 * turned + 1)
-            if share > 0.0:
-                key += (_product(wide_light, i, basis, 2 * turned) - key) * share
-                rim += (_product(wide_light, i, basis, 2 * turned + 1) - rim) * share
-                thin += (_product(wide_through, i, basis, 2 * turned + 1) - thin) * share
-            out[i, 0] += weight * key
-            out[i, 2] += weight * thin
-            out[i, 3] += weight * rim
+def _products(visibility: Visibility, basis: Float32) -> Float32:
+    """(3 N, V) key light, rim light and what comes through of it, for N pairs of rows of basis (2 N, 16)."""
+    pairs = len(basis) // 2
+    found = np.empty((3 * pairs, len(visibility.open)), dtype=np.float32)
+    for pair in range(pairs):
+        # Tables are tall: their columns beside each other are what goes through the processor fastest.
+        np.dot(basis[2 * pair : 2 * pair + 2], visibility.columns[0], out=found[3 * pair : 3 * pair + 2])
+        np.dot(basis[2 * pair + 1], visibility.columns[1], out=found[3 * pair + 2])
+    return np.clip(found, 0, 1, out=found)
 
 
 def _unit(vector: Float64) -> Float64:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from fba.body.heads import HeadOnBody
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
+from player.body_light import BodyLight
 from player.face import FaceFigure
 from player.face_parts import coarser_part, part_shape, with_triangles
 from player.shapes import Eye, FaceMesh, FaceShape
@@ -19,8 +20,6 @@ Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
-REACH = (1.0, 0.9, 0.0, 0.25)
-"""What light reaches a body: it shades itself most from behind."""
 SEEN_WEIGHTS, BEND = 6, 0.02
 """How a coarser body keeps its joints: what a vertex carried by the wrong one counts in metres."""
 CARRIED = ("skin", "mouth", "hair", "other")
@@ -49,8 +48,8 @@ class Person:
             for part, start in zip(body.parts, body.starts.values(), strict=True)
         }
         self._shapes = {part.name: _shape(part, len(body.skeleton)) for part in self._parts}
-        free = np.array(REACH, dtype=np.float32)
-        self._light = {name: np.tile(free, (len(shape.colours), 1)) for name, shape in self._shapes.items()}
+        coarser = [self._shapes[part.name].coarser if part in self._parts else None for part in body.parts]
+        self._light = BodyLight(body, coarser)
         self._places, self._normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
         self._skin, self._upright = np.empty_like(model.vertices), np.empty_like(model.vertices)
 
@@ -65,12 +64,13 @@ class Person:
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
         """Everything but the eyeballs, for FAPs (68,) and joint matrices with the head's turn."""
         self.body.skin(joints, self._places, self._normals)
+        reaching = self._light.reaching(self._places, self._normals, joints)
         found = [
             _placed(
                 self._shapes[part.name],
                 self._places[self._rows[part.name]],
                 self._normals[self._rows[part.name]],
-                self._light[part.name],
+                reaching[self._rows[part.name]],
             )
             for part in self._parts
         ]
