@@ -138,8 +138,8 @@ def record(
     rate = exact_rate(rate)
     first, count = _stretch(shown, rate, start, end)
     width, height = picture_size(size, path)
-    if min(width, height) < 1:
-        raise ValueError(f"a film must have at least 2x2 pixels, not {size}")
+    if size is not None and min(width, height) < 1:
+        raise ValueError(f"a film must have at least 2x2 pixels, not {size[0]}x{size[1]}")
     with ExitStack() as stack:
         # Whether the encoder is there, and where it writes, shows sooner than the first picture.
         if numbered:
