@@ -1,0 +1,76 @@
+"""`--show`: switches of the player, in pictures from the command line."""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fba.errors import DisplayError
+
+Run = Callable[..., tuple[int, str, str]]
+FACE = ("--fap", "open_jaw=200", "--size", "64x48", "--camera", "front")
+
+
+@pytest.fixture
+def opengl() -> None:
+    """OpenGL works without a display here."""
+    from player.context import offscreen_context
+
+    try:
+        offscreen_context().release()
+    except DisplayError as error:
+        if os.environ.get("CI") and ctypes.util.find_library("EGL"):
+            raise
+        pytest.skip(f"no OpenGL without a display: {error}")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("wirefame", "near: wireframe"),
+        ("influence", "influence=open_jaw"),
+        ("influence=open_jav", "near: open_jaw"),
+        ("skeleton=bones", "off, through, only"),
+        ("eyes=perhaps", "on or off"),
+    ],
+)
+@pytest.mark.parametrize("command", ["render", "play"])
+def test_what_does_not_exist_is_bad_usage(
+    run: Run, tmp_path: Path, command: str, text: str, said: str
+) -> None:
+    file = tmp_path / "none.fap"
+    file.write_text("2.1 none 25 0\n")
+    output = ("-o", tmp_path / "out.png") if command == "render" else ()
+    code, _, error = run(command, file, *output, "--show", text)
+    assert code == 2
+    assert said in error
+    assert not (tmp_path / "out.png").exists()
+
+
+@pytest.mark.usefixtures("opengl")
+def test_switches_are_in_the_picture(run: Run, tmp_path: Path) -> None:
+    plain, dressed = tmp_path / "plain.png", tmp_path / "dressed.png"
+    assert run("render", *FACE, "-o", plain)[0] == 0
+    shown = ("--show", "influence=open_jaw", "--show", "eyes=off", "--show", "background=grey")
+    assert run("render", *FACE, *shown, "-o", dressed)[0] == 0
+    before, after = (np.asarray(Image.open(path)).astype(int) for path in (plain, dressed))
+    assert (np.ptp(after[:8, :8, :3], axis=(0, 1)) == 0).all()  # a plain background
+    middle = after[14:24, 26:38, :3]
+    assert np.abs(middle[..., 0] - middle[..., 2]).mean() < 12  # grey where nothing moves
+    assert (before[14:24, 26:38, 0] - before[14:24, 26:38, 2]).mean() > 30  # skin
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_transparent_background_is_in_the_file(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "clear.png"
+    assert run("render", *FACE, "--show", "background=transparent", "-o", path)[0] == 0
+    pixels = np.asarray(Image.open(path))
+    assert pixels.shape == (48, 64, 4)
+    assert pixels[2, 2, 3] == 0
+    assert pixels[24, 32, 3] == 255
