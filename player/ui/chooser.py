@@ -35,9 +35,16 @@ def found(query: str, *, face: bool, body: bool) -> tuple[tuple[str, int, str], 
     for kind, number, text, searched in listed():
         if not (face if kind == "fap" else body):
             continue
-        if all(word == str(number) if word.isdecimal() else word in searched for word in words):
+        if all(_has(word, number, searched) for word in words):
             rows.append((kind, number, text))
     return tuple(rows)
+
+
+def _has(word: str, number: int, searched: str) -> bool:
+    """A number and a single letter are meant as they are, other words may be parts of words."""
+    if word.isdecimal():
+        return word == str(number)
+    return word in searched.split() if len(word) == 1 else word in searched
 
 
 class Chooser:

@@ -16,6 +16,8 @@ Bool = npt.NDArray[np.bool_]
 
 BLOCK = 2048
 """Frames of a face worked out at once: a few milliseconds."""
+UNTOLD = 0.5
+"""What a FAP that is only filled in counts beside those that are sent."""
 TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
 """What counts as moving as much as a FAP at full: degrees, millimetres."""
 
@@ -108,8 +110,9 @@ class Columns:
         if animation.face is not None and self._done:
             shown = self._shown[: self._done]
             span = shown.max(axis=0) - shown.min(axis=0)
+            told = np.where(animation.face.mask[: self._done].any(axis=0), 1.0, UNTOLD)
             found += [
-                (float(span[number - 1]) / fap_reach(number), "fap", number)
+                (float(span[number - 1] * told[number - 1]) / fap_reach(number), "fap", number)
                 for number in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1)
             ]
         if animation.body is not None and frames:

@@ -33,7 +33,8 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
     """
     if not len(times) or columns < 1 or not high > low:
         return Envelope(np.zeros(0), np.zeros(0), np.zeros(0, bool))
-    first, last = np.searchsorted(times, [low, high], side="left")
+    first = np.searchsorted(times, low, side="left")
+    last = np.searchsorted(times, high, side="right")
     if last - first <= 2 * columns:
         part = slice(max(int(first) - 1, 0), min(int(last) + 1, len(times)))
         return Envelope((times[part] - low) / (high - low), values[part], sent[part])
