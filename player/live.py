@@ -19,7 +19,7 @@ import numpy.typing as npt
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec import Decoder
 from fba.codec.block import Block
-from fba.errors import BitstreamError, FbaError
+from fba.errors import BitstreamError, FbaError, FbaWarning
 from player.growing import GrowingFrames
 from player.timeline import Timeline
 from player.transport import BUFFER
@@ -152,7 +152,7 @@ class LiveAnimation:
                 chunk = self._source.read1(CHUNK)
             if not self._closing:
                 self._take(self._decoder.finish_blocks())
-        except (FbaError, OSError, ValueError) as error:
+        except (FbaError, FbaWarning, OSError, ValueError) as error:
             self._failure = error
             self.message, self.details = "the stream broke off", f"the stream broke off: {error}"
         finally:
