@@ -60,7 +60,8 @@ def _about(session: Session, info: StreamInfo) -> list[tuple[str, str]]:
     rows = [("name", session.source.name or "untitled")]
     if session.source.path is not None:
         folder = os.path.dirname(os.path.abspath(session.source.path))
-        rows += [("folder", folder), ("kind", info.format.upper()), ("size", _bytes(info.size))]
+        rows += [("folder", folder)] if folder != os.getcwd() else []
+        rows += [("kind", info.format.upper()), ("size", _bytes(info.size))]
     rows.append(("frames", f"{info.frames}" + (f", {info.skipped} skipped" if info.skipped else "")))
     rows.append(("rate", f"{float(info.rate):g} frames/s"))
     rows.append(("duration", clock_text(info.duration)))
