@@ -238,3 +238,18 @@ def test_the_window_is_closed_by_its_key(window: Window, hand: Hand) -> None:
         if not window.update():
             return
     pytest.fail("Escape did not close the window")
+
+
+def test_dragging_a_slider_of_the_puppeteer(window: Window, hand: Hand) -> None:
+    session = window.session
+    hand.key("F7", lambda: "puppet" in session.open)
+    settle(window)
+    panel = next(panel for panel in window._gui.panels if panel.name == "puppet")
+    left, right, y = panel.places["Jaw", 0]
+    camera = session.viewpoint.camera
+    hand.drag((left + 8, y), (left + 0.5 * (right - left), y))
+    assert session.values[0][2] == pytest.approx(600, abs=60)  # half of what the slider has
+    hand.key("Right", lambda: window.transport.frame == 1)
+    settle(window)
+    assert session.values[0][2] == pytest.approx(600, abs=60)
+    assert session.viewpoint.camera == camera
