@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from player.camera import Camera
-from player.extras import Dots, Extras, Grid, Lines
+from player.extras import Dots, Extras, Grid, Legend, Lines
 from player.placing import directions, places
 from player.programs import load_program, matrix_bytes, set_uniform
 from player.shapes import FaceMesh, FaceShape
-from player.words import MOST_NAMES, SMALLEST, legend_picture, names_picture, placed_names
+from player.words import (
+    MOST_NAMES,
+    SMALLEST,
+    SMALLEST_WITH_LEGEND,
+    legend_picture,
+    names_picture,
+    placed_names,
+)
 
 Float64 = npt.NDArray[np.float64]
 
@@ -24,6 +32,8 @@ HIDDEN = 0.2
 NAME_SIZE, SMALLEST_NAME = 13, 10
 LEAST_LEGEND = 0.65
 MARGIN = 14
+MOST_WORDS = 16
+"""Textures of words that are kept."""
 MOST_SHELLS = 48
 """Shells whose triangles are remembered; the longest unused goes first."""
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
@@ -54,7 +64,8 @@ class ExtrasRenderer:
         self._programs: dict[str, Any] = {}
         self._square: Any = None
         self._buffers: dict[str, Any] = {}
-        self._textures: dict[str, tuple[object, Any, Any]] = {}
+        self._textures: dict[Hashable, tuple[Any, Any]] = {}
+        self._depths: npt.NDArray[np.float32] | None = None
         self._indices: dict[int, tuple[FaceShape, Any]] = {}
 
     def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
@@ -82,23 +93,18 @@ class ExtrasRenderer:
             if dots.radius > 0:
                 self._draw_dots(dots, scale)
         gl.enable_only(gl.BLEND)
+        self._depths = None
         if size[1] >= SMALLEST:
             for dots in extras.dots:
                 self._draw_names(dots, matrix, camera.eye, size, scale)
-            if extras.legend is not None:
-                legend = extras.legend
-                large = max(scale, LEAST_LEGEND)
-                words = self._words("legend", (legend, large), lambda: (legend_picture(legend, large), None))
-                wide, high = words[1].size
-                edge = round(MARGIN * large)
-                if wide + 2 * edge <= size[0]:
-                    self._draw_label("legend", np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
+        if extras.legend is not None and size[1] >= SMALLEST_WITH_LEGEND:
+            self._draw_legend(extras.legend, size, max(scale, LEAST_LEGEND))
         gl.fbo.depth_mask = True
         gl.enable_only(gl.DEPTH_TEST)
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""
-        for _, texture, _ in self._textures.values():
+        for texture, _ in self._textures.values():
             texture.release()
         for _, triangles in self._indices.values():
             triangles.release()
@@ -206,8 +212,7 @@ class ExtrasRenderer:
         self, dots: Dots, matrix: Float64, eye: Float64, size: tuple[int, int], scale: float
     ) -> None:
         pixels = max(round(NAME_SIZE * scale), SMALLEST_NAME)
-        key = (dots.names, pixels)
-        _, _, boxes = self._words("names", key, lambda: names_picture(dots.names, pixels))
+        words, boxes = self._words((dots.names, pixels), lambda: names_picture(dots.names, pixels))
         at = dots.places.astype(np.float64)
         facing = np.einsum("ij,ij->i", dots.facing, eye - at) >= 0
         pixel, depth = projected(at, matrix, size)
@@ -216,16 +221,25 @@ class ExtrasRenderer:
         if not 0 < inside.sum() <= MOST_NAMES:
             return
         column, row = pixel[inside].astype(int).T
-        inside[inside] = nearer[inside] <= self._depths(size)[size[1] - 1 - row, column]
+        inside[inside] = nearer[inside] <= self._depths_of(size)[size[1] - 1 - row, column]
         pixel[~inside] = np.nan
         chosen, corners = placed_names(pixel, boxes[:, 2:], dots.radius * scale, size)
         if len(chosen):
             own = boxes[chosen].astype(np.float64)
-            whole = np.array(self._textures["names"][1].size * 2, dtype=np.float64)
-            self._draw_label("names", np.concatenate([corners, own[:, 2:], own / whole], axis=1))
+            whole = np.array(words.size * 2, dtype=np.float64)
+            self._draw_labels(words, np.concatenate([corners, own[:, 2:], own / whole], axis=1))
 
-    def _depths(self, size: tuple[int, int]) -> npt.NDArray[np.float32]:
-        """(H, W) of what is drawn, 0..1, bottom row first."""
+    def _draw_legend(self, legend: Legend, size: tuple[int, int], scale: float) -> None:
+        words, _ = self._words((legend, scale), lambda: (legend_picture(legend, scale), None))
+        wide, high = words.size
+        edge = round(MARGIN * scale)
+        if wide + 2 * edge <= size[0]:
+            self._draw_labels(words, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
+
+    def _depths_of(self, size: tuple[int, int]) -> npt.NDArray[np.float32]:
+        """(H, W) depths of what is drawn, 0..1, bottom row first; read once a picture."""
+        if self._depths is not None:
+            return self._depths
         gl, source, parts = self._gl, self._gl.fbo, []
         if source.samples:
             parts = [gl.renderbuffer(size, 4), gl.depth_renderbuffer(size)]
@@ -235,25 +249,27 @@ class ExtrasRenderer:
         source.use()
         for part in reversed(parts):
             part.release()
-        return np.frombuffer(data, dtype=np.float32).reshape(size[1], size[0])
+        self._depths = np.frombuffer(data, dtype=np.float32).reshape(size[1], size[0])
+        return self._depths
 
-    def _words(self, name: str, key: object, make: Any) -> tuple[object, Any, Any]:
-        """A texture of words kept under a name, and what `make` gave with it."""
-        held = self._textures.get(name)
-        if held is None or held[0] != key:
-            if held is not None:
-                held[1].release()
+    def _words(self, key: Hashable, make: Callable[[], tuple[npt.NDArray[np.uint8], Any]]) -> tuple[Any, Any]:
+        """A texture of words and what `make` gave with it; the last few are kept."""
+        held = self._textures.pop(key, None)
+        if held is None:
             picture, more = make()
             texture = self._gl.texture((picture.shape[1], picture.shape[0]), 4, picture.tobytes())
             texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
-            held = self._textures[name] = (key, texture, more)
+            held = (texture, more)
+        self._textures[key] = held  # now the latest used
+        while len(self._textures) > MOST_WORDS:
+            self._textures.pop(next(iter(self._textures)))[0].release()
         return held
 
-    def _draw_label(self, texture: str, boxes: Float64) -> None:
-        self._textures[texture][1].use(0)
+    def _draw_labels(self, words: Any, boxes: Float64) -> None:
+        words.use(0)
         corners = self._filled("label corners", np.array([0, 0, 1, 0, 0, 1, 1, 1], dtype="f4"))
         content = [
             (corners, "2f", "in_corner"),
-            (self._filled(texture, boxes.astype("f4")), "4f 4f/i", "in_box", "in_part"),
+            (self._filled("boxes", boxes.astype("f4")), "4f 4f/i", "in_box", "in_part"),
         ]
         self._render("label", content, len(boxes))

@@ -20,8 +20,8 @@ Bool = npt.NDArray[np.bool_]
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
 SHADE = (18, 21, 26, 190)
-SMALLEST = 240
-"""In pictures lower than this (pixels) there are no words."""
+SMALLEST, SMALLEST_WITH_LEGEND = 96, 240
+"""In pictures lower than this (pixels) there are no names, and no legend."""
 MOST_NAMES = 45
 """Where more points are in view, none is named."""
 GAP = 2.0
