@@ -1,0 +1,89 @@
+"""What the window's panels cost the processor in each picture, outside OpenGL: the goal is 2 ms."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation
+from fba.errors import DisplayError
+from player.scene import Scene
+from player.ui.session import Session
+from player.ui.source import Source
+
+pytest.importorskip("imgui_bundle")
+
+from player.ui.picture import Studio
+
+GOAL = 2e-3
+"""Seconds a picture."""
+BATCH, ROUNDS = 20, 15
+
+
+class Lists:
+    """In the place of the renderer: what it does before OpenGL is asked to draw."""
+
+    def __init__(self, renderer: Any) -> None:
+        self._renderer = renderer
+
+    def draw(self, data: Any) -> None:
+        self._renderer._upload(data)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._renderer, name)
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> tuple[Animation, Path]:
+    """Ten seconds of a face and a body, as a stream of 25 frames a second."""
+    frames = 250
+    face, body = fba.FaceTrack.empty(frames), fba.BodyTrack.empty(frames)
+    values, moves = np.array(face.values), np.array(body.values)
+    values[:, 2:12] = (300 * np.sin(np.arange(frames)[:, None] / np.arange(5, 15))).astype(int)
+    moves[:, 30:40] = (9000 * np.sin(np.arange(frames)[:, None] / np.arange(5, 15))).astype(int)
+    tracks = fba.FaceTrack(values, values != 0), fba.BodyTrack(moves, moves != 0)
+    animation = Animation(25, np.arange(frames), *tracks)  # type: ignore[arg-type]
+    path = tmp_path_factory.mktemp("bench") / "moving.fba"
+    fba.write(path, animation)
+    return fba.read(path), path
+
+
+@pytest.fixture(params=["timeline", "all panels"])
+def studio(request: pytest.FixtureRequest, moving: tuple[Animation, Path]) -> Iterator[Studio]:
+    animation, path = moving
+    scene = Scene(animation)
+    session = Session(scene, source=Source(scene, path), size=(1280, 720))
+    session.source.look(wait=True)
+    try:
+        made = Studio(session)
+    except DisplayError as error:
+        pytest.skip(str(error))
+    with made:
+        if request.param == "all panels":
+            session.open |= {panel.name for panel in made.gui.panels if panel.available(session)}
+        made.draw(6)
+        yield made
+
+
+def test_panels_outside_opengl(benchmark: Any, studio: Studio) -> None:
+    studio.gui._renderer = Lists(studio.gui._renderer)  # type: ignore[assignment]
+    studio.session.transport.play()
+    best = [float("inf")]
+
+    def batch() -> None:
+        begun = time.thread_time()
+        for _ in range(BATCH):
+            studio.gui.draw(1 / 60)
+        best[0] = min(best[0], (time.thread_time() - begun) / BATCH)
+
+    with studio._gl:
+        benchmark.pedantic(batch, rounds=ROUNDS)
+    studio.gui._renderer = studio.gui._renderer._renderer
+    benchmark.extra_info["milliseconds of the processor a picture"] = round(best[0] * 1e3, 2)
+    assert best[0] < GOAL
