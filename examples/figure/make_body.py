@@ -21,6 +21,7 @@ import shoes
 from cutting import Cloth
 from person import Person
 from sculpt import ORIGIN
+from shoulders import sloping
 
 from fba.body import Skeleton
 from fba.body.influences import strongest
@@ -62,6 +63,7 @@ class Piece:
 def pieces() -> tuple[dict[str, Piece], rig.Rig]:
     """Skin and garments of the body, and its rig."""
     person, bones = rig.rig()
+    person = sloping(person, bones)
     weights = _skull(person, bones)
     body = clothes.Body(person, weights)
     made = {
