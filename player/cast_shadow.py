@@ -82,7 +82,7 @@ class ShadowCaster:
         self._layers[:] = 0
         for mesh in meshes:
             points = self._points_of(mesh.shape)
-            if points is not None and not np.any(mesh.turn):
+            if points is not None and not mesh.turn.any():
                 _throw(
                     mesh.positions,
                     mesh.matrix,

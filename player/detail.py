@@ -51,14 +51,9 @@ class Details:
         if level is None:
             return mesh
         if level.light is None or not same(level.light[0], mesh.light):
-            level.light = (mesh.light, mesh.light[level.rows])
-        return replace(
-            mesh,
-            shape=level.shape,
-            positions=mesh.positions[level.rows],
-            normals=mesh.normals[level.rows],
-            light=level.light[1],
-        )
+            level.light = (mesh.light, mesh.light.take(level.rows, axis=0))
+        places, normals = mesh.positions.take(level.rows, axis=0), mesh.normals.take(level.rows, axis=0)
+        return FaceMesh(level.shape, places, normals, level.light[1], mesh.matrix, mesh.turn, mesh.centre)
 
     def _level(self, shape: FaceShape, number: int) -> _Level | None:
         levels = self._levels.setdefault(shape, {})

@@ -82,14 +82,15 @@ class Renderer:
         """
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
-        matrix = camera.projection_matrix(aspect) @ camera.view_matrix()
+        seen = camera.view_matrix()
+        matrix, place = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]
         gl.viewport = (0, 0, *size)
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
         pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
-        eye = tuple(float(v) for v in camera.eye)
+        eye, written = tuple(place.tolist()), matrix_bytes(matrix)
         for program in self._programs.values():
             set_uniform(program, "eye", eye)
-            set_uniform(program, "camera", matrix_bytes(matrix))
+            set_uniform(program, "camera", written)
             set_uniform(program, "pixel", pixel)
         self._draw_studio(view, matrix, size, (float(camera.target[0]), float(camera.target[2])))
         gl.enable_only(gl.DEPTH_TEST)
@@ -99,8 +100,8 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        drawn = replace(view, faces=self._details.suited(view.faces, eye, pixel))
-        self._faces.begin(camera.eye, matrix, pixel)
+        drawn = replace(view, faces=self._details.suited(view.faces, place, pixel))
+        self._faces.begin(place, matrix, pixel)
         self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
