@@ -111,21 +111,23 @@ def bar_picture(controls: Controls) -> Image:
 
 
 def help_picture(scale: float) -> Image:
-    """The help panel."""
+    """The help: two columns of keys."""
     from PIL import Image, ImageDraw
 
     rows = [row for row in keys() if not row.action.startswith("panel") or row.action == "panel help"]
-    font, line = label_font(13 * scale), 19 * scale
-    width, height = round(470 * scale), round((len(rows) + 1) * line + 26 * scale)
+    half = (len(rows) + 1) // 2
+    font, line, column = label_font(12 * scale), 19 * scale, 434 * scale
+    width, height = round(2 * column), round((half + 1) * line + 26 * scale)
     picture = Image.new("RGBA", (width, height), (0, 0, 0, 0))
     draw = ImageDraw.Draw(picture)
     draw.rounded_rectangle((0, 0, width - 1, height - 1), radius=10 * scale, fill=(18, 21, 26, 222))
-    y = 16 * scale
-    draw.text((24 * scale, y), "Keys and mouse", font=font, fill=ACCENT)
-    for row in rows:
-        y += line
-        draw.text((24 * scale, y), row.shown, font=font, fill=TEXT)
-        draw.text((180 * scale, y), row.does, font=font, fill=FAINT)
+    top = 16 * scale
+    draw.text((20 * scale, top), "Keys", font=font, fill=ACCENT)
+    for number, row in enumerate(rows):
+        side, down = divmod(number, half)
+        x, y = side * column + 20 * scale, top + (down + 1) * line
+        draw.text((x, y), row.shown, font=font, fill=TEXT)
+        draw.text((x + 136 * scale, y), row.does, font=font, fill=FAINT)
     return picture
 
 

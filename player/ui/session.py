@@ -31,6 +31,8 @@ Baps = npt.NDArray[np.float64]
 Hook = Callable[[Faps, Baps], None]
 
 NOTICE_SECONDS = 4.0
+NOTICE_GOES = 0.5
+"""Seconds before its end from which on a notice fades."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +142,9 @@ class Session:
     @property
     def restless(self) -> bool:
         """Whether the picture changes without the user's doing."""
-        return self.transport.playing or self.viewpoint.gliding or self.rolling or bool(self._notices)
+        going = self.clock() + NOTICE_GOES
+        leaving = any(notice.until < going for notice in self._notices)
+        return self.transport.playing or self.viewpoint.gliding or self.rolling or leaving
 
     def view(self, time: float) -> View:
         """What is drawn at a time, after `before_frame`."""

@@ -288,3 +288,40 @@ def test_hundreds_of_pictures_hold_their_memory(opengl: None, talking: Animation
             session.size = (wide, 240)
             studio.draw(2)
         assert len(studio.gui._renderer._textures) <= 2
+
+
+def test_a_panel_that_has_nothing_to_show_says_so(studio: Studio) -> None:
+    session = studio.session
+    session.toggle_panel("differences")  # of a single file
+    studio.draw(2)
+    assert session.open == set()
+    assert [notice.kind for notice in session.notices()] == ["warning"]
+
+
+def test_panels_open_where_there_is_room(studio: Studio) -> None:
+    session = studio.session
+    session.open |= {"camera", "curves"}
+    studio.draw(6)
+    places = [
+        (*imgui.internal.find_window_by_name(name).pos, *imgui.internal.find_window_by_name(name).size)
+        for name in ("###camera", "###curves")
+    ]
+    (x0, y0, w0, h0), (x1, y1, w1, h1) = places
+    assert x0 + w0 <= x1 or x1 + w1 <= x0 or y0 + h0 <= y1 or y1 + h1 <= y0
+    for x, y, wide, high in places:
+        assert 0 <= x <= x + wide <= SIZE[0]
+        assert 0 <= y <= y + high <= SIZE[1] - 124
+
+
+def test_it_rests_while_nothing_changes(studio: Studio, clock: Clock) -> None:
+    session = studio.session
+    assert not session.restless
+    session.say("a word", seconds=4.0)
+    assert not session.restless  # it stands still until it fades
+    clock.now += 3.8
+    assert session.restless
+    clock.now += 1.0
+    studio.draw(1)
+    assert not session.restless
+    session.viewpoint.preset("profile")
+    assert session.restless
