@@ -32,11 +32,11 @@ COARSE = 0.0032
 """Surfaces that are off by this (m) cast the same shadow."""
 KEY_RAYS, KEY_WIDTH = 12, 0.11
 """Directions of the key light, and its radius as an angle (rad)."""
-SKY_RAYS, STEEPEST, FLATTEST = 8, 0.95, 0.45
+SKY_RAYS, STEEPEST, FLATTEST = 8, 0.97, 0.62
 """Directions of the sky, from those heights (sines)."""
 KEY_SHARE, SKY_SHARE = 0.62, 0.85
 """How dark the ground is where all of either is hidden."""
-KEY_BLUR, SKY_BLUR = 1, 3
+KEY_BLUR, SKY_BLUR = 1, 4
 """Cells that the shadows are blurred by, twice."""
 LEAST = 3
 """Of 255: what is fainter is not drawn."""
