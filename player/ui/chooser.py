@@ -59,7 +59,9 @@ class Chooser:
         """Draw the button, and the list where it is open."""
         if imgui.button("Choose..."):
             imgui.open_popup("choose")
-        imgui.set_next_window_size((330, 360))
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        imgui.set_next_window_pos((low.x, high.y + 4), imgui.Cond_.appearing)
+        imgui.set_next_window_size((360, 330))
         if not imgui.begin_popup("choose"):
             return
         if imgui.is_window_appearing():
@@ -67,6 +69,8 @@ class Chooser:
         imgui.set_next_item_width(-1)
         _, self.query = imgui.input_text_with_hint("##query", "number, name or group", self.query)
         rows = found(self.query.strip(), face=face, body=body)
+        imgui.push_style_var(imgui.StyleVar_.frame_padding, (4, 2))
+        imgui.push_style_var(imgui.StyleVar_.item_spacing, (8, 3))
         imgui.begin_child("list", (0, 0))
         chosen = session.selection
         clipper = imgui.ListClipper()
@@ -79,9 +83,22 @@ class Chooser:
                 if (kind, number, text) == rows[0]:
                     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
                     self.place = (low.x + 10, (low.y + high.y) / 2)
+                _group(kind, number)
                 if changed and (on or not full):
                     chosen.toggle(kind, number)
         if not rows:
             imgui.text_colored(theme.FAINT, "nothing of that name")
         imgui.end_child()
+        imgui.pop_style_var(2)
         imgui.end_popup()
+
+
+def _group(kind: str, number: int) -> None:
+    """The group that it belongs to, in short, at the right end of its row."""
+    name = (faps() if kind == "fap" else baps())[number - 1].group_name.partition(",")[0]
+    text = f"{kind.upper()} {name}"
+    font, size = imgui.get_font(), theme.SMALL
+    right = imgui.get_window_pos().x + imgui.get_content_region_avail().x
+    wide = imgui.calc_text_size(text).x * size / imgui.get_font_size()
+    y = imgui.get_item_rect_min().y + 3
+    imgui.get_window_draw_list().add_text(font, size, (right - wide - 4, y), theme.packed(theme.FAINT), text)
