@@ -144,7 +144,8 @@ class Session:
         """Whether the picture changes without the user's doing."""
         going = self.clock() + NOTICE_GOES
         leaving = any(notice.until < going for notice in self._notices)
-        return self.transport.playing or self.viewpoint.gliding or self.rolling or leaving
+        filming = self.recording is not None
+        return self.transport.playing or self.viewpoint.gliding or self.rolling or filming or leaving
 
     def view(self, time: float) -> View:
         """What is drawn at a time, after `before_frame`."""
