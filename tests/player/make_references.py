@@ -2,7 +2,9 @@
 
     python tests/player/make_references.py [--only NAME ...] [--sheet FILE.png]
 
-Look at the sheet before you commit what this wrote. Needs OpenGL; software OpenGL, as in CI.
+Look at the sheet before you commit what this wrote. Needs OpenGL; software OpenGL, as in CI. With --dry it
+only says how far what is drawn now is from the references; with GALLIUM_DRIVER=softpipe in the environment
+that is how far another rasteriser is.
 """
 
 from __future__ import annotations

@@ -20,10 +20,11 @@ FINE, SPOT = 0.8, 2.0
 """Standard deviations of the blurs, pixels."""
 AROUND = 7
 """Half the side of a broad area, pixels."""
-MOST_MEAN, MOST_PERCENTILE, MOST_SPOT, MOST_BROAD = 0.4, 3.0, 6.0, 0.6
+MOST_MEAN, MOST_PERCENTILE, MOST_SPOT, MOST_BROAD = 0.4, 3.0, 7.0, 0.6
 """What is passed. Measured on the references: noise of a step in every value gives at most 0.31, 0.9, 1.2
-and 0.11; all edges moved by a twentieth of a pixel 0.25, 2.5, 4.9 and 0.5; a missing eye gives a spot of 11,
-light brighter by 3 % in a third of the picture 0.78 in broad areas."""
+and 0.11; all edges moved by a twentieth of a pixel 0.25, 2.5, 4.9 and 0.5; Mesa's softpipe, a rasteriser of
+its own, 0.13, 2.3, 5.4 and 0.15. A missing eye gives a spot of 11, light brighter by 3 % in a third of the
+picture 0.78 in broad areas."""
 CHEQUERS = 6
 """Pixels a square of the board that transparent pictures are laid on."""
 

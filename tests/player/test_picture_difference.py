@@ -73,7 +73,7 @@ class TestOfPictures:
         ("name", "other"),
         [
             ("neutral_front", {"switches": ("eyes=off",)}),
-            ("neutral_three_quarter", {"switches": ("hair=off",)}),
+            ("fap_eyes", {"switches": ("hair=off",)}),
             ("neutral_front", {"switches": ("shadows=off",)}),
             ("neutral_front", {"faps": ("close_t_l_eyelid=400",)}),
             ("neutral_front", {"faps": ("head_yaw=2500",)}),
