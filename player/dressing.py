@@ -32,7 +32,8 @@ HAIRS = ("lash", "brow")
 INSIDE = (*HAIRS, "teeth", "tongue", "mouth", "eye")
 """Kinds of parts that a body of glass does without."""
 DOT: Colour = (0.98, 0.62, 0.20, 1.0)
-DOT_RADIUS = 3.2
+DOT_RADIUS, DOT_SIZE = 3.2, 0.0022
+"""Pixels of a picture 720 high, and at most so many metres."""
 DOT_LIFT, NAME_LIFT = 0.004, 0.006
 
 
@@ -150,4 +151,5 @@ class Dressing:
             (DOT_LIFT if over else NAME_LIFT) * self._scale,
             self._names,
             ways.astype(np.float32),
+            DOT_SIZE * self._scale,
         )

@@ -6,6 +6,7 @@ Colours here are those of a drawing, not of a thing in the light: red, green, bl
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,7 +38,8 @@ class Dots:
 
     places: float32 (N, 3). colour: of all. radius: pixels of a picture 720 high; 0 for names alone. lift:
     as of lines; hidden further, a dot shines through faintly. names: one a dot, shown where few are in
-    view. facing: float32 (N, 3), the way in which a dot can be seen; zeros: from everywhere.
+    view. facing: float32 (N, 3), the way in which a dot can be seen; zeros: from everywhere. most: no dot
+    has a larger radius than this (m), so that from afar they stay apart.
     """
 
     places: Float32
@@ -46,6 +48,7 @@ class Dots:
     lift: float
     names: tuple[str, ...]
     facing: Float32
+    most: float = math.inf
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable
 from typing import Any
 
@@ -29,6 +30,7 @@ CROWDED = 7.0
 """Lines shorter than this (pixels) are fainter: a fine mesh is a tint, not a black spot."""
 HIDDEN = 0.2
 """How much of a dot is seen through what hides it."""
+LEAST_RADIUS = 0.8
 NAME_SIZE, SMALLEST_NAME = 13, 10
 LEAST_LEGEND = 0.65
 MARGIN = 14
@@ -48,6 +50,14 @@ def projected(places: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[
     clip[clip[:, 3] < 1e-6] = np.nan
     flat = clip[:, :3] / clip[:, 3:]
     return (flat[:, :2] * (0.5, -0.5) + 0.5) * size, flat[:, 2] * 0.5 + 0.5
+
+
+def _pixels_a_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
+    """How many pixels a metre has where the middle of the dots is."""
+    if not len(dots.places):
+        return 0.0
+    away = float(np.linalg.norm(dots.places.mean(axis=0) - camera.eye))
+    return size[1] / (2 * max(away, 1e-6) * math.tan(math.radians(camera.field_of_view) / 2))
 
 
 def _towards(eye: Float64, places: Float64, lift: float) -> Float64:
@@ -91,7 +101,7 @@ class ExtrasRenderer:
             self._draw_lines(lines, scale)
         for dots in extras.dots:
             if dots.radius > 0:
-                self._draw_dots(dots, scale)
+                self._draw_dots(dots, scale, _pixels_a_metre(dots, camera, size))
         gl.enable_only(gl.BLEND)
         self._depths = None
         if size[1] >= SMALLEST:
@@ -192,11 +202,12 @@ class ExtrasRenderer:
         content = [(corners, "2f", "in_corner"), (ends, "3f 3f/i", "in_from", "in_to"), tint]
         self._render("line", content, len(lines.ends))
 
-    def _draw_dots(self, dots: Dots, scale: float) -> None:
+    def _draw_dots(self, dots: Dots, scale: float, near: float) -> None:
+        """near: pixels a metre where they are."""
         if not len(dots.places):
             return
         gl, program = self._gl, self._programs["dot"]
-        set_uniform(program, "radius", max(dots.radius * scale, 0.9))
+        set_uniform(program, "radius", max(min(dots.radius * scale, dots.most * near), LEAST_RADIUS))
         set_uniform(program, "lift", dots.lift)
         set_uniform(program, "colour", dots.colour)
         content = [
