@@ -73,9 +73,9 @@ class Performer:
         if recorder is not None and len(recorder):
             self.takes.add(recorder.take(f"take {len(self.takes) + 1}"))
 
-    def save(self, name: str) -> Path:
-        """Write the last take; raises what `Takes.save` raises."""
-        return self.takes.save(name)
+    def save(self, name: str) -> tuple[Path, str]:
+        """Write the last take, with the BAP steps of what is played; returns and raises as `Takes.save`."""
+        return self.takes.save(name, bap_steps=self.session.source.bap_steps)
 
     def _begin(self) -> None:
         self._begun = self.session.clock()

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.errors import FormatError
+from fba.errors import FormatError, RangeError
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP
 from fba.tracks import BodyTrack, FaceTrack
 
@@ -135,9 +135,10 @@ class Takes:
             found, number = f"{name}-{number}", number + 1
         return found
 
-    def save(self, name: str) -> Path:
-        """Write the last take, and return its path.
+    def save(self, name: str, *, bap_steps: str = "iso") -> tuple[Path, str]:
+        """Write the last take; its path, and the table of BAP steps that readers need.
 
+        Where the standard's steps ("iso") do not reach as far as a joint was turned, "visage" are used.
         Raises FormatError where there is a file of that name already, where nothing was recorded or it
         cannot be written, RangeError for values that no stream holds.
         """
@@ -152,5 +153,11 @@ class Takes:
             )
         import fba
 
-        fba.write(path, self.last)
-        return path
+        try:
+            fba.write(path, self.last, bap_steps=bap_steps)
+        except RangeError:
+            if self.last.body is None or bap_steps == "visage":
+                raise
+            bap_steps = "visage"
+            fba.write(path, self.last, bap_steps=bap_steps)
+        return path, bap_steps

@@ -13,7 +13,7 @@ from player.ui.panel import Panel, heading, tooltip
 from player.ui.puppet_rows import Group, Row, groups
 from player.ui.session import Session
 
-TITLE, VALUE, RELEASE = 140.0, 68.0, 18.0
+TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
 """Points that a row's name takes, its value, and the button that gives it back."""
 
 
@@ -21,7 +21,7 @@ class PuppetPanel(Panel):
     """Sliders for FAPs, visemes, expressions and the body; takes of what they do."""
 
     name, title, label = "puppet", "Puppeteer", "Puppet"
-    width, height = 372.0, 530.0
+    width, height = 380.0, 530.0
 
     def __init__(self) -> None:
         self._performer: Performer | None = None
@@ -161,7 +161,7 @@ class PuppetPanel(Panel):
         value = sum(float(shown[number - 1]) for number in row.numbers) * row.scale
         title = row.title
         if self.together and row.mirror is not None:
-            title = " ".join(word for word in title.split() if word not in ("left", "l"))
+            title = title.removesuffix(" L").removesuffix(" R")
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if touched else theme.FAINT, title)
         imgui.same_line(TITLE)
@@ -300,8 +300,13 @@ def _choice(label: str, names: tuple[str, ...], now: int) -> int:
 
 def _save(session: Session, performer: Performer, name: str) -> None:
     try:
-        path = performer.save(name)
+        path, steps = performer.save(name)
     except (FbaError, OSError) as error:
         session.say(str(error), "error", 8.0)
         return
-    session.say(f"Kept as {path}")
+    how = (
+        ""
+        if steps == "iso" or performer.takes.last is None or performer.takes.last.body is None
+        else (f"; play it with --bap-steps {steps}")
+    )
+    session.say(f"Kept as {path}{how}", seconds=8.0 if how else 4.0)

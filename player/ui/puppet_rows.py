@@ -22,9 +22,10 @@ SHIFT = 1000.0
 class Row:
     """A slider.
 
-    title: for people. numbers: the FAPs, or the BAPs that share the motion, by number. low, high: in the
-    parameter's unit, or degrees. unit: as shown. mirror: position of the other side's row in its group, or
-    None; flipped: whether that one then has the opposite value. side: "l", "r" or "".
+    title: for people, with its side at the end ("raise inner eyebrow L"). numbers: the FAPs, or the BAPs that
+    share the motion, by number. low, high: in the parameter's unit, or degrees. unit: as shown. mirror:
+    position of the other side's row in its group, or None; flipped: whether that one then has the opposite
+    value. side: "l", "r" or "".
     """
 
     kind: str
@@ -87,7 +88,7 @@ def _fap_rows(names: list[str]) -> tuple[Row, ...]:
         scale = DEGREES if unit == "deg" else 1.0
         most = float(np.ceil(reach(number) * BEYOND * scale / 5) * 5)
         words = fap.name.split("_")
-        side = next((word for word in words if word in ("l", "r")), "")
+        side = next((word[0] for word in words if word in ("l", "r", "lm", "rm")), "")
         mate = fap.left_right_mate
         rows.append(
             Row(
@@ -121,6 +122,8 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
             low, high = -SHIFT, SHIFT
             if unit != "mm":
                 (low, high), unit = widest()[number - 1].tolist(), "deg"
+        if unit == "deg":
+            low, high = max(low, _carried(numbers, 0)), min(high, _carried(numbers, 1))
         side = word[0] if word.startswith(("left ", "right ", "l_", "r_")) else ""
         other = _other_side(word)
         flipped = other in words and _flipped(numbers[0])
@@ -129,6 +132,16 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
                 words.index(other) if other in words else None, flipped)
         )  # fmt: skip
     return tuple(rows)
+
+
+def _carried(numbers: tuple[int, ...], end: int) -> float:
+    """Degrees that a stream can carry at most (end 1) or at least (end 0), in whole degrees."""
+    found = 0.0
+    for number in numbers:
+        bap = baps()[number - 1]
+        assert bap.i_limits is not None
+        found += bap.i_limits[end] * max(bap.step_iso, bap.step_visage) * DEGREES
+    return float(np.trunc(found))
 
 
 def _flipped(number: int) -> bool:
@@ -150,14 +163,22 @@ def _other_side(name: str) -> str:
 
 
 def _title(name: str) -> str:
-    """ "raise l i eyebrow" with its words in full."""
-    full = {"l": "left", "r": "right", "t": "top", "b": "bottom", "i": "inner", "m": "middle", "o": "outer",
-            "lm": "left", "rm": "right", "midlip": "mid lip", "cornerlip": "lip corner"}  # fmt: skip
+    """ "raise inner eyebrow L" of "raise_l_i_eyebrow"; that a lip is its outer contour the group says."""
+    full = {"t": "top", "b": "bottom", "i": "inner", "m": "middle", "o": "outer", "lm": "L", "rm": "R",
+            "midlip": "mid lip", "cornerlip": "lip corner"}  # fmt: skip
     words = name.split("_")
     if words[-1] == "o":
-        words = [*words[:-1], "outer"] if "eyebrow" not in words else words
-    return " ".join(full.get(word, word) for word in words)
+        words = words[:-1]
+    side = [word.upper() for word in words if word in ("l", "r")]
+    return " ".join([full.get(word, word) for word in words if word not in ("l", "r")] + side)
 
 
 def _body_title(name: str) -> str:
-    return name.replace("HumanoidRoot_", "").replace("tr_", "").replace("rt_", "").replace("_", " ")
+    """ "upper arm flexion L" of a limit or a BAP."""
+    for word, short in (("HumanoidRoot_tr_", ""), ("HumanoidRoot_rt_", ""), ("spine 3", "upper spine"),
+                        ("spine 2", "middle spine"), ("spine 1", "lower spine")):  # fmt: skip
+        name = name.replace(word, short)
+    words = name.replace("1_", " ").replace("_", " ").split()
+    if words[0] in ("left", "right", "l", "r"):
+        words = [*words[1:], words[0][0].upper()]
+    return " ".join(words)

@@ -168,15 +168,16 @@ def test_a_take_comes_back_from_its_file(tmp_path: Path) -> None:
         recorder.add(frame / 30, wanted[frame], np.r_[turned[frame], np.zeros(110)])
     takes = Takes(tmp_path)
     takes.add(recorder.take())
-    path = takes.save("mine")
+    path, steps = takes.save("mine")
+    assert steps == "iso"
     assert path == tmp_path / "mine.fba"
     back = fba.read(path)
     assert back.rate == 30
     assert back.face is not None
     assert back.body is not None
-    steps = fba.parameters.fap_steps()
+    fap_steps = fba.parameters.fap_steps()
     # predictive coding with the finest quantiser errs by half a step, and one for what was not a whole step
-    assert (np.abs(resolve(back.face) - wanted).max(axis=0)[2:] <= steps[2:]).all()
+    assert (np.abs(resolve(back.face) - wanted).max(axis=0)[2:] <= fap_steps[2:]).all()
     assert (np.abs(back.body.values[:, :186] - turned) <= fba.parameters.bap_steps()[:186]).all()
 
 
@@ -188,7 +189,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
         recorder = TakeRecorder(Fraction(25))
         recorder.add(0.0, np.full(68, height, np.float32), np.zeros(296))
         takes.add(recorder.take())
-    path = takes.save("mine.fba")
+    path, _ = takes.save("mine.fba")
     before = path.read_bytes()
     assert takes.free_name("mine") == "mine-2"
     with pytest.raises(FormatError, match=r"exists already.*mine-2"):
@@ -204,3 +205,18 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     for name in ("", "  ", "folder/", ".."):
         with pytest.raises(FormatError, match="no name"):
             takes.save(name)
+
+
+def test_an_arm_lifted_high_needs_the_wider_steps(tmp_path: Path) -> None:
+    recorder = TakeRecorder(Fraction(25), face=False, body=True)
+    for frame in range(5):
+        baps = np.zeros(296)
+        baps[33] = 232000 - 1000 * frame  # 133 degrees; the first frame goes up to 68 by the standard's steps
+        recorder.add(frame / 25, np.zeros(68, np.float32), baps)
+    takes = Takes(tmp_path)
+    takes.add(recorder.take())
+    path, steps = takes.save("lifted")
+    assert steps == "visage"
+    body = fba.read(path, bap_steps=steps).body
+    assert body is not None
+    assert np.abs(body.values[:, 33] - (232000 - 1000 * np.arange(5))).max() <= 170

@@ -211,7 +211,7 @@ def test_left_and_right_move_together_or_alone(opened: Opened, walking: Animatio
     faps, baps = np.zeros(68, np.float32), np.zeros(296)
     puppet(faps, baps)
     assert (faps[30], faps[31]) == (120, 120)
-    abduct = next(n for n, row in enumerate(arms.rows) if row.title == "left upper arm abduction")
+    abduct = next(n for n, row in enumerate(arms.rows) if row.title == "upper arm abduction L")
     panel._move(performer, arms, arms.rows[abduct], 60.0)
     puppet(faps, baps)
     assert np.degrees(baps[33:35] * 1e-5) == pytest.approx([60, -60])  # both turn about +Z: mirrored
