@@ -1,4 +1,4 @@
-"""What the panels of the window cost the processor in each picture, outside OpenGL: 2 ms at most; and memory."""
+"""What the panels of the window cost the processor in a picture, outside OpenGL: 2 ms at most; and memory."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from player.ui.picture import Studio
 
 GOAL = 2e-3
 """Seconds a picture."""
-BATCH, ROUNDS = 20, 15
+BATCH, ROUNDS = 5, 80
 
 
 class Lists:
