@@ -44,6 +44,10 @@ class RatePanel(Panel):
         self.bars = (0.0, 0.0, 0.0, 0.0)
         """Where the bars of the planes are: left, top, right, bottom in points; for tests."""
 
+    def available(self, session: Session) -> bool:
+        """Where one performance is shown."""
+        return not hasattr(session.scene, "scenes")
+
     def draw(self, session: Session) -> None:
         """Draw it."""
         info, own = self._stream(session)
@@ -76,8 +80,8 @@ class RatePanel(Panel):
         if session.source.looking:
             return None, "Reading..."
         animation = getattr(session.scene, "animation", None)
-        if not isinstance(animation, Animation) or hasattr(session.scene, "scenes"):
-            return None, "No file whose planes could be counted."
+        if not isinstance(animation, Animation):
+            return None, "The planes of what is still arriving are not counted."
         if self._would is None or self._would[0] is not animation:
             result: list[StreamInfo | None] = []
             self._would = (animation, result)

@@ -9,13 +9,14 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.codec import StreamInfo
+from fba.compiled import is_compiled
 
 Float64 = npt.NDArray[np.float64]
 
 WINDOW = 1.0
 """Seconds over which a rate is taken."""
-MOST_VALUES = 3_000_000
-"""Values that are encoded only to see what they would take: well under a second."""
+MOST_VALUES = 3_000_000 if is_compiled() else 30_000
+"""Values that are encoded only to see what they would take: about a second."""
 
 
 @dataclass(frozen=True)
