@@ -153,7 +153,7 @@ def test_dragging_a_mark(window: Window, hand: Hand) -> None:
 
 def test_the_slider_of_speed(window: Window, hand: Hand) -> None:
     *_, bottom = window._gui.bar.place
-    x0, x1 = window._gui.bar.slider
+    x0, x1 = window._gui.bar.buttons.slider
     hand.drag(((x0 + x1) / 2, bottom + 28), (x1 + 30, bottom + 28))
     assert window.transport.speed == 4.0
     hand.drag(((x0 + x1) / 2, bottom + 28), (x0 - 30, bottom + 28))
