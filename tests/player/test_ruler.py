@@ -80,3 +80,13 @@ def test_motion_is_added_up_over_parameters() -> None:
     np.testing.assert_allclose(trace.amounts, [0.0, 1.5, 0.5])  # the expression is chosen and half there
     still = face_track([{3: 7}, {3: 7}])
     assert trace_of_motion(Animation(25, np.arange(2), face=still)) is None  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("slid", "speed"), [(0.98, 1.0), (1.02, 1.0), (2.613, 2.61), (9.0, 4.0), (0.01, 0.1), (0.255, 0.25)]
+)
+def test_the_slider_of_speed_holds_on_to_its_steps(slid: float, speed: float) -> None:
+    pytest.importorskip("imgui_bundle")
+    from player.ui.transport_buttons import snapped
+
+    assert snapped(slid) == speed
