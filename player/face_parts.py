@@ -120,9 +120,6 @@ def hairs(part: Part) -> Float32 | None:
     """
     if not len(part.triangles):
         return None
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
     vertices, count = part.vertices.astype(np.float64), len(part.vertices)
     edges = part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.intp)
     edges = np.concatenate([edges, edges[:, ::-1]])
@@ -138,8 +135,8 @@ def hairs(part: Part) -> Float32 | None:
     half[rows] = length[nearest] / 2
     if not paired.any() or 2 * float(np.median(half[paired])) > THICKEST_HAIR:
         return None
-    pieces, hair = connected_components(csr_matrix((np.ones(len(edges)), edges.T), (count, count)))
-    tip = np.full(pieces, -1)
+    hair = _pieces(edges, count)
+    tip = np.full(count, -1)
     tip[hair[~paired]] = np.flatnonzero(~paired)  # a point is not opposite to what is nearest to it
     kept = paired & (tip[hair] >= 0)
     found = np.zeros((count, 8), dtype=np.float32)
@@ -148,6 +145,19 @@ def hairs(part: Part) -> Float32 | None:
     found[kept, 3] = half[kept]
     found[kept, 4:7] = _units(vertices[tip[hair[kept]]] - vertices[kept])
     return found
+
+
+def _pieces(edges: npt.NDArray[np.intp], count: int) -> npt.NDArray[np.intp]:
+    """(V,) the lowest vertex that each is joined to. edges (E, 2), both ways."""
+    lowest = np.arange(count)
+    while True:  # each round halves the way that is left to go
+        found = lowest.copy()
+        np.minimum.at(found, edges[:, 0], lowest[edges[:, 1]])
+        np.minimum.at(found, lowest, found)
+        found = found[found]
+        if np.array_equal(found, lowest):
+            return lowest
+        lowest = found
 
 
 def _units(vectors: Float64) -> Float64:
