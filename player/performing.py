@@ -69,7 +69,7 @@ class Performer:
     def stop(self) -> None:
         """End the take that is being recorded, or the one that is shown."""
         recorder, self._recorder, self._shown = self._recorder, None, None
-        self.session.rolling = False
+        self.session.rolling.discard("take")
         if recorder is not None and len(recorder):
             self.takes.add(recorder.take(f"take {len(self.takes) + 1}"))
 
@@ -79,7 +79,7 @@ class Performer:
 
     def _begin(self) -> None:
         self._begun = self.session.clock()
-        self.session.rolling = True
+        self.session.rolling.add("take")
         self.attach()
 
     def _hook(self, faps: Faps, baps: Baps) -> None:

@@ -14,8 +14,8 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
-BLOCK = 2048
-"""Frames of a face worked out at once: a few milliseconds."""
+BLOCK = 512
+"""Frames of a face worked out at once: about two milliseconds."""
 UNTOLD = 0.5
 """What a FAP that is only filled in counts beside those that are sent."""
 TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0

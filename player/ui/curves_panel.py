@@ -58,13 +58,20 @@ class CurvesPanel(Panel):
             self._lanes = [_lane(course, place) for place, course in enumerate(courses)]
         self.lanes.draw(session, self._lanes, self.stretch, _now(session, chosen))
 
+    def closed(self, session: Session) -> None:
+        """What has been worked out is kept."""
+        session.rolling.discard(self.name)
+
     def _known(self, session: Session) -> Columns:
         timeline = _timeline(session)
         if self._columns is None or self._of is not timeline:
             later = getattr(session.scene.timeline, "later", (0,))[0]
             self._columns = Columns(timeline, getattr(session.scene, "model", None), float(later))
             self._of, self._begun = timeline, False
-        self._columns.advance()
+        if self._columns.advance():
+            session.rolling.add(self.name)
+        else:
+            session.rolling.discard(self.name)
         if not self._begun and self._columns.known >= 1.0:
             self._begun = True
             if not (session.selection.faps or session.selection.baps):

@@ -29,6 +29,7 @@ AXIS = 22.0
 """Points below the lanes for the times."""
 APART = 74.0
 THIN, THICK = 1.0, 1.6
+"""Of stretches that were not sent, and that were."""
 ZOOM = 0.8
 
 
@@ -55,6 +56,7 @@ class _Lines:
     whole: list[imgui.ImVec2]
     runs: list[list[imgui.ImVec2]]
     all_sent: bool
+    dense: bool
     zero: float | None
     low: float
     high: float
@@ -122,12 +124,13 @@ class Lanes:
             zero = top + lines.zero
             to.add_line((left, zero), (right, zero), theme.packed(theme.TEXT, 0.13))
         to.push_clip_rect((left, top - 1), (right, top + CURVE + 1), True)
+        colour = _darker(lane.colour) if lines.dense else lane.colour
         if lines.all_sent:
-            _line(to, lines.whole, corner, lane.colour, 1.0, THICK)
+            _line(to, lines.whole, corner, colour, 1.0, THICK)
         else:
-            _line(to, lines.whole, corner, lane.colour, 0.5, THIN)
+            _line(to, lines.whole, corner, colour, 0.5, THIN)
             for run in lines.runs:
-                _line(to, run, corner, lane.colour, 1.0, THICK)
+                _line(to, run, corner, colour, 1.0, THICK)
         to.pop_clip_rect()
         at = ruler.x(session.transport.time)
         if stretch.low <= session.transport.time <= stretch.high:
@@ -226,7 +229,14 @@ def _placed(found: Envelope, key: tuple[object, ...], low: float, high: float, w
     all_sent = bool(found.sent.all())
     runs = [] if all_sent else [_wide_enough(points[a:b]) for a, b in found.runs()]
     zero = float(y(np.zeros(1))[0]) if low < 0 < high else None
-    return _Lines(key, points, runs, all_sent, zero, low, high)
+    dense = len(points) > 1.2 * wide and float(np.abs(np.diff(found.values)).mean()) > 0.2 * room
+    return _Lines(key, points, runs, all_sent, dense, zero, low, high)
+
+
+def _darker(colour: theme.Colour) -> theme.Colour:
+    """Of what fills its lane: it is not to outshine the others."""
+    red, green, blue, alpha = colour
+    return red * 0.6, green * 0.6, blue * 0.6, alpha
 
 
 def _wide_enough(points: list[imgui.ImVec2]) -> list[imgui.ImVec2]:

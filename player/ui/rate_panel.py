@@ -72,6 +72,10 @@ class RatePanel(Panel):
         self._planes(session, found)
         _table(found)
 
+    def closed(self, session: Session) -> None:
+        """What has been worked out is kept."""
+        session.rolling.discard(self.name)
+
     def _stream(self, session: Session) -> tuple[StreamInfo | None, str]:
         """What is measured, and a word about it where it is not the file itself."""
         info = session.source.info
@@ -89,7 +93,9 @@ class RatePanel(Panel):
                 target=lambda: result.append(encoded(animation)), name="fba rate", daemon=True
             ).start()
         if not self._would[1]:
+            session.rolling.add(self.name)
             return None, "Encoding, to see what it would take..."
+        session.rolling.discard(self.name)
         would = self._would[1][0]
         return would, "if encoded" if would else "No stream."
 

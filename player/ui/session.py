@@ -72,7 +72,7 @@ class Session:
 
     wishes: what the window is to do after this picture; see `wish`. recording: seconds recorded so far,
     None where nothing is being recorded. values: faps and baps of the last picture, after the hooks.
-    rolling: a hook changes the picture by itself, or counts on being called.
+    rolling: names of what changes the picture by itself, or counts on being drawn.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Session:
         self.before_frame: list[Hook] = []
         self.wishes: deque[str] = deque()
         self.recording: float | None = None
-        self.rolling = False
+        self.rolling: set[str] = set()
         self.audio: Audio | None = None
         self.values: tuple[Faps, Baps] = (np.zeros(68, np.float32), np.zeros(296))
         self.clock = clock

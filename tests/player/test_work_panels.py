@@ -154,8 +154,11 @@ def test_the_bit_rate_of_a_stream(opened: Opened, talking: Animation, tmp_path: 
 
 
 def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animation) -> None:
-    studio = opened(talking, "rate")
+    studio = opened(talking)
+    studio.session.open.add("rate")
     panel = panel_of(studio, "rate")
+    studio.draw(1)
+    assert studio.session.restless or panel._would[1]  # pictures go on until it is known
     for _ in range(600):
         studio.draw(1)
         if panel._would is not None and panel._would[1]:
@@ -166,6 +169,24 @@ def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animatio
     studio.draw(2)
     assert panel.bars[2] > panel.bars[0] > 0
     assert panel._rates[1].totals[0].planes == 1
+    assert not studio.session.restless
+
+
+def test_pictures_go_on_until_all_curves_are_known(
+    opened: Opened, talking: Animation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("player.ui.columns.BLOCK", 1)
+    studio = opened(talking, "curves")
+    session = studio.session
+    assert session.restless
+    assert session.selection.faps == []  # which move most is not known yet
+    session.open.clear()
+    studio.draw(1)
+    assert not session.restless
+    session.open.add("curves")
+    studio.draw(10)
+    assert session.selection.faps == [5, 3, 31]
+    assert not session.restless
 
 
 def slider(studio: Studio, group: str, row: int, share: float) -> tuple[float, float]:
