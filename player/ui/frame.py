@@ -15,6 +15,8 @@ TOP = 56.0
 """Where panels begin below the buttons."""
 FADE = 0.4
 """Seconds in which a word goes."""
+MOST_OF_WIDTH = 0.55
+"""Wider than this share of the window, the buttons become one: they must not cover who is seen."""
 NARROW = 560.0
 """Below so many points of width the name is left out; below 300 the buttons too."""
 
@@ -46,7 +48,7 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
         return display[0]
     labels = [panel.label for panel in panels]
     wide = _width(labels)
-    together = wide > display[0] - 2 * EDGE
+    together = wide > MOST_OF_WIDTH * display[0]
     if together:
         wide = _width(["Panels"])
     left = display[0] - EDGE - wide
