@@ -229,7 +229,8 @@ def _placed(found: Envelope, key: tuple[object, ...], low: float, high: float, w
     all_sent = bool(found.sent.all())
     runs = [] if all_sent else [_wide_enough(points[a:b]) for a, b in found.runs()]
     zero = float(y(np.zeros(1))[0]) if low < 0 < high else None
-    dense = len(points) > 1.2 * wide and float(np.abs(np.diff(found.values)).mean()) > 0.2 * room
+    spread = wide * float(np.ptp(found.x)) if len(points) > 8 else np.inf
+    dense = len(points) > 1.5 * spread and float(np.abs(np.diff(found.values)).mean()) > 0.2 * room
     return _Lines(key, points, runs, all_sent, dense, zero, low, high)
 
 

@@ -145,7 +145,8 @@ class Session:
         going = self.clock() + NOTICE_GOES
         leaving = any(notice.until < going for notice in self._notices)
         filming = self.recording is not None
-        return self.transport.playing or self.viewpoint.gliding or self.rolling or filming or leaving
+        moving = self.transport.playing or self.viewpoint.gliding
+        return moving or bool(self.rolling) or filming or leaving
 
     def view(self, time: float) -> View:
         """What is drawn at a time, after `before_frame`."""
