@@ -321,3 +321,26 @@ def test_all_together_none_covers_another(opened: Opened, walking: Animation, si
 def test_tiny_windows(opened: Opened, walking: Animation, size: tuple[int, int]) -> None:
     studio = opened(walking, "curves", "rate", "puppet", size=size)
     assert studio.draw(3).shape == (size[1], size[0], 4)
+
+
+def test_a_take_of_what_is_played_is_what_was_played(
+    opened: Opened, talking: Animation, clock: Clock
+) -> None:
+    studio = opened(talking, "puppet")
+    session = studio.session
+    session.transport.loop = False
+    performer = panel_of(studio, "puppet").performer(session)
+    performer.record()
+    session.transport.play()
+    for _ in range(22):  # 60 pictures a second, 0.36 s
+        studio.draw(1)
+        clock.now += 1 / 60
+    performer.stop()
+    take = performer.takes.last
+    assert take is not None
+    assert take.face is not None
+    assert talking.face is not None
+    assert take.rate == talking.rate
+    sent = [2, 4, 30]
+    assert np.abs(take.face.values[:9, sent] - talking.face.values[:9, sent]).max() <= 1
+    assert take.face.values[5, 51] == take.face.values[5, 4]  # the outer lip, which the face filled in
