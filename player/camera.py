@@ -23,11 +23,15 @@ DISTANCES = (0.05, 100.0)
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What a camera is fitted to: centre (x, y, z) and half the height and width to be seen, metres."""
+    """What a camera is fitted to: centre (x, y, z) and half the height and width to be seen, metres.
+
+    half_depth: how far from the centre this may come towards the camera.
+    """
 
     centre: tuple[float, float, float]
     half_height: float
     half_width: float
+    half_depth: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,7 @@ class Camera:
     def fit(self, subject: Subject, aspect: float) -> Camera:
         """The same direction, moved so that the subject fills the picture."""
         half = max(subject.half_height, subject.half_width / max(aspect, 1e-3))
-        distance = half / math.tan(math.radians(self.field_of_view) / 2)
+        distance = half / math.tan(math.radians(self.field_of_view) / 2) + subject.half_depth
         return replace(self, target=subject.centre, distance=_clamped(distance, DISTANCES))
 
     def orbit(self, yaw: float, pitch: float) -> Camera:

@@ -18,6 +18,8 @@ STANDING = 0.12
 """Legs that move less than this (m) stand still."""
 MOST_TRAVEL = 4.0
 """A performance that moves further than this (m) is followed by the camera instead of fitted whole."""
+NEAR = 0.12
+"""Who goes about by less than this (m) stays at one distance."""
 LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
 
@@ -39,7 +41,8 @@ class Extent:
         top = whole.centre[1] + whole.half_height
         bottom = min(HIPS, top - 0.8)
         x, _, z = whole.centre
-        return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, min(whole.half_width, 0.55))
+        half_width = min(whole.half_width, 0.55)
+        return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, half_width, whole.half_depth)
 
 
 def body_extent(places: Float64, names: tuple[str, ...]) -> Extent:
@@ -56,7 +59,9 @@ def body_extent(places: Float64, names: tuple[str, ...]) -> Extent:
     x, y, z = (float(v) for v in (low + high) / 2)
     wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     tall = max(float(high[1] - low[1]) / 2 * 1.06, 0.9)
-    subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width))
+    path = places[:, 0, [0, 2]]
+    towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from whatever side the camera looks
+    subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - NEAR, 0.0))
     return Extent(subject, follows=False, legs_move=legs_move)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from player.camera import Camera
 from player.framing import body_extent
 
 NAMES = ("HumanoidRoot", "l_knee", "r_knee", "l_ankle", "r_ankle", "skullbase", "l_wrist")
@@ -72,3 +73,15 @@ def test_the_upper_half_ends_at_the_hips() -> None:
     )
     assert upper.centre[1] - upper.half_height == pytest.approx(0.78)
     assert upper.half_width <= 0.55
+
+
+@pytest.mark.parametrize(("preset", "towards"), [("front", (0.0, 0.0, 1.6)), ("profile", (1.6, 0.0, 0.0))])
+def test_who_comes_nearer_stays_in_view(preset: str, towards: tuple[float, float, float]) -> None:
+    """Worked out by rays: joints seen from the camera lie within its opening."""
+    places = moved({}, {"all": towards})
+    camera = Camera.preset(preset, body_extent(places, NAMES).subject, aspect=16 / 9)
+    direction = np.array([0.0, 0.0, 1.0] if preset == "front" else [1.0, 0.0, 0.0])
+    eye = np.array(camera.target) + camera.distance * direction
+    seen = places.reshape(-1, 3) - eye
+    steep = np.abs(seen[:, 1]) / (seen @ -direction)
+    assert steep.max() < np.tan(np.radians(camera.field_of_view) / 2)
