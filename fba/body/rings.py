@@ -63,8 +63,10 @@ def _neighbours(triangles: Int64) -> tuple[Int64, Int64]:
     """All pairs of joined vertices, both ways round, by the first."""
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     sides = sides[sides[:, 0] != sides[:, 1]]
-    pairs = np.unique(np.concatenate([sides, sides[:, ::-1]]), axis=0)
-    return pairs[:, 0], pairs[:, 1]
+    count = int(triangles.max()) + 1  # as one number: rows take ten times as long to sort
+    first, second = np.concatenate([sides, sides[:, ::-1]]).astype(np.int64).T
+    pairs = np.unique(first * count + second)
+    return pairs // count, pairs % count
 
 
 def _turns(ways: Float64, upright: Float64, starts: Int64) -> Float64:
