@@ -114,7 +114,7 @@ def test_fps_resamples_by_rotation(tmp_path: Path) -> None:
 
 
 def test_legs_that_stay_as_they_are_retargeted(tmp_path: Path, shared: Path) -> None:
-    """This walker's legs have other proportions: planted feet cost directions of its bones, and gain ground."""
+    """This walker's legs have other proportions: planted feet cost directions of bones, and gain ground."""
     out, path = tmp_path / "out.fba", shared / "data" / "vreng" / "cmu_walk.bvh"
     found = {}
     for plant in ("--plant", "--no-plant"):
