@@ -1,35 +1,87 @@
-"""Makes the pictures of the window: `python docs/make_player_pictures.py`."""
+"""Makes the pictures of the player's window: `python docs/make_player_pictures.py`."""
 
 from __future__ import annotations
 
+import contextlib
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import fba
+from fba.animation import Animation
+from fba.formats import merge
 from player.compare import CompareScene
 from player.picture_files import write_picture
+from player.puppet import Expression
 from player.scene import Scene
-from player.ui.picture import Studio
+from player.ui.picture import SETTLES, Studio, picture
+from player.ui.puppet_panel import PuppetPanel
 from player.ui.session import Session
+from player.ui.source import Source
 
-IMAGES = Path(__file__).with_name("images")
-SAMPLE = Path(fba.__file__).with_name("samples") / "hello.fap"
+IMAGES = Path(__file__).resolve().with_name("images")
+SAMPLES = Path(fba.__file__).resolve().with_name("samples")
+SIZE = (1280, 720)
+MOMENT, MARKS = 4.4, (2.0, 6.6)
+"""What is shown, and the loop that is marked, seconds."""
 COARSE = 31
 """Quantiser step of what is compared."""
-MOMENT = 4.4
+CURVES = [3, 49, 31]
+MOVED = {3: 420.0, 15: -120.0}
+"""FAPs whose curves are shown, and those moved by hand."""
+
+
+def window() -> None:
+    """A face and a body: what the stream holds, curves, marks."""
+    face, body = fba.read(SAMPLES / "hello.fap"), fba.read(SAMPLES / "hello.bvh")
+    with _played(merge(face, body.resample(face.rate))) as session:
+        session.transport.mark_in, session.transport.mark_out = MARKS
+        write_picture(IMAGES / "window.jpg", picture(session, ("file", "curves")))
+
+
+def panels() -> None:
+    """Curves, bit rate, and a face moved by hand."""
+    with _played(fba.read(SAMPLES / "hello.fap")) as session:
+        session.source.look(wait=True)
+        session.open |= {"curves", "rate", "puppet"}
+        session.selection.faps = CURVES
+        with Studio(session) as studio:
+            studio.draw(SETTLES)
+            panel = next(one for one in studio.gui.panels if isinstance(one, PuppetPanel))
+            puppet = panel.performer(session).puppet
+            puppet.expression = Expression(1, 45)
+            for number, value in MOVED.items():
+                puppet.move_fap(number, value)
+            studio.draw(1)
+            write_picture(IMAGES / "panels.jpg", studio.draw(SETTLES))
 
 
 def compare() -> None:
     """Two performances over each other, and the panel of their differences."""
-    original = fba.read(SAMPLE)
+    original = fba.read(SAMPLES / "hello.fap")
     coarse = fba.decode(fba.encode(original, fba.EncoderOptions(fap_quant=COARSE)))
     names = ["hello.fap", "coarse.fba"]
     scene = CompareScene([Scene(original), Scene(coarse)], arrangement="over", names=names)
-    session = Session(scene, size=(1280, 720))
+    session = Session(scene, size=SIZE)
     session.open.add("differences")
+    session.transport.seek(MOMENT)
     with Studio(session) as studio:
+        write_picture(IMAGES / "compare.jpg", studio.draw(2 * SETTLES))
+
+
+@contextlib.contextmanager
+def _played(animation: Animation) -> Iterator[Session]:
+    """A session that plays the animation from a stream with an I plane every two seconds."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        path = Path("hello.fba")
+        fba.write(path, animation, intra_period=2, bap_steps="visage")
+        scene = Scene(fba.read(path, bap_steps="visage"))
+        session = Session(scene, source=Source(scene, path, bap_steps="visage"), size=SIZE)
         session.transport.seek(MOMENT)
-        write_picture(IMAGES / "compare.jpg", studio.draw(8)[..., :3])
+        yield session
 
 
 if __name__ == "__main__":
+    window()
+    panels()
     compare()

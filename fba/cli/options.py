@@ -90,6 +90,15 @@ def model_option(command: Command) -> Command:
     )(command)
 
 
+def body_option(command: Command) -> Command:
+    return click.option(
+        "--body",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        metavar="FILE.glb",
+        help="The body. Default: the built-in person.",
+    )(command)
+
+
 def read_model(path: Path | None) -> FaceModel | None:
     """The face of `--model`, or None for the built-in one."""
     if path is None:

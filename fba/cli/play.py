@@ -39,12 +39,7 @@ MOST = 8
     help="Several files: side by side (default), or over each other (default with --compare).",
 )
 @options.model_option
-@click.option(
-    "--body",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE.glb",
-    help="The body. Default: the built-in person.",
-)
+@options.body_option
 @click.option(
     "--audio",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),

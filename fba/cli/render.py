@@ -87,12 +87,7 @@ class SheetType(click.ParamType[str | int]):
     "expressions. --size is that of one picture.",
 )
 @options.model_option
-@click.option(
-    "--body",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE.glb",
-    help="The body. Default: the built-in person.",
-)
+@options.body_option
 @click.option(
     "--arrange",
     type=click.Choice(["side", "over"]),

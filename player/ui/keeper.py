@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FbaError
-from player.pictures import write_picture
+from player.picture_files import write_picture
 from player.recorder import Recorder
 from player.ui.session import Session
 
