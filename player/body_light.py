@@ -7,6 +7,8 @@ vertices, and spread over the others.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -18,6 +20,8 @@ from player.face_light import KEY_DIRECTION, kept_visibility
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
+Rows = npt.NDArray[np.intp]
+Prepared = tuple[Int32, Int32, Float32, Float32]
 
 REACH = (1.0, 0.95, 0.0, 0.25)
 """What light reaches a body where nothing is in its way: it shades itself most from behind."""
@@ -31,12 +35,30 @@ CAPSULES = (
     ("l_knee", "l_ankle", 0.05), ("r_knee", "r_ankle", 0.05),
 )  # fmt: skip
 """Joints at both ends, and the radius of a body 1.75 m tall (m)."""
+KEY = tuple(np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION))
 TALL = 1.75
 COARSE = 0.0064
 """Light is worked out at what is left of the vertices where the surface may be off by this (m)."""
 NEAREST = 3
+MOST_KEPT = 64
+"""Choices of vertices remembered."""
 FOLDS = 0.75
 """How much of what folds hide is shown: cloth lets some light through, and the posture changes."""
+
+
+class LitBody:
+    """The light on a body in one pose, worked out where it is asked for."""
+
+    def __init__(self, some: Callable[[slice, Rows | None], Float32]) -> None:
+        self._some = some
+
+    def __call__(self, part: slice, rows: Rows | None) -> Float32:
+        """float32 (N, 4) at some vertices (N,) of a part, or at all."""
+        return self._some(part, rows)
+
+    def of(self, part: slice) -> Callable[[Rows | None], Float32]:
+        """The same for one part."""
+        return lambda rows: self._some(part, rows)
 
 
 class BodyLight:
@@ -52,25 +74,46 @@ class BodyLight:
         tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else TALL
         head = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or the neck
         self._radii = np.array([row[2] for row in known]) * (tall / head / TALL if tall > 0 else 1.0)
-        self._made: tuple[Int32, Int32, Float32, Float32] | None = None
+        self._made: Prepared | None = None
+        self._kept: dict[tuple[int, int], tuple[Rows | None, Prepared]] = {}
 
     def reaching(self, places: Float32, normals: Float32, joints: Float64) -> Float32:
         """float32 (V, 4), see `player.shapes.FaceMesh.light`, for the body's vertices and normals (V, 3) in
         the world and its joint matrices (J, 4, 4)."""
-        free = np.tile(np.array(REACH, dtype=np.float32), (len(places), 1))
-        if not is_compiled() or not len(self._ends):
-            return free
-        if self._made is None:
-            self._made = self._prepared()
-        rows, near, shares, folds = self._made
-        capsules = np.ascontiguousarray(joints[self._ends.ravel(), :3, 3].reshape(-1, 2, 3))
-        key = np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION)
-        past = np.empty((len(rows), 2), dtype=np.float32)
-        _past(places, normals, rows, capsules, self._radii, key, past)
-        _spread(past, near, shares, folds, free)
-        return free
+        return self.lit(places, normals, joints)(slice(0, len(places)), None)
 
-    def _prepared(self) -> tuple[Int32, Int32, Float32, Float32]:
+    def lit(self, places: Float32, normals: Float32, joints: Float64) -> LitBody:
+        """The same, worked out where it is asked for."""
+        if not is_compiled() or not len(self._ends):
+            return LitBody(_free)
+        capsules = _capsules(joints[self._ends.ravel(), :3, 3].reshape(-1, 2, 3), self._radii)
+
+        def some(part: slice, rows: Rows | None) -> Float32:
+            at, near, shares, folds = self._some(part, rows)
+            past = np.empty((len(at), 2), dtype=np.float32)
+            _past(places, normals, at, capsules, past)
+            light = _free(part, rows)
+            _spread(past, near, shares, folds, light)
+            return light
+
+        return LitBody(some)
+
+    def _some(self, part: slice, rows: Rows | None) -> Prepared:
+        """As `_prepared` for some of a part's vertices; kept for as long as these are."""
+        key = (part.start, id(rows))
+        if key not in self._kept:
+            while len(self._kept) >= MOST_KEPT:
+                del self._kept[next(iter(self._kept))]
+            if self._made is None:
+                self._made = self._prepared()
+            at, near, shares, folds = self._made
+            chosen = np.arange(part.start, part.stop) if rows is None else rows + part.start
+            used, places = np.unique(near[chosen], return_inverse=True)
+            near = places.reshape(len(chosen), -1).astype(np.int32)
+            self._kept[key] = (rows, (at[used], near, shares[chosen], folds[chosen]))
+        return self._kept[key][1]
+
+    def _prepared(self) -> Prepared:
         """Vertices at which light is worked out; for each vertex (V, NEAREST) the places among these that it
         takes it from and their shares; and how much of the sky its folds leave it."""
         from scipy.spatial import cKDTree
@@ -103,54 +146,66 @@ class BodyLight:
         )
 
 
+def _free(part: slice, rows: Rows | None) -> Float32:
+    """(N, 4) the light where nothing is in its way."""
+    free = np.empty((part.stop - part.start if rows is None else len(rows), len(REACH)), dtype=np.float32)
+    free[:] = REACH
+    return free
+
+
+def _capsules(ends: Float64, radii: Float64) -> Float32:
+    """(K, 12) for ends (K, 2, 3) and radii (K,): one end, the way to the other, its inverse squared length,
+    how far it goes towards the key light, the inverse squared length of what is left of it, the radius and
+    its square."""
+    way = ends[:, 1] - ends[:, 0]
+    squared = np.maximum((way * way).sum(axis=1), 1e-9)
+    along = way @ KEY
+    aside = 1 / np.maximum(squared - along * along, 1e-9)
+    found = np.column_stack([ends[:, 0], way, 1 / squared, along, aside, radii, radii * radii])
+    return np.ascontiguousarray(found, dtype=np.float32)
+
+
 @compiled
-def _past(
-    places: Float32,
-    normals: Float32,
-    rows: Int32,
-    capsules: Float64,
-    radii: Float64,
-    key: Float64,
-    past: Float32,
-) -> None:
+def _past(places: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32) -> None:
     """past (N, 2): how much of the key light and of the sky comes past the capsules to some vertices."""
-    kx, ky, kz = key[0], key[1], key[2]
+    one, zero = np.float32(1.0), np.float32(0.0)
+    kx, ky, kz = np.float32(KEY[0]), np.float32(KEY[1]), np.float32(KEY[2])
     for i in range(len(rows)):
         x, y, z = places[rows[i], 0], places[rows[i], 1], places[rows[i], 2]
         nx, ny, nz = normals[rows[i], 0], normals[rows[i], 1], normals[rows[i], 2]
-        facing = nx * kx + ny * ky + nz * kz
-        lit, sky = 1.0, 1.0
-        for k in range(len(radii)):
-            radius = radii[k]
-            ax, ay, az = capsules[k, 0, 0] - x, capsules[k, 0, 1] - y, capsules[k, 0, 2] - z
-            bx = capsules[k, 1, 0] - capsules[k, 0, 0]
-            by = capsules[k, 1, 1] - capsules[k, 0, 1]
-            bz = capsules[k, 1, 2] - capsules[k, 0, 2]
-            bb = max(bx * bx + by * by + bz * bz, 1e-9)
+        towards_key = nx * kx + ny * ky + nz * kz >= np.float32(-0.2)
+        lit, sky = one, one
+        for k in range(len(capsules)):
+            ax, ay, az = capsules[k, 0] - x, capsules[k, 1] - y, capsules[k, 2] - z
+            bx, by, bz = capsules[k, 3], capsules[k, 4], capsules[k, 5]
             ab = ax * bx + ay * by + az * bz
             # The sky: the nearest place of the axis, as a ball there.
-            s = min(max(-ab / bb, 0.0), 1.0)
+            s = min(max(-ab * capsules[k, 6], zero), one)
             dx, dy, dz = ax + s * bx, ay + s * by, az + s * bz
-            squared = max(dx * dx + dy * dy + dz * dz, 1e-6)
             towards = nx * dx + ny * dy + nz * dz
-            if towards > 0.0:
-                share = min(radius * radius / squared, 1.0)
-                sky *= 1.0 - min(1.4 * share * towards / np.sqrt(squared), 0.9)
+            if towards > zero:
+                per = one / max(dx * dx + dy * dy + dz * dz, np.float32(1e-6))
+                share = min(capsules[k, 10] * per, one) * np.float32(1.4)
+                sky *= one - min(share * towards * np.sqrt(per), np.float32(0.9))
             # The key light: where the way to it comes nearest to the axis.
-            if facing < -0.2:
+            if not towards_key:
                 continue
-            ak, bk = ax * kx + ay * ky + az * kz, bx * kx + by * ky + bz * kz
-            s = min(max((ak * bk - ab) / max(bb - bk * bk, 1e-9), 0.0), 1.0)
+            radius, bk = capsules[k, 9], capsules[k, 7]
+            ak = ax * kx + ay * ky + az * kz
+            s = min(max((ak * bk - ab) * capsules[k, 8], zero), one)
             ahead = ak + s * bk
-            if ahead <= 0.4 * radius:
+            if ahead <= np.float32(0.4) * radius:
                 continue
             dx, dy, dz = ax + s * bx - ahead * kx, ay + s * by - ahead * ky, az + s * bz - ahead * kz
-            away = np.sqrt(dx * dx + dy * dy + dz * dz)
-            soft = 0.12 * ahead + 0.012
-            hidden = min(max((radius + soft - away) / (2.0 * soft), 0.0), 1.0)
-            hidden = hidden * hidden * (3.0 - 2.0 * hidden)
-            near = min((ahead / radius - 0.4) / 1.2, 1.0)  # a limb does not hide its own skin
-            lit *= 1.0 - hidden * near
+            soft = np.float32(0.12) * ahead + np.float32(0.012)
+            squared = dx * dx + dy * dy + dz * dz
+            if squared >= (radius + soft) * (radius + soft):
+                continue
+            hidden = min((radius + soft - np.sqrt(squared)) / (np.float32(2.0) * soft), one)
+            hidden = hidden * hidden * (np.float32(3.0) - np.float32(2.0) * hidden)
+            # a limb does not hide its own skin
+            near = min((ahead / radius - np.float32(0.4)) / np.float32(1.2), one)
+            lit *= one - hidden * near
         past[i, 0] = lit
         past[i, 1] = sky
 

@@ -27,7 +27,7 @@ class _Level:
 
     shape: FaceShape
     rows: npt.NDArray[np.intp]
-    light: tuple[Float32, Float32] | None = None
+    light: tuple[object, Float32] | None = None
 
 
 class Details:
@@ -50,8 +50,8 @@ class Details:
         level = self._level(mesh.shape, number)
         if level is None:
             return mesh
-        if level.light is None or not same(level.light[0], mesh.light):
-            level.light = (mesh.light, mesh.light.take(level.rows, axis=0))
+        if level.light is None or not _same_light(level.light[0], mesh.reaching):
+            level.light = (mesh.reaching, mesh.light_at(level.rows))
         places, normals = mesh.positions.take(level.rows, axis=0), mesh.normals.take(level.rows, axis=0)
         return FaceMesh(level.shape, places, normals, level.light[1], mesh.matrix, mesh.turn, mesh.centre)
 
@@ -98,6 +98,12 @@ def _nearest(positions: Float32, matrix: Float64, eye: Float64, step: int) -> fl
     for k in range(3):
         scale += matrix[k, 0] * matrix[k, 0]
     return np.sqrt(least / scale) if least < np.inf and scale > 0.0 else 0.0
+
+
+def _same_light(one: object, other: object) -> bool:
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return same(one, other)
+    return one is other
 
 
 def same(one: npt.NDArray[np.float32], other: npt.NDArray[np.float32]) -> bool:

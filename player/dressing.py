@@ -105,8 +105,9 @@ class Dressing:
         if "eye" in hidden:
             view = replace(view, eyes=[])
         if not switches["shadows"]:
-            lit = [np.broadcast_to(np.array(UNSHADED, np.float32), mesh.light.shape) for mesh in view.faces]
-            faces = [replace(mesh, light=light) for mesh, light in zip(view.faces, lit, strict=True)]
+            free = np.array(UNSHADED, dtype=np.float32)
+            lit = [np.broadcast_to(free, (len(mesh.positions), len(free))) for mesh in view.faces]
+            faces = [replace(mesh, reaching=light) for mesh, light in zip(view.faces, lit, strict=True)]
             view = replace(view, faces=faces, blobs=no_shadows())
         return view
 

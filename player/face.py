@@ -14,7 +14,7 @@ from fba.face.model import FaceModel, Part, point_row
 from fba.parameters import FAP_COUNT
 from player.camera import Subject
 from player.eyeball import Eyeball, find_eyeball
-from player.face_light import MOUTH_OPEN, FaceLight
+from player.face_light import MOUTH_OPEN, FaceLight, LitFace
 from player.face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
 from player.shapes import Eye, FaceMesh, FaceShape, rotation_vector
 
@@ -141,7 +141,7 @@ class FaceFigure:
             if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
             rows = self._ranges[name]
-            arrays = pose.positions[rows], pose.normals[rows], light[rows]
+            arrays = pose.positions[rows], pose.normals[rows], light.of(rows)
             found.append(FaceMesh(shape, *arrays, matrix, axis, self.centre))
         return found
 
@@ -154,8 +154,8 @@ class FaceFigure:
         """Where a part's vertices are among those of the model."""
         return self._ranges[name]
 
-    def light(self, faps: Float32, frame: Float64) -> Float32:
-        """(V, 4) what light reaches each vertex. frame: (4, 4), the turned head's into the world."""
+    def light(self, faps: Float32, frame: Float64) -> LitFace:
+        """What light reaches its vertices. frame: (4, 4), the turned head's into the world."""
         return self._light.reaching(self.pose(faps).positions, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,8 @@ Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
 Bool = npt.NDArray[np.bool_]
+Rows = npt.NDArray[np.intp]
+Light = Callable[[Rows | None], Float32]
 
 KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
 """As in shaders/lighting.glsl."""
@@ -30,17 +33,40 @@ ON_TEETH = 0.3
 """How much more light falls on teeth than finds its way between the lips."""
 STEP = 2
 """Digits to which the head's rotation is taken: its light changes by less than is seen."""
+MOST_KEPT = 96
+"""Choices of vertices remembered."""
 MOVES = 0.05
 """What sways less than this is lit without care."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Baked:
-    """Visibility with the mouth shut and open, and how far its lips are apart in both, metres."""
+    """Visibility with the mouth shut and open, (V,) where these differ, and how far its lips are apart in
+    both, metres."""
 
     shut: Visibility
     wide: Visibility
+    near: Bool
     gaps: tuple[float, float]
+
+
+class LitFace:
+    """The light on a face in one pose, worked out where it is asked for."""
+
+    def __init__(
+        self, light: FaceLight, share: float, lights: list[Float32], tongues: list[tuple[slice, Float32]]
+    ) -> None:
+        self._light = light
+        self._args = (share, lights, tongues)
+        self._parts: dict[int, Light] = {}
+
+    def of(self, part: slice) -> Light:
+        """What gives float32 (N, 4), 0..1, for the vertices of a part, or those of its rows (N,) that are
+        asked for: what reaches them of the key light, of the open sky, through the skin from behind, and of
+        the rim light. The same object each time."""
+        if part.start not in self._parts:
+            self._parts[part.start] = lambda rows: self._light.lit(part, rows, *self._args)
+        return self._parts[part.start]
 
 
 class FaceLight:
@@ -55,7 +81,8 @@ class FaceLight:
         self._deformer = deformer
         self._sway = sway
         self._baked: _Baked | None = None
-        self._lit: tuple[tuple[object, ...], Float32] | None = None
+        self._lit: tuple[tuple[object, ...], LitFace] | None = None
+        self._kept: dict[tuple[int, int], tuple[Rows | None, _Some]] = {}
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
         self._teeth = [self._rows(part) for part in model.of_kind("teeth")]
@@ -65,13 +92,9 @@ class FaceLight:
         start = self._model.starts[part.name]
         return slice(start, start + len(part.vertices))
 
-    def reaching(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
-        """(V, 4), 0..1: what reaches each vertex of the key light, of the open sky, through the skin from
-        behind, and of the rim light.
-
-        positions: (V, 3) without the head's turn (3, 3); matrix: (3, 3) of the whole in the world. The
-        array is kept while nothing changes: do not write to it.
-        """
+    def reaching(self, positions: Float32, turn: Float64, matrix: Float64) -> LitFace:
+        """The light for positions: (V, 3) without the head's turn (3, 3); matrix: (3, 3) of the whole in the
+        world. The same object while nothing changes."""
         if self._baked is None:
             self._baked = self._bake()
         share = round(self._mouth_open(positions, self._baked.gaps), 2)
@@ -80,13 +103,40 @@ class FaceLight:
         turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
         if self._lit is None or self._lit[0] != key:
-            light = _reaching(self._baked, share, turned, still, self._sway)
-            for rows in self._teeth:  # as a photographer would have it
-                light[rows, :2] += (1 - light[rows, :2]) * np.float32(ON_TEETH * share)
-            for rows, outside in zip(self._tongues, out, strict=True):
-                light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
-            self._lit = (key, light)
+            tongues = list(zip(self._tongues, out, strict=True))
+            lights = [_basis(turned)] if np.array_equal(turned, still) else [_basis(turned), _basis(still)]
+            self._lit = (key, LitFace(self, share, lights, tongues))
         return self._lit[1]
+
+    def lit(
+        self,
+        part: slice,
+        rows: Rows | None,
+        share: float,
+        lights: list[Float32],
+        tongues: list[tuple[slice, Float32]],
+    ) -> Float32:
+        """As `LitFace` gives it for some of a part's vertices, or for all. lights: (2, 16) what weighs the
+        harmonics for what goes with the head, then for what stands where that differs."""
+        found = self._some(part, rows).reaching(share, lights)
+        if part in self._teeth:  # as a photographer would have it
+            found[:, :2] += (1 - found[:, :2]) * np.float32(ON_TEETH * share)
+        for tongue, outside in tongues:
+            if tongue == part and outside.any():
+                free = outside if rows is None else outside[rows]
+                found += (np.array(FREE, dtype=np.float32) - found) * free[:, None]
+        return found
+
+    def _some(self, part: slice, rows: Rows | None) -> _Some:
+        """What light at some of a part's vertices is worked out from; kept for as long as they are."""
+        key = (part.start, id(rows))
+        if key not in self._kept:
+            while len(self._kept) >= MOST_KEPT:
+                del self._kept[next(iter(self._kept))]
+            assert self._baked is not None
+            chosen = np.arange(part.start, part.stop) if rows is None else rows + part.start
+            self._kept[key] = (rows, _Some(self._baked, chosen, self._sway))
+        return self._kept[key][1]
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -114,7 +164,7 @@ class FaceLight:
         still, normals = self._posed(faps)
         shut = kept_visibility(still, normals, triangles, self._sway > MOVES)
         if self._lips is None:
-            return _Baked(shut, shut, (0.0, 0.0))
+            return _Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():
             faps[fap - 1] = value
         moved, normals = self._posed(faps)
@@ -124,7 +174,7 @@ class FaceLight:
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut.arrays, wide.arrays, strict=True)
         ]
-        return _Baked(shut, Visibility(*arrays), (self._gap(still), self._gap(moved)))
+        return _Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
 
     def _posed(self, faps: Float32) -> tuple[Float32, Float32]:
         positions = np.empty((len(self._sway), 3), dtype=np.float32)
@@ -152,42 +202,71 @@ def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, with
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 
-def _basis(into: Float64) -> Float64:
-    """(2, 16) what weighs the harmonics for key and rim light, turned by `into` (3, 3)."""
-    return weights(np.stack([_unit(into @ KEY_DIRECTION), _unit(into @ RIM_DIRECTION)]))
+class _Mixed:
+    """Of some vertices: what the light with the mouth shut and, where that differs, wide open is made of."""
+
+    def __init__(self, baked: _Baked, chosen: Rows) -> None:
+        shut, wide = baked.shut, baked.wide
+        self._shut = _columns(shut, chosen)
+        self._near = np.flatnonzero(baked.near[chosen])
+        self._wide = _columns(wide, chosen[self._near])
+
+    def products(self, light: Float32, share: float) -> Float32:
+        """(3, N) key light, rim light and what comes through of it."""
+        found = _products(self._shut, light)
+        if share > 0 and len(self._near):
+            wide, before = _products(self._wide, light), found[:, self._near]
+            wide -= before
+            wide *= np.float32(share)
+            wide += before
+            found[:, self._near] = wide
+        return found
 
 
-def _reaching(baked: _Baked, share: float, turned: Float64, still: Float64, sway: Float32) -> Float32:
-    """(V, 4) key light, sky, through, rim light. turned: (3, 3) by which the lights are turned for what goes
-    with the head; still: for what stands. share: how far the mouth is wide open."""
-    bent = not np.array_equal(turned, still)
-    basis = np.concatenate([_basis(turned), _basis(still)] if bent else [_basis(turned)]).astype(np.float32)
-    shut = _products(baked.shut, basis)
-    if share > 0:
-        wide = _products(baked.wide, basis)
-        shut += (wide - shut) * np.float32(share)
-    found = np.empty((len(sway), 4), dtype=np.float32)
-    for column, row in ((0, 0), (3, 1), (2, 2)):
-        if bent:
-            shut[row] -= shut[row + 3]
-            shut[row] *= sway
-            shut[row] += shut[row + 3]
-        found[:, column] = shut[row]
-    found[:, 1] = baked.shut.open
-    if share > 0:
-        found[:, 1] += (baked.wide.open - baked.shut.open) * np.float32(share)
-    return found
+class _Some:
+    """What the light at some vertices of the model is worked out from."""
+
+    def __init__(self, baked: _Baked, chosen: Rows, sway: Float32) -> None:
+        self._all = _Mixed(baked, chosen)
+        swaying = np.flatnonzero(sway[chosen] < 1)
+        self._swaying = swaying
+        self._sway = sway[chosen[swaying]]
+        self._still = _Mixed(baked, chosen[swaying])
+        self._open = baked.shut.open[chosen]
+        self._wider = baked.wide.open[chosen] - self._open
+
+    def reaching(self, share: float, lights: list[Float32]) -> Float32:
+        """(N, 4) key light, sky, through, rim light. share: how far the mouth is wide open."""
+        turned = self._all.products(lights[0], share)
+        if len(lights) > 1 and len(self._swaying):
+            still = self._still.products(lights[1], share)
+            turned[:, self._swaying] = still + (turned[:, self._swaying] - still) * self._sway
+        found = np.empty((turned.shape[1], 4), dtype=np.float32)
+        found[:, 0], found[:, 3], found[:, 2] = turned
+        found[:, 1] = self._open
+        if share > 0:
+            found[:, 1] += self._wider * np.float32(share)
+        return found
 
 
-def _products(visibility: Visibility, basis: Float32) -> Float32:
-    """(3 N, V) key light, rim light and what comes through of it, for N pairs of rows of basis (2 N, 16)."""
-    pairs = len(basis) // 2
-    found = np.empty((3 * pairs, len(visibility.open)), dtype=np.float32)
-    for pair in range(pairs):
-        # Tables are tall: their columns beside each other are what goes through the processor fastest.
-        np.dot(basis[2 * pair : 2 * pair + 2], visibility.columns[0], out=found[3 * pair : 3 * pair + 2])
-        np.dot(basis[2 * pair + 1], visibility.columns[1], out=found[3 * pair + 2])
+def _columns(visibility: Visibility, rows: Rows) -> tuple[Float32, Float32]:
+    """light and through of some vertices as (16, N): side by side, their columns are what goes through the
+    processor fastest."""
+    light, through = (np.ascontiguousarray(table[rows].T) for table in (visibility.light, visibility.through))
+    return light, through
+
+
+def _products(columns: tuple[Float32, Float32], basis: Float32) -> Float32:
+    """(3, N) key light, rim light and what comes through of it, for basis (2, 16)."""
+    found = np.empty((3, columns[0].shape[1]), dtype=np.float32)
+    np.dot(basis, columns[0], out=found[:2])
+    np.dot(basis[1], columns[1], out=found[2])
     return np.clip(found, 0, 1, out=found)
+
+
+def _basis(into: Float64) -> Float32:
+    """(2, 16) what weighs the harmonics for key and rim light, turned by `into` (3, 3)."""
+    return weights(np.stack([_unit(into @ KEY_DIRECTION), _unit(into @ RIM_DIRECTION)])).astype(np.float32)
 
 
 def _unit(vector: Float64) -> Float64:

@@ -13,6 +13,7 @@ from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
 from player.body_light import BodyLight
 from player.face import FaceFigure
+from player.face_light import Light
 from player.face_parts import coarser_part, part_shape, with_triangles
 from player.shapes import Eye, FaceMesh, FaceShape
 
@@ -64,13 +65,13 @@ class Person:
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
         """Everything but the eyeballs, for FAPs (68,) and joint matrices with the head's turn."""
         self.body.skin(joints, self._places, self._normals)
-        reaching = self._light.reaching(self._places, self._normals, joints)
+        reaching = self._light.lit(self._places, self._normals, joints)
         found = [
             _placed(
                 self._shapes[part.name],
                 self._places[self._rows[part.name]],
                 self._normals[self._rows[part.name]],
-                reaching[self._rows[part.name]],
+                reaching.of(self._rows[part.name]),
             )
             for part in self._parts
         ]
@@ -79,7 +80,7 @@ class Person:
         light = self.figure.light(faps, self.frame(joints))
         for name, shape in self._face.items():
             rows = self.figure.rows(name)
-            found.append(_placed(shape, self._skin[rows], self._upright[rows], light[rows]))
+            found.append(_placed(shape, self._skin[rows], self._upright[rows], light.of(rows)))
         return found
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
@@ -111,5 +112,5 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     return replace(kept, coarser=coarser)
 
 
-def _placed(shape: FaceShape, places: Float32, normals: Float32, light: Float32) -> FaceMesh:
+def _placed(shape: FaceShape, places: Float32, normals: Float32, light: Light) -> FaceMesh:
     return FaceMesh(shape, places, normals, light, np.eye(4), np.zeros(3), np.zeros(3))

@@ -6,7 +6,9 @@ more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres;
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.intp]
 
 CAPSULE_FLOATS = 16
 """A capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
@@ -92,19 +95,29 @@ class FaceShape:
 class FaceMesh:
     """A part of a face in one pose.
 
-    positions, normals: float32 (V, 3), without the head's rotation. light: float32 (V, 4), 0..1, what
+    positions, normals: float32 (V, 3), without the head's rotation. reaching: float32 (V, 4), 0..1, what
     reaches each vertex past the rest of the face: of the key light, of the open sky, through the skin
-    from behind, of the rim light. matrix: (4, 4) into the world. turn: (3,) axis of the head's rotation
-    times its angle, about centre (3,), in the frame of the positions.
+    from behind, of the rim light; or what gives that for chosen vertices (N,), or for None, all. matrix:
+    (4, 4) into the world. turn: (3,) axis of the head's rotation times its angle, about centre (3,), in the
+    frame of the positions.
     """
 
     shape: FaceShape
     positions: Float32
     normals: Float32
-    light: Float32
+    reaching: Float32 | Callable[[Rows | None], Float32]
     matrix: Float64
     turn: Float64
     centre: Float64
+
+    @cached_property
+    def light(self) -> Float32:
+        """What reaches each vertex: float32 (V, 4)."""
+        return self.reaching(None) if callable(self.reaching) else self.reaching
+
+    def light_at(self, rows: Rows) -> Float32:
+        """The same for chosen vertices: float32 (N, 4)."""
+        return self.reaching(rows) if callable(self.reaching) else self.reaching.take(rows, axis=0)
 
 
 @dataclass(frozen=True, eq=False)

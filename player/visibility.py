@@ -7,7 +7,7 @@ harmonics: soft shadows of large lights then cost a few products a vertex, which
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -45,11 +45,6 @@ class Visibility:
     def arrays(self) -> tuple[Float32, Float32, Float32]:
         """light, through, open."""
         return self.light, self.through, self.open
-
-    @cached_property
-    def columns(self) -> tuple[Float32, Float32]:
-        """light and through as (16, V)."""
-        return np.ascontiguousarray(self.light.T), np.ascontiguousarray(self.through.T)
 
     def towards(self, direction: npt.ArrayLike) -> tuple[Float32, Float32]:
         """What reaches each vertex from a direction (3,), and what comes through: float32 (V,), 0..1."""
