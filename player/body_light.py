@@ -154,15 +154,17 @@ def _free(part: slice, rows: Rows | None) -> Float32:
 
 
 def _capsules(ends: Float64, radii: Float64) -> Float32:
-    """(K, 12) for ends (K, 2, 3) and radii (K,): one end, the way to the other, its inverse squared length,
+    """(K, 11) for ends (K, 2, 3) and radii (K,): one end, the way to the other, its inverse squared length,
     how far it goes towards the key light, the inverse squared length of what is left of it, the radius and
     its square."""
+    found = np.empty((len(ends), 11), dtype=np.float32)
     way = ends[:, 1] - ends[:, 0]
-    squared = np.maximum((way * way).sum(axis=1), 1e-9)
+    squared = np.maximum(np.einsum("ij,ij->i", way, way), 1e-9)
     along = way @ KEY
-    aside = 1 / np.maximum(squared - along * along, 1e-9)
-    found = np.column_stack([ends[:, 0], way, 1 / squared, along, aside, radii, radii * radii])
-    return np.ascontiguousarray(found, dtype=np.float32)
+    found[:, :3], found[:, 3:6], found[:, 7] = ends[:, 0], way, along
+    found[:, 6], found[:, 8] = 1 / squared, 1 / np.maximum(squared - along * along, 1e-9)
+    found[:, 9], found[:, 10] = radii, radii * radii
+    return found
 
 
 @compiled

@@ -170,6 +170,8 @@ def _throw(
     """Add to layers (N, rows, columns), one a ray, the share of each cell that the points cover."""
     cells = layers.shape[1]
     p = np.empty((3, 3))
+    longer = 1.0 / rays[:, 1]
+    aside, ahead = rays[:, 0] * longer / CELL, rays[:, 2] * longer / CELL
     for i in range(len(corners)):
         for k in range(3):
             x, y, z = positions[corners[i, k], 0], positions[corners[i, k], 1], positions[corners[i, k], 2]
@@ -186,26 +188,35 @@ def _throw(
         y = max(a * p[0, 1] + b * p[1, 1] + c * p[2, 1], 0.0)
         z = a * p[0, 2] + b * p[1, 2] + c * p[2, 2]
         piece = area[i] / length / (CELL * CELL)
+        left, front = (x - low_x) / CELL - 0.5, (z - low_z) / CELL - 0.5
         for ray in range(len(rays)):
             facing = nx * rays[ray, 0] + ny * rays[ray, 1] + nz * rays[ray, 2]
             if facing <= 0.0:
                 continue
-            fall = y / rays[ray, 1]
-            column = (x - rays[ray, 0] * fall - low_x) / CELL - 0.5
-            row = (z - rays[ray, 2] * fall - low_z) / CELL - 0.5
+            column = left - aside[ray] * y
+            row = front - ahead[ray] * y
             if not (1.0 <= column < cells - 2.0 and 1.0 <= row < cells - 2.0):
                 continue
             # Over three cells each way, as a quadratic spline spreads it: the points are not quite even.
             middle, centre = int(column + 0.5), int(row + 0.5)
             fx, fy = column - middle, row - centre
-            amount = piece * facing / rays[ray, 1]
-            for k in range(3):
-                down = 0.75 - fy * fy if k == 1 else 0.5 * (0.5 + (fy if k == 2 else -fy)) ** 2
-                down *= amount
-                line = layers[ray, centre + k - 1]
-                line[middle - 1] += np.float32(down * 0.5 * (0.5 - fx) ** 2)
-                line[middle] += np.float32(down * (0.75 - fx * fx))
-                line[middle + 1] += np.float32(down * 0.5 * (0.5 + fx) ** 2)
+            amount = piece * facing * longer[ray]
+            one = np.float32(0.5 * (0.5 - fx) * (0.5 - fx))
+            two = np.float32(0.75 - fx * fx)
+            three = np.float32(0.5 * (0.5 + fx) * (0.5 + fx))
+            layer = layers[ray]
+            down = np.float32(amount * 0.5 * (0.5 - fy) * (0.5 - fy))
+            layer[centre - 1, middle - 1] += down * one
+            layer[centre - 1, middle] += down * two
+            layer[centre - 1, middle + 1] += down * three
+            down = np.float32(amount * (0.75 - fy * fy))
+            layer[centre, middle - 1] += down * one
+            layer[centre, middle] += down * two
+            layer[centre, middle + 1] += down * three
+            down = np.float32(amount * 0.5 * (0.5 + fy) * (0.5 + fy))
+            layer[centre + 1, middle - 1] += down * one
+            layer[centre + 1, middle] += down * two
+            layer[centre + 1, middle + 1] += down * three
 
 
 @compiled

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from fba.compiled import is_compiled
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
+from player.face_light_loops import Table, lit, sway
 from player.kept import kept
 from player.visibility import BAKING, HARMONICS, Visibility, bake, weights
 
@@ -54,7 +55,7 @@ class LitFace:
     """The light on a face in one pose, worked out where it is asked for."""
 
     def __init__(
-        self, light: FaceLight, share: float, lights: list[Float32], tongues: list[tuple[slice, Float32]]
+        self, light: FaceLight, share: float, lights: Float32, tongues: list[tuple[slice, Float32]]
     ) -> None:
         self._light = light
         self._args = (share, lights, tongues)
@@ -104,7 +105,7 @@ class FaceLight:
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
         if self._lit is None or self._lit[0] != key:
             tongues = list(zip(self._tongues, out, strict=True))
-            lights = [_basis(turned)] if np.array_equal(turned, still) else [_basis(turned), _basis(still)]
+            lights = _basis(turned) if np.array_equal(turned, still) else _basis(turned, still)
             self._lit = (key, LitFace(self, share, lights, tongues))
         return self._lit[1]
 
@@ -113,14 +114,13 @@ class FaceLight:
         part: slice,
         rows: Rows | None,
         share: float,
-        lights: list[Float32],
+        lights: Float32,
         tongues: list[tuple[slice, Float32]],
     ) -> Float32:
         """As `LitFace` gives it for some of a part's vertices, or for all. lights: (2, 16) what weighs the
         harmonics for what goes with the head, then for what stands where that differs."""
-        found = self._some(part, rows).reaching(share, lights)
-        if part in self._teeth:  # as a photographer would have it
-            found[:, :2] += (1 - found[:, :2]) * np.float32(ON_TEETH * share)
+        more = ON_TEETH * share if part in self._teeth else 0.0  # as a photographer would have it
+        found = self._some(part, rows).reaching(share, lights, more)
         for tongue, outside in tongues:
             if tongue == part and outside.any():
                 free = outside if rows is None else outside[rows]
@@ -141,8 +141,8 @@ class FaceLight:
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
             return 0.0
-        share = np.clip((self._gap(positions) - gaps[0]) / max(gaps[1] - gaps[0], 1e-6), 0.0, 1.0)
-        return float(share**0.4)  # the first millimetres let most of the light in
+        share = (self._gap(positions) - gaps[0]) / max(gaps[1] - gaps[0], 1e-6)
+        return float(min(max(share, 0.0), 1.0) ** 0.4)  # the first millimetres let most of the light in
 
     def _gap(self, positions: Float32) -> float:
         upper, lower = positions[self._lips]
@@ -202,73 +202,40 @@ def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, with
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 
-class _Mixed:
-    """Of some vertices: what the light with the mouth shut and, where that differs, wide open is made of."""
-
-    def __init__(self, baked: _Baked, chosen: Rows) -> None:
-        shut, wide = baked.shut, baked.wide
-        self._shut = _columns(shut, chosen)
-        self._near = np.flatnonzero(baked.near[chosen])
-        self._wide = _columns(wide, chosen[self._near])
-
-    def products(self, light: Float32, share: float) -> Float32:
-        """(3, N) key light, rim light and what comes through of it."""
-        found = _products(self._shut, light)
-        if share > 0 and len(self._near):
-            wide, before = _products(self._wide, light), found[:, self._near]
-            wide -= before
-            wide *= np.float32(share)
-            wide += before
-            found[:, self._near] = wide
-        return found
-
-
 class _Some:
     """What the light at some vertices of the model is worked out from."""
 
     def __init__(self, baked: _Baked, chosen: Rows, sway: Float32) -> None:
-        self._all = _Mixed(baked, chosen)
+        self._all = _table(baked, chosen)
         swaying = np.flatnonzero(sway[chosen] < 1)
+        self._still = _table(baked, chosen[swaying])
         self._swaying = swaying
         self._sway = sway[chosen[swaying]]
-        self._still = _Mixed(baked, chosen[swaying])
-        self._open = baked.shut.open[chosen]
-        self._wider = baked.wide.open[chosen] - self._open
 
-    def reaching(self, share: float, lights: list[Float32]) -> Float32:
-        """(N, 4) key light, sky, through, rim light. share: how far the mouth is wide open."""
-        turned = self._all.products(lights[0], share)
-        if len(lights) > 1 and len(self._swaying):
-            still = self._still.products(lights[1], share)
-            turned[:, self._swaying] = still + (turned[:, self._swaying] - still) * self._sway
-        found = np.empty((turned.shape[1], 4), dtype=np.float32)
-        found[:, 0], found[:, 3], found[:, 2] = turned
-        found[:, 1] = self._open
-        if share > 0:
-            found[:, 1] += self._wider * np.float32(share)
+    def reaching(self, share: float, lights: Float32, on_teeth: float) -> Float32:
+        """(N, 4) key light, sky, through, rim light. share: how far the mouth is wide open. on_teeth: how
+        much more of it falls in."""
+        found = np.empty((len(self._all.open), 4), dtype=np.float32)
+        lit(self._all, lights[:2], share, on_teeth, found)
+        if len(lights) > 2 and len(self._swaying):
+            still = np.empty((len(self._swaying), 4), dtype=np.float32)
+            lit(self._still, lights[2:], share, on_teeth, still)
+            sway(found, still, self._swaying, self._sway)
         return found
 
 
-def _columns(visibility: Visibility, rows: Rows) -> tuple[Float32, Float32]:
-    """light and through of some vertices as (16, N): side by side, their columns are what goes through the
-    processor fastest."""
-    light, through = (np.ascontiguousarray(table[rows].T) for table in (visibility.light, visibility.through))
-    return light, through
+def _table(baked: _Baked, chosen: Rows) -> Table:
+    near = np.flatnonzero(baked.near[chosen])
+    shut, wide = (
+        [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]
+        for visibility, rows in ((baked.shut, chosen), (baked.wide, chosen[near]))
+    )
+    return Table(shut[0], shut[1], shut[2], wide[0], wide[1], wide[2], near)
 
 
-def _products(columns: tuple[Float32, Float32], basis: Float32) -> Float32:
-    """(3, N) key light, rim light and what comes through of it, for basis (2, 16)."""
-    found = np.empty((3, columns[0].shape[1]), dtype=np.float32)
-    np.dot(basis, columns[0], out=found[:2])
-    np.dot(basis[1], columns[1], out=found[2])
-    return np.clip(found, 0, 1, out=found)
-
-
-def _basis(into: Float64) -> Float32:
-    """(2, 16) what weighs the harmonics for key and rim light, turned by `into` (3, 3)."""
-    return weights(np.stack([_unit(into @ KEY_DIRECTION), _unit(into @ RIM_DIRECTION)])).astype(np.float32)
-
-
-def _unit(vector: Float64) -> Float64:
-    unit: Float64 = vector / np.linalg.norm(vector)
-    return unit
+def _basis(*turns: Float64) -> Float32:
+    """(2 N, 16) what weighs the harmonics for key and rim light, turned by each of turns, N of (3, 3)."""
+    lights = np.stack([np.array(KEY_DIRECTION), np.array(RIM_DIRECTION)], axis=1)
+    towards = np.concatenate([(into @ lights).T for into in turns])
+    towards /= np.sqrt((towards * towards).sum(axis=1, keepdims=True))
+    return weights(towards).astype(np.float32)

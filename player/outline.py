@@ -115,10 +115,13 @@ def _project(
 ) -> None:
     """Pixels x, y of vertices (V, 3), and w, below 0 behind the camera; turned as face.vert does."""
     half_wide, half_high = 0.5 * size[0], 0.5 * size[1]
+    whole_sine, whole_cosine = np.sin(angle), np.cos(angle)
     for i in range(len(positions)):
         x, y, z = float(positions[i, 0]), float(positions[i, 1]), float(positions[i, 2])
         if angle > 1e-6:
-            sine, cosine = np.sin(angle * sway[i]), np.cos(angle * sway[i])
+            sine, cosine = whole_sine, whole_cosine
+            if sway[i] != 1.0:  # few: sines take longer than all else
+                sine, cosine = np.sin(angle * sway[i]), np.cos(angle * sway[i])
             x, y, z = x - centre[0], y - centre[1], z - centre[2]
             along = (x * axis[0] + y * axis[1] + z * axis[2]) * (1.0 - cosine)
             cross_x = axis[1] * z - axis[2] * y
@@ -172,6 +175,13 @@ def _outline(
         )
         length = max(abs(bx - ax), abs(by - ay))
         if outside or not length < 4.0 * (wide + high):
+            continue
+        left, right = int(max(min(ax, bx) - BESIDE, 0.0)), int(min(max(ax, bx) + BESIDE, wide - 1.0))
+        low, top = int(max(min(ay, by) - BESIDE, 0.0)), int(min(max(ay, by) + BESIDE, high - 1.0))
+        if right // TILE - left // TILE <= 1 and top // TILE - low // TILE <= 1:  # short, as most are
+            for row in range(low // TILE, top // TILE + 1):
+                for column in range(left // TILE, right // TILE + 1):
+                    marked[row, column] = 1
             continue
         steps = int(length / BESIDE) + 1
         for step in range(steps + 1):

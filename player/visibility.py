@@ -96,27 +96,31 @@ def weights(directions: Float64) -> Float64:
 
 def harmonics(directions: Float64) -> Float64:
     """(N, 16) real spherical harmonics up to the third band, for unit vectors (N, 3)."""
-    x, y, z = directions.T
-    one = np.ones_like(x)
-    found = [
-        0.282095 * one,
-        0.488603 * y,
-        0.488603 * z,
-        0.488603 * x,
-        1.092548 * x * y,
-        1.092548 * y * z,
-        0.315392 * (3 * z * z - 1),
-        1.092548 * x * z,
-        0.546274 * (x * x - y * y),
-        0.590044 * y * (3 * x * x - y * y),
-        2.890611 * x * y * z,
-        0.457046 * y * (5 * z * z - 1),
-        0.373176 * z * (5 * z * z - 3),
-        0.457046 * x * (5 * z * z - 1),
-        1.445306 * z * (x * x - y * y),
-        0.590044 * x * (x * x - 3 * y * y),
-    ]
-    return np.stack(found, axis=1)
+    found = np.empty((len(directions), HARMONICS))
+    _harmonics(np.ascontiguousarray(directions, dtype=np.float64), found)
+    return found
+
+
+@compiled
+def _harmonics(directions: Float64, found: Float64) -> None:
+    for i in range(len(directions)):
+        x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
+        found[i, 0] = 0.282095
+        found[i, 1] = 0.488603 * y
+        found[i, 2] = 0.488603 * z
+        found[i, 3] = 0.488603 * x
+        found[i, 4] = 1.092548 * x * y
+        found[i, 5] = 1.092548 * y * z
+        found[i, 6] = 0.315392 * (3 * z * z - 1)
+        found[i, 7] = 1.092548 * x * z
+        found[i, 8] = 0.546274 * (x * x - y * y)
+        found[i, 9] = 0.590044 * y * (3 * x * x - y * y)
+        found[i, 10] = 2.890611 * x * y * z
+        found[i, 11] = 0.457046 * y * (5 * z * z - 1)
+        found[i, 12] = 0.373176 * z * (5 * z * z - 3)
+        found[i, 13] = 0.457046 * x * (5 * z * z - 1)
+        found[i, 14] = 1.445306 * z * (x * x - y * y)
+        found[i, 15] = 0.590044 * x * (x * x - 3 * y * y)
 
 
 @cache

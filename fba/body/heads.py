@@ -65,6 +65,7 @@ class HeadOnBody:
             anchors = np.concatenate([part.vertices for part in neck])
             self.place[:3, 3] += _offset(anchors, places * self._size + self.place[:3, 3])
         self._shift = self.place[:3, 3].astype(np.float32)
+        self._from_place = np.linalg.inv(self.place)
         placed = places.astype(np.float64) * self._size + self.place[:3, 3]
         joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
         weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
@@ -108,7 +109,7 @@ class HeadOnBody:
         relative to what BAPs do to the skull base.
         """
         turned: Float64 = np.array(matrices, dtype=np.float64)
-        within = self.place @ np.asarray(turn, dtype=np.float64) @ np.linalg.inv(self.place)
+        within = self.place @ np.asarray(turn, dtype=np.float64) @ self._from_place
         if np.array_equal(within, np.eye(4)):
             return turned
         skull = turned[self._skull]
