@@ -140,8 +140,11 @@ class HeadOnBody:
         returned. upright: float32 (V, 3), normals of the face in its own frame; normals: filled with those
         on the body. method: as of `BodyModel.skin`.
         """
-        np.multiply(local, np.float32(self._size), out=self._placed)
-        self._placed += self._shift
+        from fba.body.skinning_loops import sized
+
+        if local.shape != self._placed.shape:
+            raise ValueError(f"vertices must have shape {self._placed.shape}, not {local.shape}")
+        sized(local, self._size, self._shift, self._placed)
         return self._skinner.carry(self._placed, upright, matrices, out, normals, method)
 
 

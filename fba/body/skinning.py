@@ -52,15 +52,16 @@ class Skinner:
         self._joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
         self._weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
         self._counts = (self._weights > 0).sum(axis=1).astype(np.int32)
-        self._modelled = np.ascontiguousarray(vertices, dtype=np.float32)
-        self._upright_modelled = np.ascontiguousarray(normals, dtype=np.float32)
-        # copies to work on: compiled code is made anew for arrays that may not be written to
+        # copies: compiled code is made anew for arrays that may not be written to
+        self._modelled = np.array(vertices, dtype=np.float32, order="C")
+        self._upright_modelled = np.array(normals, dtype=np.float32, order="C")
         self._vertices, self._upright = self._modelled.copy(), self._upright_modelled.copy()
         self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
         self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
         self._twists = twists(skeleton, bind, self._modelled, self._joints, self._weights)
         self._girdle = girdle(skeleton, bind, self._modelled, self._joints, self._weights)
         self._wrung = self._vertices.copy()
+        self._wrung_modelled = True
         faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
         self._around, self._numbers = rings(self._modelled, self._upright_modelled, faces)
         self._scratch = np.empty((len(bind), 12), dtype=np.float32)
@@ -111,16 +112,16 @@ class Skinner:
         out = result_array(shape, out, normals)
         placed = out[None] if single else out
         turned = placed[:0] if normals is None else normals[None] if single else normals
-        mesh = (
-            self._vertices, self._upright, self._joints, self._weights, self._counts, self._around,
-            self._numbers,
-        )  # fmt: skip
         with self._lock, np.errstate(all="ignore"):
-            np.copyto(self._vertices, vertices)
-            if upright is not None:
-                np.copyto(self._upright, upright)
-            if method == "dual":
-                np.copyto(self._wrung, vertices)
+            vertices = _usable(vertices, self._vertices)
+            upright = self._upright if upright is None else _usable(upright, self._upright)
+            mesh = (vertices, upright, self._joints, self._weights, self._counts, self._around, self._numbers)
+            wrung = vertices
+            if method == "dual" and len(self._twists.rows):
+                wrung = self._wrung
+                if not (self._wrung_modelled and vertices is self._modelled):  # else what is wrung is anew
+                    np.copyto(wrung, vertices)
+                self._wrung_modelled = vertices is self._modelled
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)
                 if method == "dual":
@@ -132,7 +133,7 @@ class Skinner:
                         self._scratch,
                         self._twists,
                         self._girdle,
-                        self._wrung,
+                        wrung,
                         placed[part],
                         turned[part],
                     )
@@ -158,3 +159,11 @@ class Skinner:
             frame, joint = (int(place) for place in np.argwhere(~np.isfinite(frames))[0, :2])
             raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")
         return frames, array.ndim == 3
+
+
+def _usable(array: Float32, room: Float32) -> Float32:
+    """The array as compiled code takes it: itself, or a copy in `room`."""
+    if array.dtype == np.float32 and array.flags.c_contiguous and array.flags.writeable:
+        return array
+    np.copyto(room, array)
+    return room

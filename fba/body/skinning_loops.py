@@ -193,8 +193,22 @@ def _dual_places(
     out: Float32, upright: Float32, around: Int32, normals: Float32,
 ) -> None:  # fmt: skip
     with_normals = upright.shape[0] > 0
+    tops = np.empty((len(duals), 12), dtype=np.float32)
+    _matrices(duals, tops)
     for i in range(vertices.shape[0]):
-        j, share = joints[i, 0], weights[i, 0]
+        j = joints[i, 0]
+        if counts[i] == 1:  # as most of a head: nothing to blend
+            px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+            out[i, 0] = tops[j, 0] * px + tops[j, 1] * py + tops[j, 2] * pz + tops[j, 3]
+            out[i, 1] = tops[j, 4] * px + tops[j, 5] * py + tops[j, 6] * pz + tops[j, 7]
+            out[i, 2] = tops[j, 8] * px + tops[j, 9] * py + tops[j, 10] * pz + tops[j, 11]
+            if with_normals and around[i, 0] < 0:
+                px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
+                normals[i, 0] = tops[j, 0] * px + tops[j, 1] * py + tops[j, 2] * pz
+                normals[i, 1] = tops[j, 4] * px + tops[j, 5] * py + tops[j, 6] * pz
+                normals[i, 2] = tops[j, 8] * px + tops[j, 9] * py + tops[j, 10] * pz
+            continue
+        share = weights[i, 0]
         w, x, y, z = share * duals[j, 0], share * duals[j, 1], share * duals[j, 2], share * duals[j, 3]
         a, b, c, d = share * duals[j, 4], share * duals[j, 5], share * duals[j, 6], share * duals[j, 7]
         for k in range(1, counts[i]):
@@ -226,6 +240,44 @@ def _dual_places(
             normals[i, 0] = px + per * (y * uz - z * uy)
             normals[i, 1] = py + per * (z * ux - x * uz)
             normals[i, 2] = pz + per * (x * uy - y * ux)
+
+
+@compiled
+def _matrices(duals: Float32, tops: Float32) -> None:
+    """Dual quaternions (J, 8) as matrices (J, 12), row by row."""
+    for j in range(len(duals)):
+        w, x, y, z = duals[j, 0], duals[j, 1], duals[j, 2], duals[j, 3]
+        a, b, c, d = duals[j, 4], duals[j, 5], duals[j, 6], duals[j, 7]
+        per = TWO / max(w * w + x * x + y * y + z * z, TINY)
+        tops[j, 0], tops[j, 1], tops[j, 2] = (
+            ONE - per * (y * y + z * z),
+            per * (x * y - w * z),
+            per * (x * z + w * y),
+        )
+        tops[j, 4], tops[j, 5], tops[j, 6] = (
+            per * (x * y + w * z),
+            ONE - per * (x * x + z * z),
+            per * (y * z - w * x),
+        )
+        tops[j, 8], tops[j, 9], tops[j, 10] = (
+            per * (x * z - w * y),
+            per * (y * z + w * x),
+            ONE - per * (x * x + y * y),
+        )
+        tops[j, 3] = per * (w * b - x * a + y * d - z * c)
+        tops[j, 7] = per * (w * c - y * a + z * b - x * d)
+        tops[j, 11] = per * (w * d - z * a + x * c - y * b)
+
+
+@compiled
+def sized(vertices: Float32, size: float, shift: Float32, out: Float32) -> None:
+    """out (V, 3) = size x vertices + shift (3,)."""
+    times = np.float32(size)
+    x, y, z = shift[0], shift[1], shift[2]
+    for i in range(len(vertices)):
+        out[i, 0] = times * vertices[i, 0] + x
+        out[i, 1] = times * vertices[i, 1] + y
+        out[i, 2] = times * vertices[i, 2] + z
 
 
 @compiled
