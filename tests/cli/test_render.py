@@ -371,7 +371,10 @@ def test_pictures_and_films_are_the_same_from_run_to_run(run: Run, clip: Path, t
 def test_ctrl_c_leaves_nothing_half_written(clip: Path, tmp_path: Path, suffix: str) -> None:
     output = tmp_path / f"film{suffix}"
     output.write_bytes(b"old")
-    command = [sys.executable, "-m", "fba.cli.main", "render", str(clip), "-o", str(output), "--fps", "90"]
+    # Where the tests run in the background, a shell may have made them, and what they start, deaf to SIGINT.
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += "from fba.cli.main import main; main()"
+    command = [sys.executable, "-c", code, "render", str(clip), "-o", str(output), "--fps", "90"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         for _ in range(3000):
             if len(list(tmp_path.iterdir())) == 3 or process.poll() is not None:
