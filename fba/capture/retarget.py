@@ -24,8 +24,10 @@ HINGES = (("shoulder", "elbow"), ("hip", "knee"))
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 LOOSE = 1e-3
 """Weight of a free preference against a bone's direction."""
-STIFF = 0.1
-"""The same for fingers, which are often straight: their knuckles then turn no further than this lets them."""
+STIFF = {"thumb": 0.3, "index": 0.1, "middle": 0.1, "ring": 0.1, "pinky": 0.1}
+"""The same for fingers, which are often straight: their knuckles then turn no further than this lets them.
+Thumbs bend in another plane in every source: bones that pointed quite as the source's would take angles that
+thumbs do not reach and that the standard's I planes do not carry."""
 FOREARM_SHARE = 0.5
 """Of the hand's twist against the forearm, what the forearm takes: radius and ulna turn about each other."""
 CLAVICLE_SHARE = 0.5
@@ -225,7 +227,7 @@ class Retarget:
             targets.append(aiming.Target(pieces, rotations.inside(above, self._direction(joint))))
         turned = np.array(axes)
         start = np.concatenate(starts, axis=1)
-        angles = aiming.aim_all(turned, start, targets, np.full(len(turned), STIFF))
+        angles = aiming.aim_all(turned, start, targets, np.full(len(turned), STIFF[finger[2:]]))
         used = 0
         frame = above
         for joint, own_angles in zip(joints, starts, strict=True):
