@@ -6,6 +6,7 @@ import shlex
 import tempfile
 from importlib.resources import as_file, files
 from pathlib import Path
+from threading import Timer
 
 import click
 
@@ -15,6 +16,9 @@ from fba.errors import DisplayError
 
 BAP_STEPS = "visage"
 """The standard's own table moves a root in steps of 64 mm, which shows."""
+PATIENCE = 4.0
+"""Seconds after which it says why nothing is to be seen yet."""
+COMPILING = "compiling for this machine, on the first run only: about a minute in all"
 
 
 @click.command(epilog=options.examples("fba demo", "fba demo --no-play --out demo/"))
@@ -35,10 +39,14 @@ def command(out: Path | None, play: bool | None) -> None:
 
     folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
     folder.mkdir(parents=True, exist_ok=True)
+    compiling = Timer(PATIENCE, click.echo, [COMPILING], {"err": True})
+    compiling.daemon = True
+    compiling.start()
     with as_file(files("fba") / "samples") as samples:
         body, face = read(samples / "hello.bvh"), read(samples / "hello.fap")
         captured = sum((samples / name).stat().st_size for name in ("hello.bvh", "hello.fap"))
     animation = merge(face, body.resample(face.rate))
+    compiling.cancel()
     click.echo(
         f"sample: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and face at "
         f"{options.rate_text(face.rate)} frames/s, {captured} bytes of text (BVH and FAP)"
