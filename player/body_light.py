@@ -92,7 +92,7 @@ class BodyLight:
             at, near, shares, folds = self._some(part, rows)
             past = np.empty((len(at), 2), dtype=np.float32)
             _past(places, normals, at, capsules, past)
-            light = _free(part, rows)
+            light = np.empty((len(near), len(REACH)), dtype=np.float32)
             _spread(past, near, shares, folds, light)
             return light
 
@@ -214,12 +214,15 @@ def _past(places: Float32, normals: Float32, rows: Int32, capsules: Float32, pas
 
 @compiled
 def _spread(past: Float32, near: Int32, shares: Float32, folds: Float32, light: Float32) -> None:
-    """Multiply light (V, 4) by what comes past capsules and folds."""
+    """light (V, 4): what comes past capsules and folds."""
+    lit, open_ = np.float32(REACH[0]), np.float32(REACH[1])
+    through, rim = np.float32(REACH[2]), np.float32(REACH[3])
     for i in range(len(light)):
         key, sky = np.float32(0.0), np.float32(0.0)
         for k in range(near.shape[1]):
             key += shares[i, k] * past[near[i, k], 0]
             sky += shares[i, k] * past[near[i, k], 1]
-        light[i, 0] *= key
-        light[i, 1] *= sky * folds[i]
-        light[i, 3] *= sky * folds[i]
+        light[i, 0] = lit * key
+        light[i, 1] = open_ * (sky * folds[i])
+        light[i, 2] = through
+        light[i, 3] = rim * (sky * folds[i])

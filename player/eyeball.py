@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,7 +46,7 @@ class Eyeball:
 
     def posed(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
         """The eye for moved vertices of its part (V, 3) and of the face, in the world by matrix (4, 4)."""
-        moved = part[self.rows].astype(np.float64)
+        moved = part.take(self.rows, axis=0).astype(np.float64)
         turn, centre = _placed(self.neutral, moved, self.centre)
         if not np.isfinite(turn).all():  # squeezed flat
             turn = _rotation(self.neutral - self.neutral.mean(axis=0), moved - moved.mean(axis=0))
@@ -58,13 +59,16 @@ class Eyeball:
         return Eye(
             matrix @ frame,
             iris,
-            float(np.clip(pupil / 2 / self.radius, 0.03, iris * 0.92)),
+            min(max(pupil / 2 / self.radius, 0.03), iris * 0.92),
             self._lid_places(face, centre),
-            matrix[:3, :3] / np.linalg.norm(matrix[:3, 0]),
+            matrix[:3, :3] / math.sqrt(matrix[:3, 0] @ matrix[:3, 0]),
         )
 
     def _lid_places(self, face: Float32, centre: Float64) -> Float64:
         """(4, 3) lids' middles and corners from the centre, in radii; wide open where there are none."""
+        if min(self.lids) >= 0:
+            known: Float64 = (face.take(self.lids, axis=0) - centre) / self.radius
+            return known
         open_ = np.array([[0.0, 0.5, 0.86], [0.0, -0.5, 0.86], [1.0, 0.0, 0.3], [-1.0, 0.0, 0.3]])
         for place, vertex in enumerate(self.lids):
             if vertex >= 0:

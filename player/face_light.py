@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -25,6 +26,7 @@ Light = Callable[[Rows | None], Float32]
 
 KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
 """As in shaders/lighting.glsl."""
+LIGHTS = np.array([KEY_DIRECTION, RIM_DIRECTION])
 MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
               51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
 """FAPs of a mouth open so far that light falls in."""
@@ -145,15 +147,19 @@ class FaceLight:
         return float(min(max(share, 0.0), 1.0) ** 0.4)  # the first millimetres let most of the light in
 
     def _gap(self, positions: Float32) -> float:
-        upper, lower = positions[self._lips]
-        return float(np.linalg.norm(upper - lower))
+        assert self._lips is not None
+        way = positions[self._lips[0]] - positions[self._lips[1]]
+        return math.sqrt(float(way @ way))
 
     def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
         """(N,) how far vertices of a tongue at these depths are out between the lips, 0..1."""
         if self._lips is None:
             return np.zeros(len(depths), dtype=np.float32)
         reach = 0.12 * self._model.fapu.ENS * 1024
-        share: Float32 = np.clip((depths - positions[self._lips, 2].min()) / reach, 0.0, 1.0)
+        lips = min(positions[self._lips[0], 2], positions[self._lips[1], 2])
+        if depths.max(initial=lips) <= lips:  # as most of the time
+            return np.zeros(len(depths), dtype=np.float32)
+        share: Float32 = np.clip((depths - lips) / reach, 0.0, 1.0)
         return share.astype(np.float32)
 
     def _bake(self) -> _Baked:
@@ -235,7 +241,8 @@ def _table(baked: _Baked, chosen: Rows) -> Table:
 
 def _basis(*turns: Float64) -> Float32:
     """(2 N, 16) what weighs the harmonics for key and rim light, turned by each of turns, N of (3, 3)."""
-    lights = np.stack([np.array(KEY_DIRECTION), np.array(RIM_DIRECTION)], axis=1)
-    towards = np.concatenate([(into @ lights).T for into in turns])
-    towards /= np.sqrt((towards * towards).sum(axis=1, keepdims=True))
+    towards = np.empty((2 * len(turns), 3))
+    for k, into in enumerate(turns):
+        np.dot(LIGHTS, into.T, out=towards[2 * k : 2 * k + 2])
+    towards /= np.sqrt(np.einsum("ij,ij->i", towards, towards))[:, None]
     return weights(towards).astype(np.float32)

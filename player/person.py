@@ -23,6 +23,7 @@ Float64 = npt.NDArray[np.float64]
 SCATTER = {"skin": 1.0, "neck": 1.0}
 SEEN_WEIGHTS, BEND = 6, 0.02
 """How a coarser body keeps its joints: what a vertex carried by the wrong one counts in metres."""
+WORLD, NOWHERE = np.eye(4), np.zeros(3)
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of parts of a face that the neck may bend; eyes, teeth and tongue go with the skull."""
 
@@ -113,4 +114,4 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
 
 
 def _placed(shape: FaceShape, places: Float32, normals: Float32, light: Light) -> FaceMesh:
-    return FaceMesh(shape, places, normals, light, np.eye(4), np.zeros(3), np.zeros(3))
+    return FaceMesh(shape, places, normals, light, WORLD, NOWHERE, NOWHERE)
