@@ -75,7 +75,7 @@ class BodyLight:
         head = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or the neck
         self._radii = np.array([row[2] for row in known]) * (tall / head / TALL if tall > 0 else 1.0)
         self._made: Prepared | None = None
-        self._kept: dict[tuple[int, int], tuple[Rows | None, Prepared]] = {}
+        self._kept: dict[tuple[int, int, int], tuple[Rows | None, Prepared]] = {}
 
     def reaching(self, places: Float32, normals: Float32, joints: Float64) -> Float32:
         """float32 (V, 4), see `player.shapes.FaceMesh.light`, for the body's vertices and normals (V, 3) in
@@ -100,7 +100,7 @@ class BodyLight:
 
     def _some(self, part: slice, rows: Rows | None) -> Prepared:
         """As `_prepared` for some of a part's vertices; kept for as long as these are."""
-        key = (part.start, id(rows))
+        key = (part.start, part.stop, id(rows))
         if key not in self._kept:
             while len(self._kept) >= MOST_KEPT:
                 del self._kept[next(iter(self._kept))]

@@ -6,6 +6,7 @@ import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -61,15 +62,16 @@ class LitFace:
     ) -> None:
         self._light = light
         self._args = (share, lights, tongues)
-        self._parts: dict[int, Light] = {}
+        self._parts: dict[tuple[int, int], Light] = {}
 
     def of(self, part: slice) -> Light:
         """What gives float32 (N, 4), 0..1, for the vertices of a part, or those of its rows (N,) that are
         asked for: what reaches them of the key light, of the open sky, through the skin from behind, and of
         the rim light. The same object each time."""
-        if part.start not in self._parts:
-            self._parts[part.start] = lambda rows: self._light.lit(part, rows, *self._args)
-        return self._parts[part.start]
+        key = (part.start, part.stop)
+        if key not in self._parts:
+            self._parts[key] = partial(self._light.lit, part, *self._args)
+        return self._parts[key]
 
 
 class FaceLight:
@@ -85,7 +87,7 @@ class FaceLight:
         self._sway = sway
         self._baked: _Baked | None = None
         self._lit: tuple[tuple[object, ...], LitFace] | None = None
-        self._kept: dict[tuple[int, int], tuple[Rows | None, _Some]] = {}
+        self._kept: dict[tuple[int, int, int], tuple[Rows | None, _Some]] = {}
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
         self._teeth = [self._rows(part) for part in model.of_kind("teeth")]
@@ -114,10 +116,10 @@ class FaceLight:
     def lit(
         self,
         part: slice,
-        rows: Rows | None,
         share: float,
         lights: Float32,
         tongues: list[tuple[slice, Float32]],
+        rows: Rows | None,
     ) -> Float32:
         """As `LitFace` gives it for some of a part's vertices, or for all. lights: (2, 16) what weighs the
         harmonics for what goes with the head, then for what stands where that differs."""
@@ -131,7 +133,7 @@ class FaceLight:
 
     def _some(self, part: slice, rows: Rows | None) -> _Some:
         """What light at some of a part's vertices is worked out from; kept for as long as they are."""
-        key = (part.start, id(rows))
+        key = (part.start, part.stop, id(rows))
         if key not in self._kept:
             while len(self._kept) >= MOST_KEPT:
                 del self._kept[next(iter(self._kept))]

@@ -56,3 +56,14 @@ def test_a_face_of_other_vertices_is_refused(person: Person) -> None:
     few = np.zeros((7, 3), dtype=np.float32)
     with pytest.raises(ValueError, match="must have shape"):
         person.head.skin(few, person.body.bind)
+
+
+def test_of_the_whole_body_and_of_its_first_part(person: Person) -> None:
+    body, light = person.body, person._light
+    joints = BapSolver(body.skeleton).pose(np.zeros(296))
+    places, normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
+    body.skin(joints, places, normals)
+    first = light.lit(places, normals, joints)(slice(0, len(body.parts[0].vertices)), None)
+    whole = light.reaching(places, normals, joints)
+    assert len(whole) == len(places)
+    np.testing.assert_allclose(first, whole[: len(first)], atol=1e-6)
