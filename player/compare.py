@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,7 @@ from player.compare_times import CompareTimeline
 from player.differences import Differences, differences
 from player.scene import Scene
 from player.shapes import View, srgb
+from player.showable import InTime
 from player.switches import Switches
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ ABOVE = 0.96
 """Height of a caption above the middle of a head, in half heads."""
 
 
-class CompareScene:
+class CompareScene(InTime[CompareTimeline]):
     """Several scenes shown together, at the same times; a `Showable` as `Scene` is.
 
     scenes: at least one. arrangement: "side" or "over"; may be set at any time. names: captions of the
@@ -123,21 +123,6 @@ class CompareScene:
     def has_body(self) -> bool:
         """Whether one of them has a body."""
         return any(scene.has_body for scene in self.scenes)
-
-    @property
-    def rate(self) -> Fraction:
-        """Frames a second of the first."""
-        return self.timeline.rate
-
-    @property
-    def start(self) -> Fraction:
-        """Where the earliest begins, seconds."""
-        return self.timeline.start
-
-    @property
-    def duration(self) -> Fraction:
-        """Seconds from there to where the latest ends."""
-        return self.timeline.duration
 
     @property
     def subject(self) -> Subject:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from player.camera import Camera, Subject
 from player.framing import Extent, body_extent
 from player.ground import no_shadows, shadows
 from player.shapes import View
+from player.showable import InTime
 from player.switches import SWITCHES, Switches
 from player.timeline import Timeline
 
@@ -34,7 +34,7 @@ LOOKS = ("figure", "points")
 """What a scene may be shown as: a person, or feature points and bones."""
 
 
-class Scene:
+class Scene(InTime[Timeline]):
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
     animation: at least one frame, else ValueError. model: the face, by default the built-in head; one that is
@@ -126,21 +126,6 @@ class Scene:
     def has_body(self) -> bool:
         """Whether a body is shown."""
         return self.animation.body is not None
-
-    @property
-    def rate(self) -> Fraction:
-        """Frames a second of the animation."""
-        return self.timeline.rate
-
-    @property
-    def start(self) -> Fraction:
-        """Time of the first frame, seconds."""
-        return self.timeline.start
-
-    @property
-    def duration(self) -> Fraction:
-        """Seconds from the first frame to the end of the last."""
-        return self.timeline.duration
 
     @property
     def subject(self) -> Subject:

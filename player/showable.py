@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -54,6 +54,30 @@ class Course(Times, Protocol):
 
     def baps(self, time: float) -> npt.NDArray[np.float64]:
         """(296,); zeros where there is no body."""
+
+
+Own = TypeVar("Own", bound=Times)
+
+
+class InTime(Generic[Own]):
+    """A scene's times, as its own kind of timeline says."""
+
+    timeline: Own
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames a second; of several performances, the first's."""
+        return self.timeline.rate
+
+    @property
+    def start(self) -> Fraction:
+        """Time of the first frame, seconds."""
+        return self.timeline.start
+
+    @property
+    def duration(self) -> Fraction:
+        """Seconds from the first frame to the end of the last."""
+        return self.timeline.duration
 
 
 class Showable(Protocol):

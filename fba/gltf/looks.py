@@ -8,22 +8,14 @@ from fba.errors import ModelError
 from fba.gltf.scene import Gltf
 from fba.gltf.values import Value
 from fba.gltf.writer import Builder
-from fba.mesh import Float32, Int32, Material
+from fba.mesh import Float32, Material, Mesh
 
 WHITE = (1.0, 1.0, 1.0)
 
 
-class MeshPart(Protocol):
+class MeshPart(Mesh, Protocol):
     """A mesh with its looks: a part of a face or of a body."""
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def vertices(self) -> Float32: ...
-    @property
-    def triangles(self) -> Int32: ...
-    @property
-    def normals(self) -> Float32 | None: ...
     @property
     def texcoords(self) -> Float32 | None: ...
     @property

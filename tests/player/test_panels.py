@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from set_clock import Clock
 
 import fba
 from fba.animation import Animation
@@ -20,16 +21,6 @@ imgui = pytest.importorskip("imgui_bundle").imgui
 from player.ui.picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (900, 600)
-
-
-class Clock:
-    """A clock that tests set."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from player_tracks import face_track
+from set_clock import Clock
 
 from fba.animation import Animation
 from player.timeline import Timeline
@@ -14,18 +15,10 @@ from player.times import clock_text, timecode
 from player.transport import Transport
 
 
-class Clock:
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
 def transport(index: list[int] | None = None, rate: int = 10, loop: bool = True) -> tuple[Transport, Clock]:
     at = list(range(20)) if index is None else index
     animation = Animation(Fraction(rate), np.array(at), face=face_track([{3: 1} for _ in at]))
-    clock = Clock()
+    clock = Clock(1000.0)
     return Transport(Timeline(animation), loop=loop, clock=clock), clock
 
 
@@ -245,7 +238,7 @@ def test_another_clock_goes_on_from_the_same_place() -> None:
     player, clock = transport()
     player.play()
     clock.now += 0.5
-    other = Clock()
+    other = Clock(1000.0)
     other.now = -3.0
     player.use_clock(other)
     clock.now += 1.0

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from set_clock import Clock
 
 from fba.animation import Animation
 from player.camera import PRESETS, Camera
 from player.scene import Scene
 from player.viewpoint import GLIDE, Viewpoint
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 5.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 class Walking:
@@ -31,7 +24,7 @@ class Walking:
 
 @pytest.fixture
 def clock() -> Clock:
-    return Clock()
+    return Clock(5.0)
 
 
 def test_it_glides_to_a_preset_and_arrives(talking: Animation, clock: Clock) -> None:

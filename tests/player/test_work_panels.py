@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from set_clock import Clock
 from studio_hand import StudioHand, panel_of
 
 import fba
@@ -21,16 +22,6 @@ imgui = pytest.importorskip("imgui_bundle").imgui
 from player.ui.picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (1000, 640)
-
-
-class Clock:
-    """A clock that tests set."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture
