@@ -139,10 +139,6 @@ class Scene(InTime[Timeline]):
             return None
         return self._framed().upper_half
 
-    def refit(self) -> None:
-        """Look anew at where the performance takes place: more of a stream has arrived."""
-        self._extent = None
-
     @property
     def face_subject(self) -> Subject:
         """The head alone, where the performance begins."""

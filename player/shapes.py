@@ -171,28 +171,6 @@ def spheres(places: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ..
     return found
 
 
-class Normals:
-    """Vertex normals of one triangulation, for any positions."""
-
-    def __init__(self, triangles: npt.NDArray[np.int32], vertices: int) -> None:
-        from scipy.sparse import csr_matrix
-
-        self._triangles = triangles
-        flat = triangles.ravel()
-        rows = np.repeat(np.arange(len(triangles)), 3)
-        self._gather = csr_matrix(
-            (np.ones(len(flat), dtype=np.float32), (flat, rows)), (vertices, len(triangles))
-        )
-
-    def __call__(self, positions: Float32) -> Float32:
-        """(V, 3) positions -> (V, 3) unit normals, weighted by area."""
-        a, b, c = (positions[self._triangles[:, i]] for i in range(3))
-        normals = self._gather @ np.cross(b - a, c - a)
-        length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
-        result: Float32 = (normals / np.maximum(length, 1e-20)[:, None]).astype(np.float32)
-        return result
-
-
 def srgb(text: str) -> tuple[float, float, float]:
     """A colour written "#rrggbb" in sRGB, as linear light."""
     values = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
