@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import secrets
@@ -12,6 +13,9 @@ from typing import BinaryIO
 from fba.errors import FbaError, FormatError
 
 Path = str | os.PathLike[str]
+
+_unfinished: set[str] = set()
+"""Temporary files that may exist now, noted before they are made: Ctrl-C may come between any two steps."""
 
 
 @contextlib.contextmanager
@@ -41,13 +45,7 @@ def atomic(path: Path) -> Iterator[BinaryIO]:
         raise FormatError(
             "is write-protected; make it writable (chmod u+w) or choose another name", path=name
         )
-    temporary = os.path.join(os.path.dirname(target), f".fba-{secrets.token_hex(6)}.tmp")
-    try:
-        # created with the permissions that a plain open() would give, as the umask wants them
-        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-    except (OSError, ValueError) as error:
-        raise FormatError(f"cannot be written: {_reason(error)}", path=name) from error
-    try:
+    with temporary_beside(target, ".tmp", name) as (temporary, handle):
         try:
             with os.fdopen(handle, "wb") as file:
                 yield file
@@ -58,10 +56,39 @@ def atomic(path: Path) -> Iterator[BinaryIO]:
             raise  # some are also OSErrors, and say more than "could not be written"
         except OSError as error:
             raise FormatError(f"could not be written: {_reason(error)}", path=name) from error
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
+
+
+@contextlib.contextmanager
+def temporary_beside(target: str, suffix: str, name: Path) -> Iterator[tuple[str, int]]:
+    """A new file in the target's folder, and its open handle: gone when the block ends, unless renamed.
+
+    A block that never ends, because Ctrl-C came while it was being entered, leaves it to the end of the
+    program. Raises FormatError, which gives the name as the user wrote it, where it cannot be made.
+    """
+    temporary = os.path.join(os.path.dirname(target), f".fba-{secrets.token_hex(6)}{suffix}")
+    _unfinished.add(temporary)
+    try:
+        # created with the permissions that a plain open() would give, as the umask wants them
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    except (OSError, ValueError) as error:
+        _unfinished.discard(temporary)
+        raise FormatError(f"cannot be written: {_reason(error)}", path=name) from error
+    try:
+        yield temporary, handle
+    finally:
+        _remove(temporary)
+
+
+def _remove(temporary: str) -> None:
+    with contextlib.suppress(OSError):
+        os.unlink(temporary)
+    _unfinished.discard(temporary)
+
+
+@atexit.register
+def _remove_unfinished() -> None:
+    for temporary in tuple(_unfinished):
+        _remove(temporary)
 
 
 @contextlib.contextmanager

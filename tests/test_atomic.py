@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -42,6 +44,25 @@ def test_whatever_interrupts_leaves_the_old_file(
         interrupted()
     assert path.read_bytes() == b"old"
     assert os.listdir(tmp_path) == ["a"]
+
+
+@pytest.mark.parametrize("writer", ["fba.atomic import atomic as w", "player.whole import written as w"])
+def test_an_interruption_just_when_the_temporary_file_appears(tmp_path: Path, writer: str) -> None:
+    code = f"""
+import os
+from {writer}
+made = os.open
+def open_and_stop(*arguments):
+    made(*arguments)
+    assert len(os.listdir({str(tmp_path)!r})) == 1
+    raise KeyboardInterrupt
+os.open = open_and_stop
+with w({str(tmp_path / "a.mp4")!r}):
+    pass
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "KeyboardInterrupt" in result.stderr
+    assert os.listdir(tmp_path) == []
 
 
 def test_a_failing_disk_is_a_clear_error(tmp_path: Path) -> None:

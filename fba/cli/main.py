@@ -10,6 +10,7 @@ from importlib import import_module
 import click
 
 from fba import __version__
+from fba.cli.interruption import KeptInterruptions
 from fba.errors import FbaError, FbaWarning
 
 _COMMANDS = {
@@ -68,8 +69,10 @@ def main(arguments: list[str] | None = None) -> None:
     debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
     warnings.simplefilter("always", FbaWarning)
     warnings.showwarning = _show_warning
+    interruptions = KeptInterruptions()
     try:
-        result = group.main(arguments, prog_name="fba", standalone_mode=False)
+        with interruptions:
+            result = group.main(arguments, prog_name="fba", standalone_mode=False)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.ClickException as error:
@@ -90,6 +93,9 @@ def main(arguments: list[str] | None = None) -> None:
     except Exception as error:
         if debug:
             raise
+        if interruptions.made(error):
+            click.echo("fba: interrupted", err=True)
+            sys.exit(INTERRUPTED)
         click.echo(
             f"fba: internal error: {type(error).__name__}: {_one_line(error)}; this is a defect of fba: "
             "please report it with what --debug prints",
