@@ -1,19 +1,23 @@
-"""Ctrl-C that Python raises where nothing can be raised: inside a callback of C code, or a finalizer.
+"""Ctrl-C, kept from the moments at which Python cannot take it.
 
-There, Python prints "Exception ignored in" and goes on. While compiled loops are being loaded that is
-likely (a tenth of a second in each two), so such an interruption is kept and comes again.
+Compiled loops are loaded by LLVM, which calls Python back while it does so. An error raised in there is
+printed ("Exception ignored in") and lost, or leaves LLVM with half a function: the program then crashes. In
+such a moment, and in any other callback or finalizer, an interruption waits, and comes again soon.
 """
 
 from __future__ import annotations
 
 import _thread
+import signal
 import sys
 import time
-from types import TracebackType
-from typing import Protocol
+from types import FrameType, TracebackType
+from typing import Any, Protocol
 
 AGAIN_AFTER = 0.05
-"""Seconds until it comes again: by then the callback has returned."""
+"""Seconds until it comes again."""
+TOUCHY = ("llvmlite.", "numba.core.caching", "numba.core.codegen", "numba.core.runtime")
+"""Beginnings of the names of modules that must not be left halfway; none of their calls takes long."""
 
 
 class _Unraisable(Protocol):
@@ -24,19 +28,27 @@ class _Unraisable(Protocol):
     object: object
 
 
-class KeptInterruptions:
-    """While it lasts, no Ctrl-C is lost."""
+class Interruptions:
+    """While it lasts, Ctrl-C is neither lost nor harmful; for the main thread, which alone gets signals."""
 
     def __init__(self) -> None:
         self._lost = False
+        self._handler: Any = None
 
-    def __enter__(self) -> KeptInterruptions:
-        self._before = sys.unraisablehook
+    def __enter__(self) -> Interruptions:
+        self._hook = sys.unraisablehook
         sys.unraisablehook = self._unraisable
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            try:
+                self._handler = signal.signal(signal.SIGINT, self._interrupt)
+            except ValueError:  # not the main thread
+                self._handler = None
         return self
 
     def __exit__(self, *_: object) -> None:
-        sys.unraisablehook = self._before
+        sys.unraisablehook = self._hook
+        if self._handler is not None:
+            signal.signal(signal.SIGINT, self._handler)
 
     def made(self, error: BaseException) -> bool:
         """Whether it is for an interruption that there is this error: by its causes, or by what was lost."""
@@ -47,9 +59,17 @@ class KeptInterruptions:
             cause = cause.__cause__ or cause.__context__
         return self._lost
 
+    def _interrupt(self, _number: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            if str(frame.f_globals.get("__name__", "")).startswith(TOUCHY):
+                _thread.start_new_thread(_again, ())
+                return
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
     def _unraisable(self, unraisable: _Unraisable) -> None:
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
-            self._before(unraisable)
+            self._hook(unraisable)
             return
         self._lost = True
         _thread.start_new_thread(_again, ())

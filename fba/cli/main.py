@@ -10,7 +10,7 @@ from importlib import import_module
 import click
 
 from fba import __version__
-from fba.cli.interruption import KeptInterruptions
+from fba.cli.interruption import Interruptions
 from fba.errors import FbaError, FbaWarning
 
 _COMMANDS = {
@@ -69,7 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
     debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
     warnings.simplefilter("always", FbaWarning)
     warnings.showwarning = _show_warning
-    interruptions = KeptInterruptions()
+    interruptions = Interruptions()
     try:
         with interruptions:
             result = group.main(arguments, prog_name="fba", standalone_mode=False)

@@ -25,6 +25,36 @@ main(["long"])
 """
 
 
+LOADING = """
+import signal, sys, time
+from fba.cli.main import group, main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+steps = []
+names = {"signal": signal, "steps": steps, "__name__": "llvmlite.binding.executionengine"}
+exec("def load():\\n signal.raise_signal(signal.SIGINT)\\n steps.append('loaded')", names)
+
+@group.command("long")
+def long():
+    names["load"]()
+    while True:
+        time.sleep(0.01)
+
+group.get_command = lambda context, name: long
+try:
+    main(["long"])
+finally:
+    print(*steps)
+"""
+
+
+def test_what_must_not_be_left_halfway_is_finished_first() -> None:
+    command = [sys.executable, "-c", LOADING]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (result.returncode, result.stdout.strip(), result.stderr.strip()) == (
+        130, "loaded", "fba: interrupted",
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize(
     "afterwards",
     [
