@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
+from fba.atomic import temporary_beside
 from fba.errors import FbaError, FormatError
 
 PathLike = str | os.PathLike[str]
@@ -29,12 +29,9 @@ def written(path: PathLike) -> Iterator[Path]:
         raise FormatError(
             "is write-protected; make it writable (chmod u+w) or choose another name", path=path
         )
-    temporary = target.parent / f".fba-{secrets.token_hex(6)}{target.suffix}"
-    try:
-        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-    except (OSError, ValueError) as error:
-        raise cannot(path, error, "cannot be written") from error
-    try:
+    with temporary_beside(str(target), target.suffix, path) as (name, handle):
+        os.close(handle)
+        temporary = Path(name)
         yield temporary
         try:
             if target.exists():
@@ -42,9 +39,6 @@ def written(path: PathLike) -> Iterator[Path]:
             temporary.replace(target)
         except OSError as error:
             raise cannot(path, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def cannot(path: PathLike, error: BaseException, what: str = "could not be written") -> FbaError:
