@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FormatError, UnsupportedError
-from player.picture_files import QUICK, check_picture, write_picture
+from player.picture_files import check_picture, write_picture
 from player.recorder import FILMS
 from player.whole import PathLike, cannot
 
@@ -113,7 +113,7 @@ class Sequence:
     def write(self, pixels: UInt8, number: int) -> None:
         """A picture, uint8 (H, W, 4)."""
         path = self._names.path(number)
-        write_picture(path, pixels, transparent=self._transparent, packing=QUICK)
+        write_picture(path, pixels, transparent=self._transparent)
 
     def finish(self, count: int) -> Path:
         """The folder; all pictures are there."""

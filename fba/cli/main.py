@@ -11,6 +11,7 @@ import click
 
 from fba import __version__
 from fba.cli.interruption import Interruptions
+from fba.cli.startup import hasten
 from fba.errors import FbaError, FbaWarning
 
 _COMMANDS = {
@@ -64,8 +65,13 @@ def group() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 bad data, 2 bad usage, 130 interrupted."""
-    arguments = sys.argv[1:] if arguments is None else arguments
+    """Run the command line and exit: 0 done, 1 bad data, 2 bad usage, 130 interrupted.
+
+    arguments: None for those of the process, which then is taken as doing nothing else.
+    """
+    if arguments is None:
+        hasten()
+        arguments = sys.argv[1:]
     debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
     warnings.simplefilter("always", FbaWarning)
     warnings.showwarning = _show_warning
