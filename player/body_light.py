@@ -8,6 +8,7 @@ vertices, and spread over the others.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ from player.face_light import KEY_DIRECTION, kept_visibility
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
-Rows = npt.NDArray[np.intp]
+Rows = npt.NDArray[np.integer[Any]]
 Prepared = tuple[Int32, Int32, Float32, Float32]
 
 REACH = (1.0, 0.95, 0.0, 0.25)
@@ -84,6 +85,10 @@ class BodyLight:
 
     def lit(self, places: Float32, normals: Float32, joints: Float64) -> LitBody:
         """The same, worked out where it is asked for."""
+        return self.lit_at(lambda rows: (places, normals), joints)
+
+    def lit_at(self, reached: Callable[[Rows], tuple[Float32, Float32]], joints: Float64) -> LitBody:
+        """The same. reached: gives places and normals (V, 3) that are right at rows (N,)."""
         if not is_compiled() or not len(self._ends):
             return LitBody(_free)
         capsules = _capsules(joints[self._ends.ravel(), :3, 3].reshape(-1, 2, 3), self._radii)
@@ -91,7 +96,7 @@ class BodyLight:
         def some(part: slice, rows: Rows | None) -> Float32:
             at, near, shares, folds = self._some(part, rows)
             past = np.empty((len(at), 2), dtype=np.float32)
-            _past(places, normals, at, capsules, past)
+            _past(*reached(at), at, capsules, past)
             light = np.empty((len(near), len(REACH)), dtype=np.float32)
             _spread(past, near, shares, folds, light)
             return light

@@ -53,8 +53,10 @@ class CastShadow:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """corners int32 (N, 3), shares float32 (N, 3): where on which triangles; area float32 (N,), m²."""
+    """corners int32 (N, 3), shares float32 (N, 3): where on which triangles; area float32 (N,), m².
+    rows int32 (M,): all corners, each once."""
 
+    rows: Int32
     corners: Int32
     shares: Float32
     area: Float32
@@ -84,7 +86,7 @@ class ShadowCaster:
             points = self._points_of(mesh.shape)
             if points is not None and not mesh.turn.any():
                 _throw(
-                    mesh.positions,
+                    mesh.places.reached(points.rows),
                     mesh.matrix,
                     points.corners,
                     points.shares,
@@ -128,6 +130,7 @@ def _spread(shape: FaceShape) -> _Points | None:
     over = u + v > 1
     u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
     return _Points(
+        np.unique(triangles[owner]).astype(np.int32),
         np.ascontiguousarray(triangles[owner], dtype=np.int32),
         np.stack([1 - u - v, u, v], axis=1).astype(np.float32),
         np.full(count, ends[-1] / count, dtype=np.float32),

@@ -44,7 +44,7 @@ class Details:
 
     def _suited(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
         coarser = mesh.shape.coarser
-        if coarser is None or not len(mesh.positions):
+        if coarser is None or not len(mesh.places):
             return mesh
         number = int(np.searchsorted(TOLERANCES, PIXELS * pixel * distance(mesh, eye), side="right"))
         level = self._level(mesh.shape, number)
@@ -52,8 +52,8 @@ class Details:
             return mesh
         if level.light is None or not _same_light(level.light[0], mesh.reaching):
             level.light = (mesh.reaching, mesh.light_at(level.rows))
-        places, normals = mesh.positions.take(level.rows, axis=0), mesh.normals.take(level.rows, axis=0)
-        return FaceMesh(level.shape, places, normals, level.light[1], mesh.matrix, mesh.turn, mesh.centre)
+        places = mesh.places.some(level.rows)
+        return FaceMesh(level.shape, places, level.light[1], mesh.matrix, mesh.turn, mesh.centre)
 
     def _level(self, shape: FaceShape, number: int) -> _Level | None:
         levels = self._levels.setdefault(shape, {})
@@ -79,14 +79,14 @@ def _left(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> _Level:
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """From an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
-    step = max(len(mesh.positions) // SAMPLED, 1)
-    return float(_nearest(mesh.positions, mesh.matrix, eye, step))
+    places = mesh.places.sampled(max(len(mesh.places) // SAMPLED, 1))
+    return float(_nearest(places, mesh.matrix, eye))
 
 
 @compiled
-def _nearest(positions: Float32, matrix: Float64, eye: Float64, step: int) -> float:
+def _nearest(positions: Float32, matrix: Float64, eye: Float64) -> float:
     least = np.inf
-    for i in range(0, len(positions), step):
+    for i in range(len(positions)):
         squared = 0.0
         for k in range(3):
             away = matrix[k, 3] - eye[k]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,10 +16,12 @@ from player.camera import Subject
 from player.eyeball import Eyeball, find_eyeball
 from player.face_light import MOUTH_OPEN, FaceLight, LitFace
 from player.face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
+from player.places import Places, Probe, Whole
 from player.shapes import Eye, FaceMesh, FaceShape, rotation_vector
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.intp]
 
 CUT = 0.45
 """On a body, what sways less than this is left out: the body has a neck of its own."""
@@ -33,12 +35,21 @@ EYES_APART = 0.062
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face for one set of FAPs: positions and normals float32 (V, 3), without the head's turn (4, 4)."""
+    """The face for one set of FAPs (68,): its vertices (V, 3), without the head's turn (4, 4)."""
 
     faps: Float32
-    positions: Float32
-    normals: Float32
+    whole: Whole
     turn: Float64
+
+    @property
+    def positions(self) -> Float32:
+        """float32 (V, 3)."""
+        return self.whole.arrays[0]
+
+    @property
+    def normals(self) -> Float32:
+        """float32 (V, 3)."""
+        return self.whole.arrays[1]
 
 
 class FaceFigure:
@@ -71,6 +82,10 @@ class FaceFigure:
         self.sway = sways
         self.centre = _head_centre(model)
         self._light = FaceLight(model, self.deformer, sways)
+        self._probe = Probe(len(model.vertices), self._prepared)
+        looking = [self._ranges[part.name].start + ball.rows for part, ball in self._eyeballs]
+        lids = np.array([row for _, ball in self._eyeballs for row in ball.lids if row >= 0], dtype=np.intp)
+        self._looking = np.concatenate([lids, *looking])
 
     def _shape(self, part: Part, sways: Float32) -> FaceShape:
         shape = part_shape(part, sways)
@@ -120,11 +135,21 @@ class FaceFigure:
     def pose(self, faps: Float32) -> Pose:
         """The face for FAPs (68,)."""
         if self._pose is None or not np.array_equal(self._pose.faps, faps):
+            self._pose = self._posed(faps.copy())
+        return self._pose
+
+    def _posed(self, faps: Float32) -> Pose:
+        def make() -> tuple[Float32, Float32]:
             positions = np.empty((len(self.model.vertices), 3), dtype=np.float32)
             normals = np.empty_like(positions)
-            self.deformer.local(faps, out=positions, normals=normals)
-            self._pose = Pose(faps.copy(), positions, normals, self.deformer.head_matrices(faps))
-        return self._pose
+            return self.deformer.local(faps, out=positions, normals=normals), normals
+
+        whole = Whole(len(self.model.vertices), make, lambda rows: self._probe.at(faps, rows)[0])
+        return Pose(faps, whole, self.deformer.head_matrices(faps))
+
+    def _prepared(self, rows: Rows) -> Callable[[Float32, Float32], None]:
+        """What writes the places of some vertices (N,), for FAPs (68,)."""
+        return self.deformer.chosen(rows).local
 
     def meshes(
         self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()
@@ -134,15 +159,15 @@ class FaceFigure:
         on_body: without the lower neck and shoulders. without: kinds of parts that are left out.
         """
         pose = self.pose(faps)
-        light = self._light.reaching(pose.positions, pose.turn[:3, :3], matrix[:3, :3])
+        light = self._light.reaching(pose.whole.at, pose.turn[:3, :3], matrix[:3, :3])
         axis = rotation_vector(pose.turn[:3, :3])
         found = []
         for name, shape in (self._on_body() if on_body else self._shapes).items():
             if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
             rows = self._ranges[name]
-            arrays = pose.positions[rows], pose.normals[rows], light.of(rows)
-            found.append(FaceMesh(shape, *arrays, matrix, axis, self.centre))
+            places = Places(pose.whole, rows.start, rows.stop - rows.start)
+            found.append(FaceMesh(shape, places, light.of(rows), matrix, axis, self.centre))
         return found
 
     @property
@@ -156,7 +181,7 @@ class FaceFigure:
 
     def light(self, faps: Float32, frame: Float64) -> LitFace:
         """What light reaches its vertices. frame: (4, 4), the turned head's into the world."""
-        return self._light.reaching(self.pose(faps).positions, np.eye(3), frame[:3, :3])
+        return self._light.reaching(self.pose(faps).whole.at, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
         """The eyeballs for FAPs (68,), put into the world by matrix (4, 4).
@@ -165,8 +190,9 @@ class FaceFigure:
         """
         pose = self.pose(faps)
         placed = matrix if turned else matrix @ pose.turn
+        positions = pose.whole.at(self._looking)
         return [
-            ball.posed(pose.positions[self._ranges[part.name]], pose.positions, faps, placed)
+            ball.posed(positions[self._ranges[part.name]], positions, faps, placed)
             for part, ball in self._eyeballs
         ]
 

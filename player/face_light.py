@@ -92,16 +92,21 @@ class FaceLight:
         self._lips = lips if min(lips) >= 0 else None
         self._teeth = [self._rows(part) for part in model.of_kind("teeth")]
         self._tongues = [self._rows(part) for part in model.of_kind("tongue")]
+        looked = [np.arange(rows.start, rows.stop) for rows in self._tongues]
+        self._looked = np.concatenate([np.array(self._lips or (), dtype=np.intp), *looked])
+        """Vertices by which it is known how far the mouth is open, and the tongue out."""
 
     def _rows(self, part: Part) -> slice:
         start = self._model.starts[part.name]
         return slice(start, start + len(part.vertices))
 
-    def reaching(self, positions: Float32, turn: Float64, matrix: Float64) -> LitFace:
-        """The light for positions: (V, 3) without the head's turn (3, 3); matrix: (3, 3) of the whole in the
-        world. The same object while nothing changes."""
+    def reaching(self, at: Callable[[Rows], Float32], turn: Float64, matrix: Float64) -> LitFace:
+        """The light for a face whose positions without the head's turn (3, 3), (V, 3), `at` gives, right at
+        rows (N,) at least; matrix: (3, 3) of the whole in the world. The same object while nothing changes.
+        """
         if self._baked is None:
             self._baked = self._bake()
+        positions = at(self._looked)
         share = round(self._mouth_open(positions, self._baked.gaps), 2)
         out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
         # In steps that nobody sees, the same whatever was shown before.

@@ -39,6 +39,11 @@ class FaceRenderer:
         for program in self._programs.values():
             self._place(program)
 
+    def prepare(self, meshes: list[FaceMesh]) -> None:
+        """Before anything of a picture: everything that `draw` is then given a part of."""
+        for mesh in meshes:
+            _ = mesh.places.whole.arrays
+
     def draw(self, meshes: list[FaceMesh]) -> None:
         """Draw parts; those that can be seen through last."""
         gl = self._gl

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import cast
 
@@ -12,13 +13,15 @@ from fba.body.heads import HeadOnBody
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
 from player.body_light import BodyLight
-from player.face import FaceFigure
+from player.face import FaceFigure, Pose
 from player.face_light import Light
 from player.face_parts import coarser_part, part_shape, with_triangles
+from player.places import Places, Probe, SomeRows, Whole
 from player.shapes import Eye, FaceMesh, FaceShape
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.intp]
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
 SEEN_WEIGHTS, BEND = 6, 0.02
@@ -54,6 +57,9 @@ class Person:
         self._light = BodyLight(body, coarser)
         self._places, self._normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
         self._skin, self._upright = np.empty_like(model.vertices), np.empty_like(model.vertices)
+        self._probe = Probe(len(body.vertices), self._some_of_body)
+        self._lit = Probe(len(body.vertices), self._some_lit, normals=True)
+        self._face_probe = Probe(len(model.vertices), self._some_of_face)
 
     def joints(self, faps: Float32, matrices: Float64) -> Float64:
         """Joint matrices (J, 4, 4) with the head turned by FAPs (68,) on its skull base."""
@@ -65,24 +71,74 @@ class Person:
 
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
         """Everything but the eyeballs, for FAPs (68,) and joint matrices with the head's turn."""
-        self.body.skin(joints, self._places, self._normals)
-        reaching = self._light.lit(self._places, self._normals, joints)
+        body = self._body_whole(joints)
+
+        def reached(rows: SomeRows) -> tuple[Float32, Float32]:
+            places, normals = body.arrays if body.is_made else self._lit.at(joints, rows)
+            return places, normals
+
+        reaching = self._light.lit_at(reached, joints)
         found = [
-            _placed(
-                self._shapes[part.name],
-                self._places[self._rows[part.name]],
-                self._normals[self._rows[part.name]],
-                reaching.of(self._rows[part.name]),
-            )
+            _placed(self._shapes[part.name], body, self._rows[part.name], reaching.of(self._rows[part.name]))
             for part in self._parts
         ]
-        pose = self.figure.pose(faps)
-        self.head.skin(pose.positions, joints, self._skin, upright=pose.normals, normals=self._upright)
+        face = self._face_whole(self.figure.pose(faps), joints)
         light = self.figure.light(faps, self.frame(joints))
         for name, shape in self._face.items():
             rows = self.figure.rows(name)
-            found.append(_placed(shape, self._skin[rows], self._upright[rows], light.of(rows)))
+            found.append(_placed(shape, face, rows, light.of(rows)))
         return found
+
+    def _body_whole(self, joints: Float64) -> Whole:
+        """The body's vertices."""
+
+        def make() -> tuple[Float32, Float32]:
+            return self.body.skin(joints, self._places, self._normals), self._normals
+
+        return Whole(len(self._places), make, lambda rows: self._probe.at(joints, rows)[0])
+
+    def _face_whole(self, pose: Pose, joints: Float64) -> Whole:
+        """The face's, on the body."""
+
+        def make() -> tuple[Float32, Float32]:
+            upright = self._upright
+            return self.head.skin(
+                pose.positions, joints, self._skin, upright=pose.normals, normals=upright
+            ), upright
+
+        posed = (pose, joints)
+        return Whole(len(self._skin), make, lambda rows: self._face_probe.at(posed, rows)[0])
+
+    def _some_of_body(self, rows: Rows) -> Callable[[Float64, Float32], None]:
+        """What writes the places of some of the body's vertices (N,)."""
+        skinner, room = self.body.skinner.chosen(rows), np.empty((len(rows), 3), dtype=np.float32)
+
+        def write(joints: Float64, places: Float32) -> None:
+            places[rows] = skinner.skin(joints, room)
+
+        return write
+
+    def _some_lit(self, rows: Rows) -> Callable[[Float64, Float32, Float32], None]:
+        """The same with their normals."""
+        all_ = self.body.skinner.with_neighbours(rows)
+        skinner = self.body.skinner.chosen(all_)
+        room, upright = (np.empty((len(all_), 3), dtype=np.float32) for _ in range(2))
+
+        def write(joints: Float64, places: Float32, normals: Float32) -> None:
+            places[all_] = skinner.skin(joints, room, upright)
+            normals[all_] = upright
+
+        return write
+
+    def _some_of_face(self, rows: Rows) -> Callable[[tuple[Pose, Float64], Float32], None]:
+        """What writes the places of some of the face's vertices (N,)."""
+        head, room = self.head.chosen(rows), np.empty((len(rows), 3), dtype=np.float32)
+
+        def write(posed: tuple[Pose, Float64], places: Float32) -> None:
+            pose, joints = posed
+            places[rows] = head.skin(pose.whole.at(rows).take(rows, axis=0), joints, room)
+
+        return write
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
         """The eyeballs, likewise."""
@@ -113,5 +169,6 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     return replace(kept, coarser=coarser)
 
 
-def _placed(shape: FaceShape, places: Float32, normals: Float32, light: Light) -> FaceMesh:
-    return FaceMesh(shape, places, normals, light, WORLD, NOWHERE, NOWHERE)
+def _placed(shape: FaceShape, whole: Whole, rows: slice, light: Light) -> FaceMesh:
+    places = Places(whole, rows.start, rows.stop - rows.start)
+    return FaceMesh(shape, places, light, WORLD, NOWHERE, NOWHERE)

@@ -81,6 +81,7 @@ class Renderer:
         Returns where its steps are.
         """
         gl = self._gl
+        self._faces.prepare(view.faces)
         aspect = size[0] / max(size[1], 1)
         seen = camera.view_matrix()
         matrix, place = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]

@@ -17,6 +17,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from player.coarse import Coarser
     from player.extras import Extras
+    from player.places import Places
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -95,20 +96,29 @@ class FaceShape:
 class FaceMesh:
     """A part of a face in one pose.
 
-    positions, normals: float32 (V, 3), without the head's rotation. reaching: float32 (V, 4), 0..1, what
-    reaches each vertex past the rest of the face: of the key light, of the open sky, through the skin
-    from behind, of the rim light; or what gives that for chosen vertices (N,), or for None, all. matrix:
-    (4, 4) into the world. turn: (3,) axis of the head's rotation times its angle, about centre (3,), in the
-    frame of the positions.
+    places: positions and normals, float32 (V, 3), without the head's rotation. reaching: float32 (V, 4),
+    0..1, what reaches each vertex past the rest of the face: of the key light, of the open sky, through
+    the skin from behind, of the rim light; or what gives that for chosen vertices (N,), or for None, all.
+    matrix: (4, 4) into the world. turn: (3,) axis of the head's rotation times its angle, about centre (3,),
+    in the frame of the positions.
     """
 
     shape: FaceShape
-    positions: Float32
-    normals: Float32
+    places: Places
     reaching: Float32 | Callable[[Rows | None], Float32]
     matrix: Float64
     turn: Float64
     centre: Float64
+
+    @property
+    def positions(self) -> Float32:
+        """float32 (V, 3), worked out for all of the figure with the first that is asked for."""
+        return self.places.positions
+
+    @property
+    def normals(self) -> Float32:
+        """float32 (V, 3), likewise."""
+        return self.places.normals
 
     @cached_property
     def light(self) -> Float32:

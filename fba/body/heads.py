@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -146,6 +147,13 @@ class HeadOnBody:
             raise ValueError(f"vertices must have shape {self._placed.shape}, not {local.shape}")
         sized(local, self._size, self._shift, self._placed)
         return self._skinner.carry(self._placed, upright, matrices, out, normals, method)
+
+    def chosen(self, rows: npt.NDArray[np.intp]) -> HeadOnBody:
+        """The same for some of the face's vertices, rows (N,), each once: `skin` takes and gives these."""
+        some = copy.copy(self)
+        some._skinner = self._skinner.chosen(rows)
+        some._placed = np.empty((len(rows), 3), dtype=np.float32)
+        return some
 
 
 def skull_of(body: BodyModel) -> int:

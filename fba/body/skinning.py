@@ -7,10 +7,10 @@ import threading
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.girdle import girdle
+from fba.body.girdle import chosen_girdle, girdle
 from fba.body.rings import rings
 from fba.body.skeleton import Skeleton
-from fba.body.twisting import twists
+from fba.body.twisting import chosen_twists, twists
 from fba.mesh import result_array
 
 Float32 = npt.NDArray[np.float32]
@@ -95,6 +95,30 @@ class Skinner:
                     f"vertices and normals must have shape {self._modelled.shape}, not {array.shape}"
                 )
         return self._run(vertices, upright, matrices, out, normals, method)
+
+    def chosen(self, rows: npt.NDArray[np.intp]) -> Skinner:
+        """A skinner of some vertices, rows (N,), each once. Their normals follow the surface where all the
+        neighbours that they are taken from are among them (`with_neighbours`), else they only turn."""
+        some = Skinner.__new__(Skinner)
+        some.__dict__.update(self.__dict__)
+        for name in ("_joints", "_weights", "_counts", "_modelled", "_upright_modelled", "_numbers"):
+            setattr(some, name, np.ascontiguousarray(getattr(self, name)[rows]))
+        place = np.full(len(self._modelled), -1, dtype=np.int32)
+        place[rows] = np.arange(len(rows))
+        around = self._around[rows]
+        around = np.where(around < 0, -1, place[around])
+        some._around = np.where((around < 0).any(axis=1, keepdims=True), -1, around).astype(np.int32)
+        some._twists, some._girdle = chosen_twists(self._twists, place), chosen_girdle(self._girdle, place)
+        some._vertices, some._upright = some._modelled.copy(), some._upright_modelled.copy()
+        some._wrung, some._wrung_modelled = some._modelled.copy(), True
+        some._scratch = np.empty_like(self._scratch)
+        some._lock = threading.Lock()
+        return some
+
+    def with_neighbours(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+        """(N,) the rows and those that their normals are taken from, rising."""
+        around = self._around[rows]
+        return np.union1d(rows, np.where(around < 0, rows[:, None], around))
 
     def _run(
         self,

@@ -282,6 +282,33 @@ def deform_frames(
 
 
 @compiled
+def deform_chosen(
+    values: Float64,
+    rest: Float32,
+    rows: Int64,
+    part_start: Int64,
+    shifts: Shifts,
+    transforms: Transforms,
+    scratch: Scratch,
+    out: Float32,
+) -> None:
+    """values (68,) -> rows (N,) of out (V, 3), in the frame of the head; rest (N, 3), part p's from
+    part_start[p] on. Number for number as `deform_frames`."""
+    copy(rest, scratch.moved)
+    add_shifts(values, shifts, scratch.moved, scratch.touched)
+    compose(values, transforms, scratch.poses)
+    for part in range(len(scratch.poses) - 1):
+        start, stop = int(part_start[part]), int(part_start[part + 1])
+        if start == stop:
+            continue
+        scratch.pose[:] = scratch.poses[part]
+        place(scratch.pose, scratch.moved[start:stop], scratch.moved[start:stop])
+    for k in range(len(rows)):
+        i = rows[k]
+        out[i, 0], out[i, 1], out[i, 2] = scratch.moved[k, 0], scratch.moved[k, 1], scratch.moved[k, 2]
+
+
+@compiled
 def points_of_frames(
     values: Float64,
     rest: Float64,

@@ -128,6 +128,28 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
     )
 
 
+def chosen_shifts(shifts: Shifts, rows: npt.NDArray[np.intp], count: int) -> Shifts:
+    """What they do to some of all `count` vertices, rows (N,), rising; numbered 0 to N - 1."""
+    place = np.full(count, -1, dtype=np.int64)
+    place[rows] = np.arange(len(rows))
+    found = place[shifts.rows]
+    kept = np.flatnonzero(found >= 0)
+    start = np.searchsorted(kept, shifts.start)
+    sizes = np.diff(start)
+    interval = np.repeat(np.arange(len(sizes)), sizes)
+    held = shifts.base[interval] >= 0
+    of_bases = (shifts.base - shifts.start[:-1])[interval] + kept
+    first = np.cumsum(np.where(shifts.base >= 0, sizes, 0)) - sizes
+    return shifts._replace(
+        start=start.astype(np.int64),
+        base=np.where(shifts.base >= 0, first, -1).astype(np.int64),
+        rows=found[kept].astype(np.uint32),
+        slopes=np.ascontiguousarray(shifts.slopes[kept]),
+        bases=np.ascontiguousarray(shifts.bases[of_bases[held]]),
+        amount=np.zeros_like(shifts.amount),
+    )
+
+
 _Interval = tuple[float, float, npt.NDArray[np.intp], npt.NDArray[np.float64], npt.NDArray[np.float64]]
 
 

@@ -8,6 +8,7 @@ import pytest
 from fba.compiled import is_compiled
 from player.cast_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
 from player.coarse import Coarser
+from player.places import Places
 from player.primitives import sphere_mesh
 from player.shapes import FaceMesh, FaceShape
 
@@ -31,7 +32,9 @@ def ball(radius: float, centre: tuple[float, float, float]) -> FaceMesh:
     matrix = np.eye(4)
     matrix[:3, 3] = centre
     light = np.ones((count, 4), dtype=np.float32)
-    return FaceMesh(shape, places, vertices.astype(np.float32), light, matrix, np.zeros(3), np.zeros(3))
+    return FaceMesh(
+        shape, Places.of(places, vertices.astype(np.float32)), light, matrix, np.zeros(3), np.zeros(3)
+    )
 
 
 def at(shadow: CastShadow, x: float, z: float) -> float:

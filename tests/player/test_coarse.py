@@ -11,6 +11,7 @@ import pytest
 from fba.compiled import is_compiled
 from player.coarse import TOLERANCES, Coarser, coarser
 from player.detail import Details, distance, same
+from player.places import Places
 from player.primitives import sphere_mesh
 from player.shapes import FaceMesh, FaceShape
 
@@ -47,7 +48,12 @@ def mesh_of(vertices: npt.NDArray[np.float32], triangles: Int32) -> FaceMesh:
         coarser=Coarser(vertices, 1, triangles),
     )
     return FaceMesh(
-        shape, vertices, vertices, np.ones((count, 4), np.float32), np.eye(4), np.zeros(3), np.zeros(3)
+        shape,
+        Places.of(vertices, vertices),
+        np.ones((count, 4), np.float32),
+        np.eye(4),
+        np.zeros(3),
+        np.zeros(3),
     )
 
 

@@ -15,6 +15,7 @@ from player.extent import filled
 from player.eyeball import find_eyeball
 from player.face_parts import hairs
 from player.outline import TILE, Outliner
+from player.places import Places
 from player.primitives import sphere_mesh
 from player.shapes import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
 
@@ -119,7 +120,7 @@ def test_the_outline_of_a_ball_is_a_circle() -> None:
     vertices, triangles = sphere_mesh(24, 48)
     shape = FaceShape(triangles, np.zeros((len(vertices), 4), np.float32), np.ones(len(vertices), np.float32))
     light = np.ones((len(vertices), 4), dtype=np.float32)
-    mesh = FaceMesh(shape, vertices * 0.1, vertices, light, np.eye(4), np.zeros(3), np.zeros(3))
+    mesh = FaceMesh(shape, Places.of(vertices * 0.1, vertices), light, np.eye(4), np.zeros(3), np.zeros(3))
     camera, size = Camera(distance=2.0), (200, 200)
     matrix = camera.projection_matrix(1.0) @ camera.view_matrix()
     outliner = Outliner()
