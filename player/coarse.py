@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.compiled import is_compiled
-from player.kept import kept
+from fba.kept import kept
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from fba.compiled import is_compiled
 from fba.face.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
+from fba.kept import kept
 from player.face_light_loops import Table, lit, sway
-from player.kept import kept
 from player.visibility import BAKING, HARMONICS, Visibility, bake, weights
 
 Float32 = npt.NDArray[np.float32]

@@ -3,37 +3,23 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.influences import strongest
-from fba.body.model import INFLUENCES, BodyModel, BodyPart, checked_weights
+from fba.body.model import INFLUENCES, BodyModel, checked_weights
+from fba.body.necks import carried_by_neck
 from fba.body.skinning import Skinner
 from fba.errors import ModelError
 from fba.mesh import float_rows
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
 
 SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
 SAME_SIZE = 0.005
 """Sizes that differ by less than this share are taken as the same."""
-NEAR, FAR = 0.010, 0.030
-"""Metres from the body's neck: up to the first a vertex moves as the neck there, beyond the second with the
-skull alone."""
-NEIGHBOURS = 4
-SAME, ALMOST, ROUNDS = 1e-5, 0.01, 20
-"""Metres: vertices so near are the same; those of one mesh may at first be so far apart. How often a face is
-moved by what its vertices are off."""
-RIM = 0.3
-"""The share of a neck's width that its lower rim has at least."""
-SEAM = 0.002
-"""A face whose vertices come this close (m) to those of the body's neck brings its own neck."""
 
 
 class HeadOnBody:
@@ -61,13 +47,8 @@ class HeadOnBody:
         self.place = placement(body, eyes)
         """float64 (4, 4): the face's frame into the body's, as modelled."""
         self._size = float(self.place[0, 0])
-        neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
-        if neck:
-            anchors = np.concatenate([part.vertices for part in neck])
-            self.place[:3, 3] += _offset(anchors, places * self._size + self.place[:3, 3])
-        self._shift = self.place[:3, 3].astype(np.float32)
-        self._from_place = np.linalg.inv(self.place)
         placed = places.astype(np.float64) * self._size + self.place[:3, 3]
+        neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
         joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
         weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
         joints[:, 0], weights[:, 0] = self._skull, 1.0
@@ -76,19 +57,14 @@ class HeadOnBody:
         self.brings_neck = not neck
         """Whether the face has a neck that meets the body, whose own then is not to be shown."""
         if neck:
-            from scipy.spatial import cKDTree
-
-            dense = _dense(neck, len(body.skeleton))
-            edge, outward = _lower_edge(anchors, neck)
-            if len(edge) and len(placed):
-                low = np.setdiff1d(np.flatnonzero(anchors[:, 1] < anchors[:, 1].mean()), edge)
-                away = cKDTree(placed).query(anchors[low])[0] if len(low) else np.full(1, np.inf)
-                self.brings_neck = bool(np.median(away) < SEAM)
-                self.hidden = _beyond(cKDTree(anchors), edge, outward, anchors, placed)
             free = np.ones(len(places), dtype=bool) if skull is None else ~np.asarray(skull)
-            joints[free], weights[free] = _nearest(
-                cKDTree(anchors), dense, placed[free], self._skull, self.hidden[free]
-            )
+            found = carried_by_neck(neck, len(body.skeleton), self._skull, placed, free)
+            self.place[:3, 3] += found.offset
+            placed += found.offset
+            joints[free], weights[free] = found.joints, found.weights
+            self.hidden, self.brings_neck = found.hidden, found.brings_neck
+        self._shift = self.place[:3, 3].astype(np.float32)
+        self._from_place = np.linalg.inv(self.place)
         self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(places))
         self._below = _descendants(body, self._skull)
         self._bind = body.bind
@@ -179,106 +155,6 @@ def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
     place = np.diag([size, size, size, 1.0])
     place[:3, 3] = body.eyes.mean(axis=0) - size * given.mean(axis=0)
     return place
-
-
-def _offset(anchors: Float32, placed: Float64) -> Float64:
-    """(3,) how far a face is off a body whose neck it has, vertex by vertex; 0 where it has another.
-
-    Where pupils are found differs a little from one reader to another.
-    """
-    from scipy.spatial import cKDTree
-
-    none = np.zeros(3)
-    if not len(placed):
-        return none
-    tree, moved = cKDTree(placed), anchors.astype(np.float64)
-    for _ in range(ROUNDS):
-        away, rows = tree.query(moved)
-        near = away < ALMOST
-        if not near.any() or float((away < SAME).mean()) > 0.5:
-            break
-        moved = moved + np.median(placed[rows[near]] - moved[near], axis=0)
-    offset: Float64 = anchors[0].astype(np.float64) - moved[0]
-    found = float((tree.query(moved)[0] < SAME).mean()) > 0.5
-    return offset if found and float(np.linalg.norm(offset)) > SAME else none
-
-
-def _dense(neck: list[BodyPart], joints: int) -> Float64:
-    """(A, J) weights of the necks' vertices."""
-    rows = sum(len(part.vertices) for part in neck)
-    dense = np.zeros((rows, joints))
-    which = np.concatenate([part.joints for part in neck])
-    share = np.concatenate([part.weights for part in neck])
-    for slot in range(INFLUENCES):
-        np.add.at(dense, (np.arange(rows), which[:, slot]), share[:, slot])
-    return dense
-
-
-def _nearest(
-    tree: Any, dense: Float64, places: Float64, skull: int, below: npt.NDArray[np.bool_]
-) -> tuple[Int32, Float32]:
-    """Weights of the nearest anchors, handed over to the skull with distance, but for what lies below."""
-    away, rows = tree.query(places, k=min(NEIGHBOURS, len(dense)))
-    away, rows = away.reshape(len(places), -1), rows.reshape(len(places), -1)
-    share = 1 / np.maximum(away, 1e-6) ** 2
-    share /= share.sum(axis=1, keepdims=True)
-    found = np.einsum("vk,vkj->vj", share, dense[rows])
-    t = np.clip((away[:, :1] - NEAR) / (FAR - NEAR), 0.0, 1.0)
-    alone = np.where(below[:, None], 0.0, t * t * (3 - 2 * t))
-    found *= 1 - alone
-    found[:, skull] += alone[:, 0]
-    return strongest(found)
-
-
-def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]:
-    """Vertices of the open rims in the lower half of necks, and the ways out over them (N, 3)."""
-    starts = np.cumsum([0, *(len(part.vertices) for part in neck)])
-    triangles = np.concatenate([part.triangles + start for part, start in zip(neck, starts, strict=False)])
-    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    _, inverse, counts = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    open_sides = sides[counts[inverse.ravel()] == 1]
-    edge = _low_rims(anchors, open_sides)
-    within = np.zeros((len(anchors), 3))
-    count = np.zeros((len(anchors), 1))
-    inner = np.ones(len(anchors), dtype=bool)
-    inner[edge] = False
-    for a, b in (sides.T, sides[:, ::-1].T):
-        use = inner[b]
-        np.add.at(within, a[use], anchors[b[use]].astype(np.float64))
-        np.add.at(count, a[use], 1)
-    outward = np.where(count[edge] > 0, anchors[edge] - within[edge] / np.maximum(count[edge], 1), 0.0)
-    return edge, outward
-
-
-def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
-    """Vertices of the rims that a neck ends in below: not its chin, nor holes within."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    links = (np.ones(len(open_sides)), (open_sides[:, 0], open_sides[:, 1]))
-    _, label = connected_components(coo_array(links, shape=(len(anchors),) * 2), directed=False)
-    middle = (anchors[:, 1].min() + anchors[:, 1].max()) / 2
-    wide = RIM * np.ptp(anchors[:, 0])
-    rims = np.unique(open_sides)
-    found = [np.zeros(0, dtype=np.int64)]
-    for number in np.unique(label[rims]):
-        rim = rims[label[rims] == number]
-        if anchors[rim, 1].mean() < middle and np.ptp(anchors[rim, 0]) > wide:
-            found.append(rim)
-    return np.concatenate(found)
-
-
-def _beyond(
-    tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64
-) -> npt.NDArray[np.bool_]:
-    """(V,) places nearest to the edge and past it."""
-    away, rows = tree.query(places)
-    number = np.full(len(anchors), -1)
-    number[edge] = np.arange(len(edge))
-    at = number[rows]
-    past: npt.NDArray[np.bool_] = (at >= 0) & (away > SEAM)
-    past &= ((places - anchors[rows]) * outward[at]).sum(axis=1) > 0
-    return past
 
 
 def _descendants(body: BodyModel, joint: int) -> list[int]:

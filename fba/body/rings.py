@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fba.kept import kept, key_of
+
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
@@ -18,6 +20,10 @@ Int64 = npt.NDArray[np.int64]
 
 FLATTEST = 0.05
 """Sine between both ways across, below which they say nothing about the surface."""
+LARGE = 4000
+"""What meshes of so many vertices and more give is kept on disk."""
+MAKING = 1
+"""Counts up with every change of what is found: what was kept before is then made anew."""
 
 
 def rings(
@@ -28,6 +34,23 @@ def rings(
     With t = v[0] - v[2] and u = v[1] - v[3] of the neighbours, x t + y u + z (t x u) is the normal of the
     mesh as modelled, for the three numbers x, y, z, and the same again after any rotation of the whole.
     """
+    count = len(vertices)
+    if count < LARGE or not len(triangles):
+        return _rings(vertices, normals, triangles)
+
+    def make() -> list[npt.NDArray[Any]]:
+        return list(_rings(vertices, normals, triangles))
+
+    key = key_of("rings", MAKING, vertices, normals, triangles)
+    around, numbers = kept(key, ((count, 4), (count, 3)), make, [np.int32, np.float32])
+    if around.min() < -1 or around.max() >= count:
+        around, numbers = make()
+    return around, numbers
+
+
+def _rings(
+    vertices: Float32, normals: Float32, triangles: npt.NDArray[np.integer[Any]]
+) -> tuple[Int32, Float32]:
     count = len(vertices)
     around = np.full((count, 4), -1, dtype=np.int32)
     numbers = np.zeros((count, 3), dtype=np.float32)

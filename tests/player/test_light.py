@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from fba.compiled import is_compiled
 from fba.face.normals import vertex_normals
-from player.kept import MOST_FILES, kept
 from player.primitives import sphere_mesh
 from player.visibility import Visibility, bake, harmonics
 
@@ -113,44 +110,3 @@ def test_what_is_worked_out_coarsely_counts_as_free() -> None:
 def test_no_vertices_are_no_trouble() -> None:
     found = bake(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
     assert found.open.shape == (0,)
-
-
-# --- what is kept --------------------------------------------------------------------------------------
-
-
-def numbers(value: float) -> list[npt.NDArray[np.float16]]:
-    return [np.full((3, 2), value, dtype=np.float16)]
-
-
-def test_what_was_made_is_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FBA_CACHE", str(tmp_path))
-    shapes = ((3, 2),)
-    assert kept("one", shapes, lambda: numbers(1))[0][0, 0] == 1
-    assert kept("one", shapes, lambda: numbers(2))[0][0, 0] == 1
-    assert kept("two", shapes, lambda: numbers(2))[0][0, 0] == 2
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 nothing", b"x" * 100_000, None])
-def test_a_damaged_file_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
-    monkeypatch.setenv("FBA_CACHE", str(tmp_path))
-    kept("one", ((3, 2),), lambda: numbers(1))
-    path = tmp_path / "fba" / "one.npz"
-    if content is None:  # what another version wrote
-        np.savez(path, np.full((3, 2), np.nan, dtype=np.float16))
-    else:
-        path.write_bytes(content)
-    assert kept("one", ((3, 2),), lambda: numbers(5))[0][0, 0] == 5
-    assert kept("one", ((3, 2),), lambda: numbers(6))[0][0, 0] == 5
-
-
-def test_not_more_is_kept_than_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FBA_CACHE", str(tmp_path))
-    for number in range(MOST_FILES + 5):
-        kept(f"file{number}", ((3, 2),), lambda: numbers(1))
-    assert len(list((tmp_path / "fba").iterdir())) == MOST_FILES
-
-
-def test_where_nothing_can_be_kept_it_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").write_text("in the way")
-    monkeypatch.setenv("FBA_CACHE", str(tmp_path / "file"))
-    assert kept("one", ((3, 2),), lambda: numbers(4))[0][0, 0] == 4

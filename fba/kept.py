@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,22 +16,34 @@ import numpy.typing as npt
 
 Kept = TypeVar("Kept", bound=npt.NDArray[Any])
 
-MOST_FILES = 48
+MOST_FILES = 96
 """So many are kept; the longest unused goes first."""
+
+
+def key_of(name: str, *parts: npt.ArrayLike) -> str:
+    """A key for `kept`: the name, and a digest of these arrays and numbers, their kinds and shapes."""
+    digest = hashlib.sha256()
+    for part in parts:
+        array = np.ascontiguousarray(part)
+        digest.update(f"{array.dtype.str}{array.shape}".encode())
+        digest.update(array.data)
+    return f"{name}-{digest.hexdigest()[:32]}"
 
 
 def kept(
     key: str, shapes: tuple[tuple[int, ...], ...], make: Callable[[], list[Kept]], kind: Any = np.float16
 ) -> list[Kept]:
-    """The arrays of `shapes`, numbers of one kind, that `make` gave for this key, now or some time before.
+    """The arrays of `shapes` that `make` gave for this key, now or some time before.
 
-    key: names everything that they depend on; letters and digits. Where nothing can be kept (no home, no
-    room, a file that somebody damaged) they are made anew, silently.
+    key: names everything that they depend on; letters and digits. kind: the dtype of all, or a list with that
+    of each. Where nothing can be kept (no home, no room, a file that somebody damaged) they are made anew,
+    silently. What is found may have been tampered with: numbers of rows are to be checked.
     """
+    kinds = [np.dtype(one) for one in (kind if isinstance(kind, list) else [kind] * len(shapes))]
     folder = _folder()
     path = None if folder is None else folder / f"{key}.npz"
     if path is not None:
-        found: list[Kept] | None = _read(path, shapes, np.dtype(kind))
+        found: list[Kept] | None = _read(path, shapes, kinds)
         if found is not None:
             return found
     made = make()
@@ -56,8 +69,12 @@ def _folder() -> Path | None:
     return base / "fba"
 
 
-def _read(path: Path, shapes: tuple[tuple[int, ...], ...], kind: np.dtype[Any]) -> list[Any] | None:
-    most = sum(kind.itemsize * int(np.prod(shape)) + 1024 for shape in shapes) + 4096
+def _read(
+    path: Path, shapes: tuple[tuple[int, ...], ...], kinds: Sequence[np.dtype[Any]]
+) -> list[Any] | None:
+    most = 4096
+    for shape, kind in zip(shapes, kinds, strict=True):
+        most += kind.itemsize * int(np.prod(shape)) + 1024
     try:
         if path.stat().st_size > most:
             return None
@@ -66,7 +83,7 @@ def _read(path: Path, shapes: tuple[tuple[int, ...], ...], kind: np.dtype[Any]) 
         os.utime(path)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    for array, shape in zip(found, shapes, strict=True):
+    for array, shape, kind in zip(found, shapes, kinds, strict=True):
         if array.dtype != kind or array.shape != shape or not np.isfinite(array).all():
             return None
     return found
