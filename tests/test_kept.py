@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -53,19 +54,29 @@ def test_where_nothing_can_be_kept_it_is_made(tmp_path: Path, monkeypatch: pytes
 
 def test_arrays_of_several_kinds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
-    made = [np.array([[1, -2]], dtype=np.int32), np.array([True, False]), np.array([0.1])]
+    made: list[npt.NDArray[Any]] = [
+        np.array([[1, -2]], dtype=np.int32),
+        np.array([True, False]),
+        np.array([0.1]),
+    ]
     kinds = [np.int32, np.bool_, np.float64]
     shapes = ((1, 2), (2,), (1,))
     kept("mixed", shapes, lambda: made, kinds)
-    found = kept("mixed", shapes, list, kinds)
+    found: list[npt.NDArray[Any]] = kept("mixed", shapes, list, kinds)
     assert [array.tolist() for array in found] == [[[1, -2]], [True, False], [0.1]]
     assert [array.dtype for array in found] == kinds
-    assert kept("mixed", shapes, lambda: [np.zeros(1)], [np.int64, *kinds[1:]]) == [0]
+    assert len(kept("mixed", shapes, lambda: [np.zeros(1)], [np.int64, *kinds[1:]])) == 1
 
 
 def test_a_key_tells_kinds_and_shapes_apart() -> None:
     numbers = np.arange(6, dtype=np.int32)
-    views = [numbers, numbers.reshape(2, 3), numbers.view(np.uint32), numbers.astype(np.int64), numbers + 1]
+    views: list[npt.NDArray[Any]] = [
+        numbers,
+        numbers.reshape(2, 3),
+        numbers.view(np.uint32),
+        numbers.astype(np.int64),
+        numbers + 1,
+    ]
     assert len({key_of("one", view) for view in views} | {key_of("two", numbers)}) == 6
     assert key_of("one", numbers.reshape(2, 3).T.copy().T) == key_of("one", numbers.reshape(2, 3))
     assert key_of("one", 1, numbers) != key_of("one", 2, numbers)
@@ -78,4 +89,5 @@ def test_neighbours_out_of_range_are_not_believed(tmp_path: Path, monkeypatch: p
     (path,) = (tmp_path / "fba").iterdir()
     np.savez(path, np.full_like(first[0], len(body.vertices)), first[1])
     again = rings(body.vertices, body.normals, body.triangles)
-    assert (again[0] == first[0]).all() and (again[1] == first[1]).all()
+    assert (again[0] == first[0]).all()
+    assert (again[1] == first[1]).all()
