@@ -106,12 +106,12 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
                 _check(per_step, at_anchor, dtype, f"FaceDefTables of FAP {table.fap}, part {mesh.part!r}")
                 upper.append(limit)
                 anchor.append(from_value)
-                rows.append(moving)
-                slopes.append(per_step)
+                rows.append(moving.astype(np.uint32))
+                slopes.append(per_step.astype(dtype))
                 held = at_anchor.any()
                 base.append(base_count if held else -1)
                 if held:
-                    bases.append(at_anchor)
+                    bases.append(at_anchor.astype(dtype))
                     base_count += len(at_anchor)
     return Shifts(
         column=np.array(column, dtype=np.int64),
@@ -121,9 +121,9 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
         anchor=np.array(anchor, dtype=np.float64),
         start=np.cumsum([0, *map(len, rows)], dtype=np.int64),
         base=np.array(base, dtype=np.int64),
-        rows=np.concatenate([np.zeros(0, dtype=np.uint32), *rows]).astype(np.uint32),
-        slopes=np.concatenate([np.zeros((0, 3)), *slopes]).astype(dtype),
-        bases=np.concatenate([np.zeros((0, 3)), *bases]).astype(dtype),
+        rows=np.concatenate([np.zeros(0, dtype=np.uint32), *rows]),
+        slopes=np.concatenate([np.zeros((0, 3), dtype=dtype), *slopes]),
+        bases=np.concatenate([np.zeros((0, 3), dtype=dtype), *bases]),
         amount=np.zeros(1, dtype=dtype),
     )
 
@@ -160,24 +160,29 @@ def _intervals(
     place = np.full(size, -1)
     place[mesh.vertices] = np.arange(len(mesh.vertices))
     found = place[own]
-    moves = mesh.displacements[found[found >= 0]].astype(np.float64) * unit
-    rows = rows[found >= 0]
-    borders = mesh.borders.astype(np.float64)
-    passed = np.concatenate([np.zeros((len(rows), 1, 3)), moves * np.diff(borders)[:, None]], axis=1)
-    shape = np.cumsum(passed, axis=1)
-    shape -= shape[:, [int(np.flatnonzero(mesh.borders == 0)[0])]]
+    moves, rows = mesh.displacements[found[found >= 0]], rows[found >= 0]
+    borders = [float(border) for border in mesh.borders]
+    zero = borders.index(0.0)
     cuts: list[_Interval] = []
-    for j in range(len(borders) - 1):
-        end = j if borders[j] >= 0 else j + 1
-        moving = _moves(moves[:, j]) | _moves(shape[:, end])
-        limit = borders[j + 1] if j + 2 < len(borders) else np.inf
-        cuts.append((limit, borders[end], rows[moving], moves[moving, j], shape[moving, end]))
+    for steps in (range(zero, len(borders) - 1), range(zero - 1, -1, -1)):  # up from 0, and down from it
+        shape = np.zeros((len(rows), 3))
+        for j in steps:
+            anchor, end = (borders[j], borders[j + 1]) if j >= zero else (borders[j + 1], borders[j])
+            per_step = moves[:, j].astype(np.float64) * unit
+            moving = _moves(per_step) | _moves(shape)
+            limit = borders[j + 1] if j + 2 < len(borders) else np.inf
+            cuts.append(
+                (limit, anchor, *(array.compress(moving, axis=0) for array in (rows, per_step, shape)))
+            )
+            shape += per_step * (end - anchor)
+    cuts.sort(key=lambda cut: cut[0])
     return cuts
 
 
 def _moves(shifts: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
     """(N,) whether any of three components is not 0; any(axis=1) takes several times as long."""
-    moves: npt.NDArray[np.bool_] = (shifts[:, 0] != 0) | (shifts[:, 1] != 0) | (shifts[:, 2] != 0)
+    nonzero = shifts != 0
+    moves: npt.NDArray[np.bool_] = nonzero[:, 0] | nonzero[:, 1] | nonzero[:, 2]
     return moves
 
 
