@@ -1,8 +1,9 @@
 """Ctrl-C, kept from the moments at which Python cannot take it.
 
 Compiled loops are loaded by LLVM, which calls Python back while it does so. An error raised in there is
-printed ("Exception ignored in") and lost, or leaves LLVM with half a function: the program then crashes. In
-such a moment, and in any other callback or finalizer, an interruption waits, and comes again soon.
+printed ("Exception ignored in") and lost, or leaves LLVM with half a function: the program then crashes.
+moderngl's C code crashes, too, where what it calls back fails. In such a moment, and in any other callback or
+finalizer, an interruption waits, and comes again soon.
 """
 
 from __future__ import annotations
@@ -16,7 +17,14 @@ from typing import Any, Protocol
 
 AGAIN_AFTER = 0.05
 """Seconds until it comes again."""
-TOUCHY = ("llvmlite.", "numba.core.caching", "numba.core.codegen", "numba.core.runtime")
+TOUCHY = (
+    "llvmlite.",
+    "numba.core.caching",
+    "numba.core.codegen",
+    "numba.core.runtime",
+    "moderngl",
+    "_moderngl",
+)
 """Beginnings of the names of modules that must not be left halfway; none of their calls takes long."""
 
 
