@@ -172,7 +172,7 @@ def _intervals(
             moving = _moves(per_step) | _moves(shape)
             limit = borders[j + 1] if j + 2 < len(borders) else np.inf
             cuts.append(
-                (limit, anchor, *(array.compress(moving, axis=0) for array in (rows, per_step, shape)))
+                (limit, anchor, rows[moving], per_step.compress(moving, 0), shape.compress(moving, 0))
             )
             shape += per_step * (end - anchor)
     cuts.sort(key=lambda cut: cut[0])
