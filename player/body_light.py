@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from fba.body.model import BodyModel
 from fba.compiled import compiled, is_compiled
+from fba.kept import kept, key_of
 from player.coarse import Coarser
 from player.face_light import KEY_DIRECTION, kept_visibility
 
@@ -41,6 +42,10 @@ TALL = 1.75
 COARSE = 0.0064
 """Light is worked out at what is left of the vertices where the surface may be off by this (m)."""
 NEAREST = 3
+LARGE = 4000
+"""Which vertices are near to which is kept on disk for bodies of so many and more."""
+MAKING = 1
+"""Counts up with every change of that: what was kept before is then made anew."""
 MOST_KEPT = 64
 """Choices of vertices remembered."""
 FOLDS = 0.75
@@ -121,34 +126,53 @@ class BodyLight:
     def _prepared(self) -> Prepared:
         """Vertices at which light is worked out; for each vertex (V, NEAREST) the places among these that it
         takes it from and their shares; and how much of the sky its folds leave it."""
+        body, rows = self._body, []
+        for part, coarser in zip(body.parts, self._coarser, strict=True):
+            left = None if coarser is None else coarser.within(COARSE)
+            rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
+        near, shares = _near([part.vertices for part in body.parts], rows)
+        starts = [body.starts[part.name] for part in body.parts]
+        every = np.ones(len(body.vertices), dtype=bool)
+        open_ = kept_visibility(body.vertices, body.normals, body.triangles, every).open
+        return (
+            np.concatenate([some + start for some, start in zip(rows, starts, strict=True)]).astype(np.int32),
+            near,
+            shares,
+            (1 - FOLDS * (1 - np.clip(open_, 0, 1))).astype(np.float32),
+        )
+
+
+def _near(parts: list[Float32], rows: list[Rows]) -> tuple[Int32, Float32]:
+    """For each vertex of all parts, (V, 3) each, the places of the nearest of its part's rows among the rows
+    of all: (V, NEAREST), and their shares."""
+
+    def make() -> list[npt.NDArray[Any]]:
         from scipy.spatial import cKDTree
 
-        body = self._body
-        rows, near, shares = [], [], []
+        near, shares = [], []
         count = 0
-        for part, coarser in zip(body.parts, self._coarser, strict=True):
-            start = body.starts[part.name]
-            left = None if coarser is None else coarser.within(COARSE)
-            some = np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left)
+        for vertices, some in zip(parts, rows, strict=True):
             if len(some):
-                away, found = cKDTree(part.vertices[some]).query(part.vertices, k=min(NEAREST, len(some)))
-                away, found = away.reshape(len(part.vertices), -1), found.reshape(len(part.vertices), -1)
+                away, found = cKDTree(vertices[some]).query(vertices, k=min(NEAREST, len(some)))
+                away, found = away.reshape(len(vertices), -1), found.reshape(len(vertices), -1)
                 missing = NEAREST - found.shape[1]
                 away = np.pad(away, ((0, 0), (0, missing)), constant_values=1e9)
                 found = np.pad(found, ((0, 0), (0, missing)))
                 weight = 1 / np.maximum(away, 1e-4)
                 near.append(found + count)
                 shares.append(weight / weight.sum(axis=1, keepdims=True))
-            rows.append(some + start)
             count += len(some)
-        every = np.ones(len(body.vertices), dtype=bool)
-        open_ = kept_visibility(body.vertices, body.normals, body.triangles, every).open
-        return (
-            np.concatenate(rows).astype(np.int32),
-            np.concatenate(near).astype(np.int32),
-            np.concatenate(shares).astype(np.float32),
-            (1 - FOLDS * (1 - np.clip(open_, 0, 1))).astype(np.float32),
-        )
+        return [np.concatenate(near).astype(np.int32), np.concatenate(shares).astype(np.float32)]
+
+    total = sum(map(len, parts))
+    if total < LARGE:
+        near, shares = make()
+        return near, shares
+    key = key_of("near", MAKING, *parts, *rows)
+    near, shares = kept(key, ((total, NEAREST),) * 2, make, [np.int32, np.float32])
+    if near.min() < 0 or near.max() >= sum(map(len, rows)):
+        near, shares = make()
+    return near, shares
 
 
 def _free(part: slice, rows: Rows | None) -> Float32:
