@@ -126,7 +126,8 @@ class BodyLight:
     def _prepared(self) -> Prepared:
         """Vertices at which light is worked out; for each vertex (V, NEAREST) the places among these that it
         takes it from and their shares; and how much of the sky its folds leave it."""
-        body, rows = self._body, []
+        body = self._body
+        rows: list[Rows] = []
         for part, coarser in zip(body.parts, self._coarser, strict=True):
             left = None if coarser is None else coarser.within(COARSE)
             rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
