@@ -132,7 +132,7 @@ class Window:
         self._gl: Any = None
         self._window: Any = None
         self._problems: list[str] = []
-        self._due = SETTLES
+        self._due, self._restless = SETTLES, False
         self._timeline = timeline
         self._arrived: int = timeline.arrived
         self._last = wall.perf_counter()
@@ -160,8 +160,10 @@ class Window:
         glfw, session = self._glfw, self.session
         begun = wall.perf_counter()
         arrived = self._timeline.arrived  # more of a stream makes the line longer, while paused too
-        if session.restless or session.source.looking or arrived != self._arrived:
+        restless = session.restless
+        if restless or self._restless or session.source.looking or arrived != self._arrived:
             self._due, self._arrived = max(self._due, 1), arrived
+        self._restless = restless  # one more picture when all has come to rest
         if self._due:
             glfw.poll_events()
         else:

@@ -18,7 +18,7 @@ class CameraPanel(Panel):
     """Named views, angles, distance and whether it follows."""
 
     name, title, label = "camera", "Camera", "Camera"
-    width = 300.0
+    width, height, fitted, least = 300.0, 320.0, True, 180.0
 
     def draw(self, session: Session) -> None:
         viewpoint = session.viewpoint

@@ -27,7 +27,7 @@ class DifferencesPanel(Panel):
     """The parameters that differ most, and the course of one of them with where the player is."""
 
     name, title, label = "differences", "Differences", "Differences"
-    width = 390.0
+    width, height, fitted, least = 390.0, 450.0, True, 260.0
 
     def __init__(self) -> None:
         self._second = 1

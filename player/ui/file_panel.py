@@ -18,7 +18,7 @@ class FilePanel(Panel):
 
     name, title, label = "file", "File", "File"
     side = "left"
-    width = 330.0
+    width, height, fitted, least = 330.0, 430.0, True, 170.0
 
     def __init__(self) -> None:
         self._told: tuple[StreamInfo, list[tuple[str, list[tuple[str, str]]]]] | None = None

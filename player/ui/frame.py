@@ -1,4 +1,4 @@
-"""What is always over the picture: name and panel buttons above, words that come and go, open panels."""
+"""What is always over the picture: name and panel buttons above, words that come and go."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ from imgui_bundle import imgui
 
 from player.times import clock_text
 from player.ui import theme
+from player.ui.docks import EDGE
 from player.ui.panel import Panel, tooltip
 from player.ui.session import Session
 
-EDGE = 14.0
-GAP = 10.0
-TOP = 56.0
-"""Where panels begin below the buttons."""
 FADE = 0.4
 """Seconds in which a word goes."""
 MOST_OF_WIDTH = 0.55
@@ -90,7 +87,9 @@ def _width(labels: list[str]) -> float:
 def _flat_button(label: str, *, lit: bool) -> bool:
     imgui.push_style_color(imgui.Col_.button, (0.36, 0.68, 0.90, 0.22) if lit else (0, 0, 0, 0))
     imgui.push_style_color(imgui.Col_.text, theme.TEXT if lit else theme.FAINT)
+    imgui.push_style_var(imgui.StyleVar_.frame_border_size, 0.0)
     pressed = imgui.button(label)
+    imgui.pop_style_var()
     imgui.pop_style_color(2)
     return bool(pressed)
 
@@ -115,100 +114,6 @@ def draw_notices(session: Session, display: tuple[float, float], above: float) -
             notice.text, max(display[0] - 80, 60),
         )  # fmt: skip
         y -= 8
-
-
-Rectangle = tuple[float, float, float, float]
-"""Left, top, width, height in points."""
-
-
-class Places:
-    """Where panels are: one below the other at their side, until the user moves them."""
-
-    def __init__(self) -> None:
-        self._sizes: dict[str, tuple[float, float]] = {}
-        self._moved: set[str] = set()
-
-    def draw(self, panels: list[Panel], session: Session, display: tuple[float, float], below: float) -> None:
-        """Draw open panels, in this order; `below`: points at the bottom that are taken."""
-        room = display[1] - TOP - below - GAP
-        if room < 60 or display[0] < 120:
-            return
-        placed: list[Rectangle] = []
-        for panel in panels:
-            wide = min(panel.width, display[0] - 2 * EDGE)
-            self._draw_one(
-                panel, session, (wide, room), self._place(panel, wide, room, display, placed), display
-            )
-
-    def forget(self, names: set[str]) -> None:
-        """These have been closed, and open where they belong again."""
-        self._moved -= names
-
-    def _place(
-        self, panel: Panel, wide: float, room: float, display: tuple[float, float], placed: list[Rectangle]
-    ) -> tuple[float, float]:
-        """The first place with room: at its side, at the other side, beside what is there; else over it."""
-        if panel.name in self._moved:
-            return 0.0, 0.0
-        opens = min(panel.height or 120.0, room * panel.share)
-        wide, high = self._sizes.get(panel.name, (wide, opens))
-        high = min(high, room)
-        if panel.side == "middle":
-            return (display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2
-        ends = [EDGE, display[0] - EDGE - wide]
-        own, other = ends if panel.side == "left" else reversed(ends)
-        beside = [left + width + GAP for left, _, width, _ in placed] if panel.side == "left" else []
-        beside += [left - GAP - wide for left, *_ in placed] if panel.side == "right" else []
-        for x in (own, other, *beside):
-            y = TOP
-            for left, top, width, height in sorted(placed, key=lambda one: one[1]):
-                if x < left + width + GAP and left < x + wide + GAP and top < y + high + GAP:
-                    y = max(y, top + height + GAP)
-            if ends[0] <= x <= ends[1] and y + high <= TOP + room + 1:
-                break
-        else:
-            x, y = own, TOP + room - high
-        placed.append((x, y, wide, high))
-        return x, y
-
-    def _draw_one(
-        self,
-        panel: Panel,
-        session: Session,
-        room: tuple[float, float],
-        place: tuple[float, float],
-        display: tuple[float, float],
-    ) -> None:
-        free = panel.name in self._moved
-        if not free:
-            imgui.set_next_window_pos(place)
-        wide, high = room
-        flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_collapse
-        if panel.height:
-            imgui.set_next_window_size((wide, min(panel.height, high * panel.share)), imgui.Cond_.appearing)
-            imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], high))
-        else:
-            flags |= imgui.WindowFlags_.always_auto_resize
-            imgui.set_next_window_size_constraints((wide, 40), (wide, high))
-        expanded, kept = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
-        if expanded:
-            panel.draw(session)
-        if not free and imgui.is_mouse_dragging(0) and self._taken():
-            self._moved.add(panel.name)
-        width, height = imgui.get_window_size()
-        self._sizes[panel.name] = (width, height)
-        imgui.end()
-        if not kept:
-            session.open.discard(panel.name)
-
-    @staticmethod
-    def _taken() -> bool:
-        """Whether the mouse has hold of the title of the window that is being drawn."""
-        x, y = imgui.get_window_pos()
-        start_x, start_y = imgui.get_mouse_pos() - imgui.get_mouse_drag_delta(0)
-        on_title = y <= start_y <= y + imgui.get_frame_height()
-        focused = imgui.is_window_focused(imgui.FocusedFlags_.root_window)
-        return bool(focused and on_title and x <= start_x <= x + imgui.get_window_width())
 
 
 def _facts(session: Session) -> str:

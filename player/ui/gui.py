@@ -9,9 +9,10 @@ from imgui_bundle import imgui, implot
 from player.controls import Controls
 from player.ui import theme
 from player.ui.bar import Bar
-from player.ui.frame import Places, draw_buttons, draw_name, draw_notices
+from player.ui.frame import draw_buttons, draw_name, draw_notices
 from player.ui.imgui_renderer import ImguiRenderer
 from player.ui.panels import make_panels
+from player.ui.places import Places
 from player.ui.session import Session
 
 HIDES = 3.0
@@ -84,6 +85,9 @@ class Gui:
             self._mouse(io)
         if not session.bare:
             self._draw_all(display, io)
+        if session.recording is None:  # a film does not move because a panel is opened
+            sides = (0.0, 0.0) if session.bare else self._places.sides
+            session.viewpoint.uncover(*sides, smoothly=self.hides)
         draw_notices(session, display, self.bar.height(display) * self.shown if not session.bare else 0.0)
         imgui.render()
         self._renderer.draw(imgui.get_draw_data())
@@ -125,7 +129,7 @@ class Gui:
                 session.open.discard(panel.name)
                 session.say(f"{panel.title}: there is nothing to show here", "warning")
         there = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
-        self._places.draw(there, session, display, below if self.shown > 0 else 0.0)
+        self._places.draw(there, session, display, below)
         self._open = set(session.open)
 
     def _hide(self, io: imgui.IO) -> None:

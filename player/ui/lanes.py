@@ -13,6 +13,7 @@ from player.times import clock_text
 from player.ui import theme
 from player.ui.columns import Course
 from player.ui.envelope import Envelope, envelope
+from player.ui.panel import shortened
 from player.ui.ruler import Ruler, label
 from player.ui.session import Session
 from player.ui.stretch import Stretch
@@ -167,9 +168,7 @@ class Lanes:
         small = imgui.calc_text_size(span).x * theme.SMALL / imgui.get_font_size()
         fits = ruler.right - ruler.left - small - 74
         to.add_circle_filled((ruler.left + 4, y + 9.5), 3.5, theme.packed(lane.colour))
-        title = lane.title
-        while title and imgui.calc_text_size(title).x > max(fits - 14, 20):
-            title = title[:-2]
+        title = shortened(lane.title, max(fits - 14, 20))
         to.add_text((ruler.left + 13, y), theme.packed(theme.TEXT), title)
         to.add_text(font, theme.SMALL, (ruler.right - 66 - small, y + 2), theme.packed(theme.FAINT), span)
         to.add_text((ruler.right - wide - 2, y), theme.packed(lane.colour), number)

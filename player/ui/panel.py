@@ -16,10 +16,10 @@ class Panel:
     """A window over the picture. A subclass sets the names and draws; it may keep what it needs.
 
     name: in the table of keys ("panel NAME" is its action) and in `Session.open`. title: for people. label:
-    on its button above the picture. side: "right", "left" or "middle", where it opens. width, height: points;
-    height 0 for as much as it needs. share: of the room above the timeline, what it takes at most when it
-    opens, so that those which are looked at together fit. One object of each panel lives as long as the
-    window.
+    on its button above the picture. side: the column where it opens, "right" or "left"; "middle" for one
+    that covers all for a moment. width, height: points that it likes to have; fitted: its content says how
+    high it is. least: the height with which it is of use where several share a column. One object of each
+    panel lives as long as the window.
     """
 
     name: ClassVar[str]
@@ -27,8 +27,9 @@ class Panel:
     label: ClassVar[str]
     side: ClassVar[str] = "right"
     width: ClassVar[float] = 300.0
-    height: ClassVar[float] = 0.0
-    share: ClassVar[float] = 1.0
+    height: ClassVar[float] = 300.0
+    fitted: ClassVar[bool] = False
+    least: ClassVar[float] = 150.0
 
     def draw(self, session: Session) -> None:
         """Draw the content with imgui; called for each picture while the panel is open."""
@@ -69,6 +70,15 @@ def heading(text: str) -> None:
     imgui.push_font(None, theme.SMALL)
     imgui.text_colored(theme.ACCENT, text.upper())
     imgui.pop_font()
+
+
+def shortened(text: str, wide: float) -> str:
+    """The text, or as much of it as fits into so many points."""
+    if imgui.calc_text_size(text).x <= wide:
+        return text
+    while text and imgui.calc_text_size(text + "...").x > wide:
+        text = text[:-1]
+    return text.rstrip(" ;,") + "..."
 
 
 def tooltip(text: str, key: str = "") -> None:

@@ -7,20 +7,24 @@ from imgui_bundle import imgui
 from fba.errors import FbaError
 from player.performing import Performer
 from player.ui import theme
-from player.ui.panel import Panel, tooltip
+from player.ui.columns import parameter
+from player.ui.panel import Panel, shortened, tooltip
 from player.ui.puppet_rows import Group, Row, groups
 from player.ui.puppet_speech import mood, speech
 from player.ui.session import Session
 
 TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
 """Points that a row's name takes, its value, and the button that gives it back."""
+SLIDER = 84.0
+"""Points that a slider has at least: names are cut before it is shorter."""
+SHORTEST = 70.0
 
 
 class PuppetPanel(Panel):
     """Sliders for FAPs, visemes, expressions and the body; takes of what they do."""
 
     name, title, label = "puppet", "Puppeteer", "Puppet"
-    width, height = 380.0, 530.0
+    width, height, least = 380.0, 530.0, 280.0
 
     def __init__(self) -> None:
         self._performer: Performer | None = None
@@ -161,11 +165,14 @@ class PuppetPanel(Panel):
         title = row.title
         if self.together and row.mirror is not None:
             title = title.removesuffix(" L").removesuffix(" R")
+        whole = imgui.get_content_region_avail().x
+        name_wide = min(TITLE, max(whole - RELEASE - VALUE - SLIDER, SHORTEST))
         imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.TEXT if touched else theme.FAINT, title)
-        imgui.same_line(TITLE)
-        right = x + imgui.get_content_region_avail().x + TITLE - RELEASE
-        wide = imgui.get_content_region_avail().x - RELEASE - VALUE
+        imgui.text_colored(theme.TEXT if touched else theme.FAINT, shortened(title, name_wide - 6))
+        tooltip(_told(row))
+        imgui.same_line(name_wide)
+        right = x + whole - RELEASE
+        wide = max(whole - name_wide - RELEASE - VALUE, 16.0)
         imgui.set_next_item_width(wide)
         if touched:
             imgui.push_style_color(imgui.Col_.slider_grab, theme.ACCENT)
@@ -175,7 +182,7 @@ class PuppetPanel(Panel):
         )
         if touched:
             imgui.pop_style_color()
-        self.places[group.name, place] = (x + TITLE, x + TITLE + wide, y + high / 2)
+        self.places[group.name, place] = (x + name_wide, x + name_wide + wide, y + high / 2)
         if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
             self._zeroed = name
             changed, value = True, 0.0
@@ -235,6 +242,13 @@ def _for_all(performer: Performer, group: Group, *, touched: bool) -> None:
         if imgui.small_button(f"Release##{group.name}"):
             _give_back(performer, group.kind, group.numbers)
     imgui.dummy((1, 2))
+
+
+def _told(row: Row) -> str:
+    """Which parameters a row moves."""
+    names = [parameter(row.kind, number).name for number in row.numbers]
+    pairs = zip(row.numbers, names, strict=True)
+    return f"{row.kind.upper()} " + ", ".join(f"{number} {name}" for number, name in pairs)
 
 
 def _give_back(performer: Performer, kind: str, numbers: tuple[int, ...]) -> None:

@@ -24,6 +24,8 @@ BARS = 34.0
 """Points of height of the largest plane."""
 LITTLE = 0.02
 """What is around the planes is told from this share on."""
+ALL_COLUMNS = 340.0
+"""Points of width for the whole table; one column less is in a narrower one."""
 STEP = 3.0
 """Points that a bar takes with the gap beside it, at least."""
 
@@ -33,7 +35,7 @@ class RatePanel(Panel):
 
     name, title, label = "rate", "Bit rate", "Bit rate"
     side = "left"
-    width, height, share = 430.0, 234.0, 0.44
+    width, height, least = 430.0, 238.0, 230.0
 
     def __init__(self) -> None:
         self._rates: tuple[StreamInfo, Rates | None, list[Lane]] | None = None
@@ -160,7 +162,8 @@ def _row(found: Rates, time: float) -> int:
 
 
 def _table(found: Rates) -> None:
-    if not imgui.begin_table("totals", 5, imgui.TableFlags_.sizing_fixed_fit):
+    narrow = imgui.get_content_region_avail().x < ALL_COLUMNS
+    if not imgui.begin_table("totals", 4 if narrow else 5, imgui.TableFlags_.sizing_fixed_fit):
         return
     for total in found.totals:
         if total.planes is None and total.share < LITTLE:
@@ -168,9 +171,10 @@ def _table(found: Rates) -> None:
         imgui.table_next_row()
         count = "" if total.planes is None else f"{total.planes} plane{'s' * (total.planes != 1)}"
         mean = f"{total.bits / total.planes:.0f} bits each" if total.planes else ""
-        for place, text in enumerate(
-            (total.name, count, mean, f"{total.bits / 8:.0f} bytes", f"{total.share:.1%}")
-        ):
+        cells = [total.name, count, mean, f"{total.bits / 8:.0f} bytes", f"{total.share:.1%}"]
+        if narrow:
+            del cells[3]
+        for place, text in enumerate(cells):
             imgui.table_next_column()
             imgui.text_colored(theme.FAINT if place else theme.TEXT, text)
     imgui.end_table()

@@ -29,7 +29,7 @@ def still(context: Any, renderer: Renderer, session: Session, *, transparent: bo
     try:
         if transparent:
             scene.show("background", "transparent")
-        view, camera = session.view(time), session.camera(time)
+        view, camera = session.view(time), session.viewpoint.whole(time)
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)] if transparent else [view]
         pictures = []
         for one in views:

@@ -51,7 +51,7 @@ def apply_theme() -> None:
     style.item_inner_spacing = imgui.ImVec2(7, 5)
     style.cell_padding = imgui.ImVec2(6, 3)
     style.window_border_size = 1.0
-    style.frame_border_size = 0.0
+    style.frame_border_size = 1.0
     style.popup_border_size = 1.0
     style.window_title_align = imgui.ImVec2(0.0, 0.5)
     style.window_menu_button_position = imgui.Dir.none

@@ -14,7 +14,7 @@ class ViewPanel(Panel):
     """Each switch of the scene as what suits it: a tick, a choice, a FAP."""
 
     name, title, label = "view", "View", "View"
-    width = 300.0
+    width, height, fitted, least = 300.0, 430.0, True, 190.0
 
     def draw(self, session: Session) -> None:
         scene = session.scene

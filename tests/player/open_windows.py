@@ -28,9 +28,12 @@ def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int,
 
 
 def settle(window: Window) -> None:
-    """Draw what is due."""
-    while window._due and window.update():
-        pass
+    """Draw what is due, until the view has come to rest."""
+    glided = False
+    while window._due or window.session.viewpoint.gliding or glided:
+        glided = window.session.viewpoint.gliding
+        if not window.update():
+            break
 
 
 def until(window: Window, reached: Callable[[], bool], seconds: float = 30.0) -> None:

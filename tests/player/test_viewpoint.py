@@ -91,3 +91,37 @@ def test_views_fit_above_what_is_covered(talking: Animation, clock: Clock, prese
     assert ends[0] > -0.52  # the lowest quarter of -1..1 ends at -0.5
     assert ends[1] < 1.02
     assert ends[1] - ends[0] > 1.4
+
+
+def test_between_columns_the_face_stands_in_what_is_free(talking: Animation, clock: Clock) -> None:
+    scene = Scene(talking)
+    aspect = 16 / 9
+    viewpoint = Viewpoint(scene, aspect, "front", clock=clock)
+    x, y, z = scene.face_subject.centre
+
+    def across(camera: Camera, reach: float = 0.0) -> float:
+        """Share of the picture's width at which the face's middle is, or what is so far beside it (m)."""
+        clip = camera.projection_matrix(aspect) @ camera.view_matrix() @ np.array([x + reach, y, z, 1.0])
+        return float(clip[0] / clip[3] + 1) / 2
+
+    whole = viewpoint.at(0.0)
+    assert across(whole) == pytest.approx(0.5, abs=0.001)
+    viewpoint.uncover(0.4, 0.1)
+    assert viewpoint.gliding
+    assert across(viewpoint.at(0.0)) == pytest.approx(0.5, abs=0.001)  # it begins where it was
+    clock.now += GLIDE
+    assert not viewpoint.gliding
+    assert across(viewpoint.at(0.0)) == pytest.approx(0.65, abs=0.001)
+    assert viewpoint.whole(0.0) == whole  # as a picture without panels shows it
+    viewpoint.uncover(0.4, 0.4, smoothly=False)
+    half = scene.face_subject.half_width
+    assert across(viewpoint.at(0.0), -half) > 0.399
+    assert across(viewpoint.at(0.0), half) < 0.601
+    viewpoint.uncover(0.0, 0.0, smoothly=False)
+    assert viewpoint.at(0.0) == whole
+
+
+def test_a_view_of_ones_own_keeps_its_distance_between_columns(clock: Clock) -> None:
+    viewpoint = Viewpoint(Walking(), 2.0, Camera(distance=5.0), clock=clock)  # type: ignore[arg-type]
+    viewpoint.uncover(0.3, 0.0, smoothly=False)
+    assert viewpoint.at(0.0).distance == 5.0

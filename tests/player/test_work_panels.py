@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -335,3 +336,38 @@ def test_a_take_of_what_is_played_is_what_was_played(
     sent = [2, 4, 30]
     assert np.abs(take.face.values[:9, sent] - talking.face.values[:9, sent]).max() <= 1
     assert take.face.values[5, 51] == take.face.values[5, 4]  # the outer lip, which the face filled in
+
+
+def _window(studio: Studio, name: str) -> Any:
+    imgui.set_current_context(studio.gui._context)
+    return imgui.internal.find_window_by_name(f"{panel_of(studio, name).title}###{name}")
+
+
+def test_a_folded_panel_opens_by_its_title(opened: Opened, talking: Animation) -> None:
+    studio = opened(talking, "file", "view", "camera", "curves", "rate", "puppet", size=(900, 600))
+    hand = StudioHand(studio)
+    names = ("file", "view", "camera", "curves", "rate", "puppet")
+    studio.draw(2)
+    folded = [name for name in names if _window(studio, name).size.y < 40]
+    assert folded
+    window = _window(studio, folded[0])
+    hand.click(window.pos.x + 60, window.pos.y + 12)
+    studio.draw(2)
+    assert _window(studio, folded[0]).size.y > 100
+
+
+def test_a_panel_is_taken_out_of_its_column_and_brought_back(opened: Opened, talking: Animation) -> None:
+    studio = opened(talking, "camera")
+    hand = StudioHand(studio)
+    docked = tuple(_window(studio, "camera").pos)
+    hand.move(docked[0] + 60, docked[1] + 12)
+    hand.button(True)
+    hand.move(docked[0] - 40, docked[1] + 52)  # dragged over some pictures
+    hand.move(docked[0] - 240, docked[1] + 112)
+    hand.button(False)
+    x, y = _window(studio, "camera").pos
+    assert (x, y) == pytest.approx((docked[0] - 300, docked[1] + 100), abs=2)
+    assert studio.session.viewpoint.at(0.0) == studio.session.viewpoint.whole(0.0)  # no column is there
+    hand.double_click(x + 60, y + 12)
+    studio.draw(2)
+    assert tuple(_window(studio, "camera").pos) == docked

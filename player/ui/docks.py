@@ -1,0 +1,148 @@
+"""Where open panels stand: in a column at the left and one at the right, which leave the middle free.
+
+Geometry only: it knows no imgui. All lengths are points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+EDGE, GAP, CLOSE = 14.0, 10.0, 4.0
+"""Points around columns, between panels, and below folded ones."""
+TITLE = 32.0
+"""Height of a panel of which only the title is seen."""
+MIDDLE, LEAST_MIDDLE = 0.3, 240.0
+"""Share of the width, and points, that columns leave to who is seen."""
+NARROWEST = 280.0
+"""A column's least width; where two do not fit beside the middle, there is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What a panel would like: its side, width and height, and the least height that it is of use with."""
+
+    name: str
+    side: str
+    width: float
+    height: float
+    least: float
+
+
+@dataclass(frozen=True, slots=True)
+class Dock:
+    """Where a panel stands; folded: only its title is seen."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    folded: bool = False
+
+
+class Docks:
+    """Keeps panels at the side where they opened, and folds those used longest ago where room is short."""
+
+    def __init__(self) -> None:
+        self._sides: dict[str, str] = {}
+        self._used: list[str] = []
+
+    def use(self, name: str) -> None:
+        """The user works with it: others are folded before it."""
+        if name in self._sides and self._used[-1:] != [name]:
+            self._used = [*(one for one in self._used if one != name), name]
+
+    def arrange(self, wishes: list[Wish], wide: float, top: float, high: float) -> dict[str, Dock]:
+        """Places in a display `wide` points wide, of which `high` points from `top` on are free.
+
+        Those for whose title there is no room are left out.
+        """
+        names = {wish.name for wish in wishes}
+        self._sides = {name: side for name, side in self._sides.items() if name in names}
+        self._used = [name for name in self._used if name in names]
+        room = wide - 2 * EDGE
+        middle = max(MIDDLE * wide, LEAST_MIDDLE)
+        both = room - middle >= 2 * NARROWEST
+        columns: dict[str, list[Wish]] = {"left": [], "right": []}
+        known = [name for name in self._sides if name in names]  # in the order of their opening
+        for wish in sorted(
+            wishes, key=lambda one: known.index(one.name) if one.name in known else len(known)
+        ):
+            if wish.name not in self._sides:
+                self._sides[wish.name] = _side(wish, columns, high)
+                self._used.append(wish.name)
+            columns[self._sides[wish.name] if both else "right"].append(wish)
+        widths = {side: max((one.width for one in column), default=0.0) for side, column in columns.items()}
+        most = max(room - middle, min(room, NARROWEST))
+        if sum(widths.values()) > most:
+            half = max(most / 2, most - min(widths.values()))
+            widths = {side: min(own, half) for side, own in widths.items()}
+        found: dict[str, Dock] = {}
+        for side, column in columns.items():
+            left = EDGE if side == "left" else wide - EDGE - widths[side]
+            found |= self._column(column, left, widths[side], top, high)
+        return found
+
+    def _column(
+        self, column: list[Wish], left: float, wide: float, top: float, high: float
+    ) -> dict[str, Dock]:
+        folded: set[str] = set()
+        for name in self._used:
+            if _least(column, folded) <= high or len(folded) >= len(column) - 1:
+                break
+            if any(wish.name == name for wish in column):
+                folded.add(name)
+        heights = _shared([TITLE if one.name in folded else one.least for one in column],
+                          [TITLE if one.name in folded else one.height for one in column],
+                          high - _gaps(column, folded))  # fmt: skip
+        found, y = {}, top
+        for wish, height in zip(column, heights, strict=True):
+            left_over = top + high - y
+            if left_over < TITLE:
+                break
+            found[wish.name] = Dock(left, y, wide, min(height, left_over), wish.name in folded)
+            y += height + (CLOSE if wish.name in folded else GAP)
+        return found
+
+
+def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
+    """Shares of the width that columns cover at the left and at the right."""
+    left = right = 0.0
+    for dock in docks:
+        if dock.left <= EDGE:
+            left = max(left, (dock.left + dock.width) / wide)
+        else:
+            right = max(right, 1 - dock.left / wide)
+    return left, right
+
+
+def _side(wish: Wish, columns: dict[str, list[Wish]], high: float) -> str:
+    """Its own side, or the other: where all fit as they like, else where they fit, else the emptier."""
+    own, other = wish.side, "right" if wish.side == "left" else "left"
+    for size in (_most, _least):
+        for side in (own, other):
+            if size([*columns[side], wish], set()) <= high:
+                return side
+    return min((own, other), key=lambda side: _least(columns[side], set()))
+
+
+def _most(column: list[Wish], folded: set[str]) -> float:
+    return sum(wish.height for wish in column) + _gaps(column, folded)
+
+
+def _least(column: list[Wish], folded: set[str]) -> float:
+    heights = [TITLE if wish.name in folded else min(wish.least, wish.height) for wish in column]
+    return sum(heights) + _gaps(column, folded)
+
+
+def _gaps(column: list[Wish], folded: set[str]) -> float:
+    return sum(CLOSE if wish.name in folded else GAP for wish in column[:-1])
+
+
+def _shared(least: list[float], most: list[float], room: float) -> list[float]:
+    """Heights between the least and what is liked, the room beyond the least shared by what is missing."""
+    least = [min(low, high) for low, high in zip(least, most, strict=True)]
+    missing = sum(most) - sum(least)
+    spare = min(max(room - sum(least), 0.0), missing)
+    share = spare / missing if missing > 0 else 0.0
+    return [low + (high - low) * share for low, high in zip(least, most, strict=True)]
