@@ -121,9 +121,10 @@ class Camera:
     def _axes(self) -> Float64:
         """Rows: right, up and backward of the camera, in the world."""
         yaw, pitch = math.radians(self.yaw), math.radians(self.pitch)
-        back = np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
-        right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
-        return np.stack([right, np.cross(back, right), back])
+        right_x, right_z = math.cos(yaw), -math.sin(yaw)
+        x, y, z = math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)
+        up = (y * right_z, z * right_x - x * right_z, -y * right_x)
+        return np.array([(right_x, 0.0, right_z), up, (x, y, z)])
 
 
 def _clamped(value: float, limits: tuple[float, float]) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -51,8 +52,7 @@ class CastShadow:
     high: tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class _Points:
+class Points(NamedTuple):
     """corners int32 (N, 3), shares float32 (N, 3): where on which triangles; area float32 (N,), m².
     rows int32 (M,): all corners, each once."""
 
@@ -66,8 +66,8 @@ class ShadowCaster:
     """Works out shadows; remembers the shapes that it has seen."""
 
     def __init__(self) -> None:
-        self._points: WeakKeyDictionary[FaceShape, _Points | None] = WeakKeyDictionary()
-        self._layers = np.zeros((KEY_RAYS + SKY_RAYS, CELLS, CELLS), dtype=np.float32)
+        self._points: WeakKeyDictionary[FaceShape, Points | None] = WeakKeyDictionary()
+        self._thrown = np.empty((0, 6), dtype=np.float32)
         self._darkness = np.zeros((CELLS, CELLS), dtype=np.uint8)
 
     def cast(self, meshes: list[FaceMesh], middle: tuple[float, float]) -> CastShadow | None:
@@ -75,28 +75,22 @@ class ShadowCaster:
         it cannot be worked out (without numba)."""
         if not is_compiled():
             return None
-        rays = _rays()
         ahead = 0.9 / KEY_DIRECTION[1]  # shadows fall away from the key light
         low = [
             (np.floor((place - ahead * way) / CELL) - CELLS / 2) * CELL
             for place, way in zip(middle, KEY_DIRECTION[::2], strict=True)
         ]
-        self._layers[:] = 0
+        count = 0
         for mesh in meshes:
             points = self._points_of(mesh.shape)
-            if points is not None and not mesh.turn.any():
-                _throw(
-                    mesh.places.reached(points.rows),
-                    mesh.matrix,
-                    points.corners,
-                    points.shares,
-                    points.area,
-                    rays,
-                    np.float64(low[0]),
-                    np.float64(low[1]),
-                    self._layers,
-                )
-        left, bottom, right, top = _gather(self._layers, self._darkness)
+            if points is None or mesh.turn.any():
+                continue
+            if count + len(points.area) > len(self._thrown):
+                more = np.empty((2 * len(points.area), 6), dtype=np.float32)
+                self._thrown = np.concatenate([self._thrown, more])
+            places = mesh.places.reached(points.rows)
+            count = _place(places, mesh.matrix, points, low[0], low[1], self._thrown, count)
+        left, bottom, right, top = _throw(self._thrown[:count], _rays(), self._darkness)
         if right <= left:
             return None
         return CastShadow(
@@ -105,13 +99,13 @@ class ShadowCaster:
             (low[0] + right * CELL, low[1] + top * CELL),
         )
 
-    def _points_of(self, shape: FaceShape) -> _Points | None:
+    def _points_of(self, shape: FaceShape) -> Points | None:
         if shape not in self._points:
             self._points[shape] = _spread(shape)
         return self._points[shape]
 
 
-def _spread(shape: FaceShape) -> _Points | None:
+def _spread(shape: FaceShape) -> Points | None:
     """Points over a shape's surface, as it is modelled."""
     if shape.coarser is None or shape.kind in WITHIN:
         return None
@@ -129,7 +123,7 @@ def _spread(shape: FaceShape) -> _Points | None:
     u, v = (0.5 + steps * 0.7548776662) % 1, (0.5 + steps * 0.5698402910) % 1
     over = u + v > 1
     u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
-    return _Points(
+    return Points(
         np.unique(triangles[owner]).astype(np.int32),
         np.ascontiguousarray(triangles[owner], dtype=np.int32),
         np.stack([1 - u - v, u, v], axis=1).astype(np.float32),
@@ -159,22 +153,21 @@ def _rays() -> Float64:
 
 
 @compiled
-def _throw(
+def _place(
     positions: Float32,
     matrix: Float64,
-    corners: Int32,
-    shares: Float32,
-    area: Float32,
-    rays: Float64,
+    points: Points,
     low_x: float,
     low_z: float,
-    layers: Float32,
-) -> None:
-    """Add to layers (N, rows, columns), one a ray, the share of each cell that the points cover."""
-    cells = layers.shape[1]
+    thrown: Float32,
+    count: int,
+) -> int:
+    """Write points from row `count` on: column, height (m), row; normal, as long as the area in cells.
+
+    How many there are then.
+    """
+    _, corners, shares, area = points
     p = np.empty((3, 3))
-    longer = 1.0 / rays[:, 1]
-    aside, ahead = rays[:, 0] * longer / CELL, rays[:, 2] * longer / CELL
     for i in range(len(corners)):
         for k in range(3):
             x, y, z = positions[corners[i, k], 0], positions[corners[i, k], 1], positions[corners[i, k], 2]
@@ -187,39 +180,67 @@ def _throw(
         if not length > 1e-12:
             continue
         a, b, c = shares[i, 0], shares[i, 1], shares[i, 2]
-        x = a * p[0, 0] + b * p[1, 0] + c * p[2, 0]
-        y = max(a * p[0, 1] + b * p[1, 1] + c * p[2, 1], 0.0)
-        z = a * p[0, 2] + b * p[1, 2] + c * p[2, 2]
-        piece = area[i] / length / (CELL * CELL)
-        left, front = (x - low_x) / CELL - 0.5, (z - low_z) / CELL - 0.5
-        for ray in range(len(rays)):
-            facing = nx * rays[ray, 0] + ny * rays[ray, 1] + nz * rays[ray, 2]
-            if facing <= 0.0:
-                continue
-            column = left - aside[ray] * y
-            row = front - ahead[ray] * y
-            if not (1.0 <= column < cells - 2.0 and 1.0 <= row < cells - 2.0):
-                continue
-            # Over three cells each way, as a quadratic spline spreads it: the points are not quite even.
-            middle, centre = int(column + 0.5), int(row + 0.5)
-            fx, fy = column - middle, row - centre
-            amount = piece * facing * longer[ray]
-            one = np.float32(0.5 * (0.5 - fx) * (0.5 - fx))
-            two = np.float32(0.75 - fx * fx)
-            three = np.float32(0.5 * (0.5 + fx) * (0.5 + fx))
-            layer = layers[ray]
-            down = np.float32(amount * 0.5 * (0.5 - fy) * (0.5 - fy))
-            layer[centre - 1, middle - 1] += down * one
-            layer[centre - 1, middle] += down * two
-            layer[centre - 1, middle + 1] += down * three
-            down = np.float32(amount * (0.75 - fy * fy))
-            layer[centre, middle - 1] += down * one
-            layer[centre, middle] += down * two
-            layer[centre, middle + 1] += down * three
-            down = np.float32(amount * 0.5 * (0.5 + fy) * (0.5 + fy))
-            layer[centre + 1, middle - 1] += down * one
-            layer[centre + 1, middle] += down * two
-            layer[centre + 1, middle + 1] += down * three
+        piece = area[i] / (CELL * CELL) / length
+        thrown[count, 0] = (a * p[0, 0] + b * p[1, 0] + c * p[2, 0] - low_x) / CELL - 0.5
+        thrown[count, 1] = max(a * p[0, 1] + b * p[1, 1] + c * p[2, 1], 0.0)
+        thrown[count, 2] = (a * p[0, 2] + b * p[1, 2] + c * p[2, 2] - low_z) / CELL - 0.5
+        thrown[count, 3], thrown[count, 4], thrown[count, 5] = piece * nx, piece * ny, piece * nz
+        count += 1
+    return count
+
+
+@compiled
+def _throw(thrown: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, int, int]:
+    """Write how dark each cell is; the columns and rows between which there is anything."""
+    cells = len(darkness)
+    key, sky = np.zeros((cells, cells), dtype=np.float32), np.zeros((cells, cells), dtype=np.float32)
+    layer = np.empty((cells, cells), dtype=np.float32)  # one ray after another: it stays near the processor
+    for ray in range(len(rays)):
+        layer[:] = np.float32(0.0)
+        _cover(thrown, rays[ray, 0], rays[ray, 1], rays[ray, 2], layer)
+        grid = key if ray < KEY_RAYS else sky
+        for row in range(cells):
+            for column in range(cells):
+                grid[row, column] += min(layer[row, column], np.float32(1.0))
+    _blur(key, KEY_BLUR, layer)
+    _blur(sky, SKY_BLUR, layer)
+    return _darken(key, sky, darkness)
+
+
+@compiled
+def _cover(thrown: Float32, rx: float, ry: float, rz: float, layer: Float32) -> None:
+    """Add to a layer the share of each cell that the points cover, seen along a ray."""
+    cells = len(layer)
+    limit, half, quarters = np.float32(cells - 2), np.float32(0.5), np.float32(0.75)
+    longer = 1.0 / ry
+    x, y, z = np.float32(rx * longer), np.float32(1.0), np.float32(rz * longer)
+    aside, ahead = np.float32(rx * longer / CELL), np.float32(rz * longer / CELL)
+    for i in range(len(thrown)):
+        amount = thrown[i, 3] * x + thrown[i, 4] * y + thrown[i, 5] * z
+        column = thrown[i, 0] - aside * thrown[i, 1]
+        row = thrown[i, 2] - ahead * thrown[i, 1]
+        if not (amount > np.float32(0.0) and 1.0 <= column < limit and 1.0 <= row < limit):
+            continue
+        # Over three cells each way, as a quadratic spline spreads it: the points are not quite even.
+        middle, centre = int(column + half), int(row + half)
+        fx, fy = column - np.float32(middle), row - np.float32(centre)
+        one, two, three = (
+            half * (half - fx) * (half - fx),
+            quarters - fx * fx,
+            half * (half + fx) * (half + fx),
+        )
+        down = amount * (half * (half - fy) * (half - fy))
+        layer[centre - 1, middle - 1] += down * one
+        layer[centre - 1, middle] += down * two
+        layer[centre - 1, middle + 1] += down * three
+        down = amount * (quarters - fy * fy)
+        layer[centre, middle - 1] += down * one
+        layer[centre, middle] += down * two
+        layer[centre, middle + 1] += down * three
+        down = amount * (half * (half + fy) * (half + fy))
+        layer[centre + 1, middle - 1] += down * one
+        layer[centre + 1, middle] += down * two
+        layer[centre + 1, middle + 1] += down * three
 
 
 @compiled
@@ -252,18 +273,9 @@ def _blur(grid: Float32, reach: int, room: Float32) -> None:
 
 
 @compiled
-def _gather(layers: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write how dark each cell is; the columns and rows between which there is anything."""
-    cells = layers.shape[1]
-    key, sky = np.zeros((cells, cells), dtype=np.float32), np.zeros((cells, cells), dtype=np.float32)
-    room = np.empty((cells, cells), dtype=np.float32)
-    for ray in range(len(layers)):
-        grid = key if ray < KEY_RAYS else sky
-        for row in range(cells):
-            for column in range(cells):
-                grid[row, column] += min(layers[ray, row, column], np.float32(1.0))
-    _blur(key, KEY_BLUR, room)
-    _blur(sky, SKY_BLUR, room)
+def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
+    """Write how dark each cell is, for the rays of both lights that are hidden there; see `_throw`."""
+    cells = len(darkness)
     left, bottom, right, top = cells, cells, 0, 0
     for row in range(cells):
         for column in range(cells):
