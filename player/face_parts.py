@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,6 +13,7 @@ import numpy.typing as npt
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
 from player.coarse import Coarser
+from player.face_picture import FacePicture
 from player.relief import RELIEF
 from player.shapes import FaceShape
 from player.textures import breadth
@@ -29,8 +29,6 @@ TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
 THICKEST_HAIR = 0.0012
 """A strip wider than this (m) is no single hair."""
-LARGEST_PICTURE = 4096
-"""Textures of more pixels across are made smaller."""
 ROUGH = 0.36
 """Strength of the skin's relief."""
 NECK = 2.3
@@ -183,18 +181,14 @@ def _is_smooth(part: Part) -> bool:
     return bool(((cosines < BENT) & (lengths > LONG)).mean() < MOST_BENT)
 
 
-def _picture(part: Part) -> npt.NDArray[np.uint8] | None:
-    """(H, W, 4) the part's texture, or None where there is none that can be read."""
+def _picture(part: Part) -> FacePicture | None:
+    """The part's texture, or None where there is none that can be read."""
     if part.material.texture is None:
         return None
     from PIL import Image
 
     try:
-        with Image.open(io.BytesIO(part.material.texture), formats=("PNG", "JPEG")) as image:
-            if max(image.size) > LARGEST_PICTURE:
-                image.draft("RGB", (LARGEST_PICTURE, LARGEST_PICTURE))
-                image.thumbnail((LARGEST_PICTURE, LARGEST_PICTURE))
-            return np.asarray(image.convert("RGBA"))
+        return FacePicture(part.material.texture)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         warnings.warn(
             f"the texture of part {part.name!r} cannot be read ({error}): its colour is shown instead",

@@ -119,7 +119,7 @@ def _of_face(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
     attributes = _placed(positions, normals, face.matrix, shape.triangles, shape.colours)
     texture = None
     if shape.picture is not None and shape.texcoords is not None:
-        texture = pyrender.Texture(source=shape.picture, source_channels="RGBA")
+        texture = pyrender.Texture(source=shape.picture.pixels, source_channels="RGBA")
         attributes["texcoord_0"] = np.stack([shape.texcoords[:, 0], 1 - shape.texcoords[:, 1]], axis=1)
     material = pyrender.MetallicRoughnessMaterial(
         baseColorTexture=texture,

@@ -17,6 +17,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from player.coarse import Coarser
     from player.extras import Extras
+    from player.face_picture import FacePicture
     from player.places import Places
 
 Float32 = npt.NDArray[np.float32]
@@ -59,8 +60,8 @@ class FaceShape:
 
     triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light, the
     fourth how glossy. sway: float32 (V,), 1 where it goes with the head, 0 where it stands, as shoulders
-    do. texcoords: float32 (V, 2), origin at the picture's top left. picture: uint8 (H, W, 4), sRGB, by
-    which the colours are multiplied. scatter: how far light wanders below the surface: 1 skin, 0 cloth.
+    do. texcoords: float32 (V, 2), origin at the picture's top left. picture: what
+    the colours are multiplied with. scatter: how far light wanders below the surface: 1 skin, 0 cloth.
     fine: strength of the skin's relief, and how often it repeats over the picture. two_sided: False where
     the inside is to look dark. across: float32 (V, 8), of single hairs: from the vertex opposite to each,
     half the hair's width there (m), direction to the tip, and 1 or -1 on its two sides; hairs are never
@@ -74,7 +75,7 @@ class FaceShape:
     colours: Float32
     sway: Float32
     texcoords: Float32 | None = None
-    picture: npt.NDArray[np.uint8] | None = None
+    picture: FacePicture | None = None
     scatter: float = 0.0
     fine: tuple[float, float] = (0.0, 1.0)
     two_sided: bool = False
@@ -88,8 +89,7 @@ class FaceShape:
     @property
     def see_through(self) -> bool:
         """Whether it is to be drawn over what is behind: its picture is not everywhere, or it is of hairs."""
-        clear = self.picture is not None and bool((self.picture[..., 3] < 255).any())
-        return clear or self.across is not None
+        return (self.picture is not None and not self.picture.opaque) or self.across is not None
 
 
 @dataclass(frozen=True, eq=False)

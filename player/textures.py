@@ -6,7 +6,6 @@ else: here one size is chosen for a whole part.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ import numpy.typing as npt
 from player.shapes import FaceShape
 
 Float32 = npt.NDArray[np.float32]
-UInt8 = npt.NDArray[np.uint8]
 
 SHARPEST = 0.8
 """Pixels of the screen that a texel is wide, at least."""
@@ -40,9 +38,9 @@ class Pictures:
         """The texture for a screen whose pixels are so wide where the part is (m), or None without one."""
         if self._picture is None:
             return None
-        halvings = halved(self._breadth / max(self._picture.shape[:2]), pixel, max(self._picture.shape[:2]))
+        halvings = halved(self._breadth / max(self._picture.size), pixel, max(self._picture.size))
         if halvings not in self._sizes:
-            pixels = _smaller(self._picture, 2**halvings)
+            pixels = self._picture.seen(2**halvings)
             height, width = pixels.shape[:2]
             texture = self._gl.texture((width, height), 4, pixels.tobytes())
             texture.filter = (self._gl.LINEAR, self._gl.LINEAR)
@@ -74,21 +72,3 @@ def breadth(positions: Float32, texcoords: Float32, triangles: npt.NDArray[np.in
     spread = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     laid = spread > 1e-9
     return float(np.sqrt(np.median(area[laid] / spread[laid]))) if laid.any() else 0.0
-
-
-def _smaller(picture: UInt8, factor: int) -> UInt8:
-    """Every `factor` texels made one, and the square roots of their linear light."""
-    from PIL import Image
-
-    image = Image.fromarray(picture)
-    if factor > 1:
-        image = image.reduce(factor)
-    return np.asarray(image.point([*_roots()] * 3 + list(range(256))))
-
-
-@cache
-def _roots() -> tuple[int, ...]:
-    """sRGB codes -> square roots of linear light, 0..255."""
-    code = np.arange(256) / 255
-    linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    return tuple(int(v) for v in np.round(255 * np.sqrt(linear)))
