@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,9 @@ from player.face_light import MOUTH_OPEN, FaceLight, LitFace
 from player.face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
 from player.places import Places, Probe, Whole
 from player.shapes import Eye, FaceMesh, FaceShape, rotation_vector
+
+if TYPE_CHECKING:
+    from player.gpu.tables import FaceTables, MovedFace
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -144,8 +148,20 @@ class FaceFigure:
             normals = np.empty_like(positions)
             return self.deformer.local(faps, out=positions, normals=normals), normals
 
-        whole = Whole(len(self.model.vertices), make, lambda rows: self._probe.at(faps, rows)[0])
+        def motion() -> MovedFace:
+            from player.gpu.tables import MovedFace
+
+            return MovedFace(self._tables, self.deformer.motion(faps))
+
+        whole = Whole(len(self.model.vertices), make, lambda rows: self._probe.at(faps, rows)[0], motion)
         return Pose(faps, whole, self.deformer.head_matrices(faps))
+
+    @cached_property
+    def _tables(self) -> FaceTables:
+        """For a graphics card that deforms it."""
+        from player.gpu.tables import FaceTables
+
+        return FaceTables(self.deformer)
 
     def _prepared(self, rows: Rows) -> Callable[[Float32, Float32], None]:
         """What writes the places of some vertices (N,), for FAPs (68,)."""

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from player.detail import distance, same
+from player.gpu.way import Way, release
 from player.programs import load_program, matrix_bytes, set_uniform
 from player.relief import RELIEF, relief
 from player.shapes import FaceMesh, FaceShape
@@ -22,10 +23,15 @@ FAINTEST = 0.25
 
 
 class FaceRenderer:
-    """Draws face meshes. Owns what it allocates on the context; `close` gives it back."""
+    """Draws face meshes. deform: one of `player.gpu.choice.DEFORM`.
 
-    def __init__(self, context: Any) -> None:
+    Owns what it allocates on the context; `close` gives it back.
+    """
+
+    def __init__(self, context: Any, deform: str = "auto") -> None:
         self._gl = context
+        self.way = Way(context, deform)
+        """How the vertices come into the buffers."""
         self._programs: dict[tuple[str, ...], Any] = {}
         self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
         self._reliefs: dict[int, Any] = {}
@@ -38,11 +44,6 @@ class FaceRenderer:
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
         for program in self._programs.values():
             self._place(program)
-
-    def prepare(self, meshes: list[FaceMesh]) -> None:
-        """Before anything of a picture: everything that `draw` is then given a part of."""
-        for mesh in meshes:
-            _ = mesh.places.whole.arrays
 
     def draw(self, meshes: list[FaceMesh]) -> None:
         """Draw parts; those that can be seen through last."""
@@ -70,6 +71,7 @@ class FaceRenderer:
         for part in (*self._reliefs.values(), *self._programs.values()):
             part.release()
         self._reliefs.clear()
+        self.way.close()
         self._programs.clear()
 
     def _program(self, words: tuple[str, ...]) -> Any:
@@ -105,13 +107,12 @@ class FaceRenderer:
 
     def _draw(self, mesh: FaceMesh) -> None:
         parts, shape = self._parts(mesh), mesh.shape
-        for name, array in (("positions", mesh.positions), ("normals", mesh.normals), ("light", mesh.light)):
-            if name == "light":
-                if parts["lit"] is not None and same(parts["lit"], array):
-                    continue
-                parts["lit"] = array
-            parts[name].orphan()
-            parts[name].write(np.ascontiguousarray(array, dtype="f4"))
+        self.way.write(mesh.places, parts)
+        light = mesh.light
+        if parts["lit"] is None or not same(parts["lit"], light):
+            parts["lit"] = light
+            parts["light"].orphan()
+            parts["light"].write(np.ascontiguousarray(light, dtype="f4"))
         wide = self._camera[2] * distance(mesh, self._camera[0])
         picture = parts["pictures"].suited(wide)
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
@@ -158,7 +159,7 @@ class FaceRenderer:
         return parts
 
     def _uploaded(self, mesh: FaceMesh) -> dict[str, Any]:
-        gl, shape, count = self._gl, mesh.shape, len(mesh.positions)
+        gl, shape, count = self._gl, mesh.shape, len(mesh.places)
         texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
         still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
         parts: dict[str, Any] = {
@@ -196,6 +197,7 @@ class FaceRenderer:
 
 
 def _release(parts: dict[str, Any]) -> None:
+    release(parts)
     for array in parts["arrays"].values():
         array.release()
     for name in ("positions", "normals", "light", "still", "triangles", "across"):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import cast
+from functools import cached_property
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,10 @@ from player.face_light import Light
 from player.face_parts import coarser_part, part_shape, with_triangles
 from player.places import Places, Probe, SomeRows, Whole
 from player.shapes import Eye, FaceMesh, FaceShape
+
+if TYPE_CHECKING:
+    from fba.body.skinning import JointMotion
+    from player.gpu.tables import BodyTables, CarriedBody, CarriedFace
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -57,6 +62,7 @@ class Person:
         self._light = BodyLight(body, coarser)
         self._places, self._normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
         self._skin, self._upright = np.empty_like(model.vertices), np.empty_like(model.vertices)
+        self._moved: tuple[Float64, JointMotion] | None = None
         self._probe = Probe(len(body.vertices), self._some_of_body)
         self._lit = Probe(len(body.vertices), self._some_lit, normals=True)
         self._face_probe = Probe(len(model.vertices), self._some_of_face)
@@ -95,7 +101,12 @@ class Person:
         def make() -> tuple[Float32, Float32]:
             return self.body.skin(joints, self._places, self._normals), self._normals
 
-        return Whole(len(self._places), make, lambda rows: self._probe.at(joints, rows)[0])
+        def motion() -> CarriedBody:
+            from player.gpu.tables import CarriedBody
+
+            return CarriedBody(self._tables, self._motion(joints))
+
+        return Whole(len(self._places), make, lambda rows: self._probe.at(joints, rows)[0], motion)
 
     def _face_whole(self, pose: Pose, joints: Float64) -> Whole:
         """The face's, on the body."""
@@ -106,8 +117,34 @@ class Person:
                 pose.positions, joints, self._skin, upright=pose.normals, normals=upright
             ), upright
 
+        def motion() -> CarriedFace:
+            from player.gpu.tables import CarriedFace
+
+            head = self.head
+            return CarriedFace(pose.whole, self._face_tables, self._motion(joints), head.size, head.shift)
+
         posed = (pose, joints)
-        return Whole(len(self._skin), make, lambda rows: self._face_probe.at(posed, rows)[0])
+        return Whole(len(self._skin), make, lambda rows: self._face_probe.at(posed, rows)[0], motion)
+
+    def _motion(self, joints: Float64) -> JointMotion:
+        """What joints do to body and head alike; worked out once for both."""
+        if self._moved is None or self._moved[0] is not joints:
+            self._moved = (joints, self.body.skinner.motion(joints))
+        return self._moved[1]
+
+    @cached_property
+    def _tables(self) -> BodyTables:
+        """For a graphics card that deforms the body."""
+        from player.gpu.tables import BodyTables
+
+        return BodyTables(self.body.skinner)
+
+    @cached_property
+    def _face_tables(self) -> BodyTables:
+        """The same of the face on it."""
+        from player.gpu.tables import BodyTables
+
+        return BodyTables(self.head.skinner)
 
     def _some_of_body(self, rows: Rows) -> Callable[[Float64, Float32], None]:
         """What writes the places of some of the body's vertices (N,)."""

@@ -15,10 +15,11 @@ from player.detail import Details
 from player.extent import Steps, steps
 from player.extras_renderer import ExtrasRenderer
 from player.face_renderer import FaceRenderer
+from player.gpu.way import Way
 from player.outline import Outliner
 from player.primitives import capsule_mesh, sphere_mesh
 from player.programs import load_program, matrix_bytes, set_uniform
-from player.shapes import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
+from player.shapes import CAPSULE_FLOATS, Eye, FaceMesh, Mesh, MeshShape, View
 
 MOST_BLOBS = 8
 THROUGH = 0.16
@@ -34,17 +35,18 @@ MOST_SHAPES = 32
 class Renderer:
     """Draws views into whatever framebuffer is bound.
 
-    context: a moderngl context (OpenGL 3.3 or later). The renderer owns what it allocates there;
-    `close` gives it back. Not thread-safe, as OpenGL is not.
+    context: a moderngl context (OpenGL 3.3 or later). deform: who moves the vertices of figures, one of
+    `player.gpu.choice.DEFORM`. The renderer owns what it allocates there; `close` gives it back. Not
+    thread-safe, as OpenGL is not.
     """
 
-    def __init__(self, context: Any) -> None:
+    def __init__(self, context: Any, deform: str = "auto") -> None:
         self._gl = context
         self._programs = {
             name: load_program(context, name)
             for name in ("mesh", "capsule", "eye", "studio", "shadow", "cast")
         }
-        self._faces = FaceRenderer(context)
+        self._faces = FaceRenderer(context, deform)
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
         square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
         self._studio_buffer = context.buffer(corners.tobytes())
@@ -75,19 +77,31 @@ class Renderer:
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
-    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps:
+    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps | None:
         """Clear the bound framebuffer and draw the view; size: its width and height in pixels.
 
-        Returns where its steps are.
+        Returns where its steps are, None for anywhere.
         """
         gl = self._gl
-        self._faces.prepare(view.faces)
         aspect = size[0] / max(size[1], 1)
         seen = camera.view_matrix()
         matrix, place = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]
-        gl.viewport = (0, 0, *size)
-        gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
         pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
+
+        def draw_faces(faces: list[FaceMesh]) -> View:
+            drawn = replace(view, faces=self._details.suited(faces, place, pixel))
+            self._faces.begin(place, matrix, pixel)
+            self._faces.draw(drawn.faces)
+            return drawn
+
+        def trial(faces: list[FaceMesh]) -> None:
+            drawn = draw_faces(faces)
+            if not self._faces.way.on_gpu:
+                steps(drawn, matrix, size, self._outliner)
+
+        gl.viewport = (0, 0, *size)
+        self._faces.way.prepare(view.faces, trial)
+        gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
         eye, written = tuple(place.tolist()), matrix_bytes(matrix)
         for program in self._programs.values():
             set_uniform(program, "eye", eye)
@@ -101,13 +115,18 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        drawn = replace(view, faces=self._details.suited(view.faces, place, pixel))
-        self._faces.begin(place, matrix, pixel)
-        self._faces.draw(drawn.faces)
+        drawn = draw_faces(view.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
             drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
+        if self._faces.way.on_gpu and (view.extras is None or not view.extras.is_fine):
+            return None  # a graphics card smooths all of it in less time than outlines take to be found
         return steps(drawn, matrix, size, self._outliner)
+
+    @property
+    def way(self) -> Way:
+        """Where the last picture's figures were deformed, and why."""
+        return self._faces.way
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""

@@ -7,7 +7,7 @@ more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres;
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from player.coarse import Coarser
     from player.extras import Extras
     from player.face_picture import FacePicture
-    from player.places import Places
+    from player.places import Places, Whole
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -119,6 +119,10 @@ class FaceMesh:
     def normals(self) -> Float32:
         """float32 (V, 3), likewise."""
         return self.places.normals
+
+    def afresh(self, wholes: dict[int, Whole]) -> FaceMesh:
+        """The same, with nothing worked out yet; wholes: see `Places.afresh`."""
+        return replace(self, places=self.places.afresh(wholes))
 
     @cached_property
     def light(self) -> Float32:

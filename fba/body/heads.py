@@ -46,8 +46,9 @@ class HeadOnBody:
         self._skull = skull_of(body)
         self.place = placement(body, eyes)
         """float64 (4, 4): the face's frame into the body's, as modelled."""
-        self._size = float(self.place[0, 0])
-        placed = places.astype(np.float64) * self._size + self.place[:3, 3]
+        self.size = float(self.place[0, 0])
+        """How many times as large the face is on the body."""
+        placed = places.astype(np.float64) * self.size + self.place[:3, 3]
         neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
         joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
         weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
@@ -63,13 +64,14 @@ class HeadOnBody:
             placed += found.offset
             joints[free], weights[free] = found.joints, found.weights
             self.hidden, self.brings_neck = found.hidden, found.brings_neck
-        self._shift = self.place[:3, 3].astype(np.float32)
+        self.shift = self.place[:3, 3].astype(np.float32)
+        """float32 (3,): where its origin is put."""
         self._from_place = np.linalg.inv(self.place)
         self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(places))
         self._below = _descendants(body, self._skull)
         self._bind = body.bind
         self._inverse = np.linalg.inv(body.bind)
-        self._skinner = Skinner(
+        self.skinner = Skinner(
             placed.astype(np.float32),
             np.tile(np.array([0, 0, 1], dtype=np.float32), (len(places), 1)),
             self.joints,
@@ -121,13 +123,13 @@ class HeadOnBody:
 
         if local.shape != self._placed.shape:
             raise ValueError(f"vertices must have shape {self._placed.shape}, not {local.shape}")
-        sized(local, self._size, self._shift, self._placed)
-        return self._skinner.carry(self._placed, upright, matrices, out, normals, method)
+        sized(local, self.size, self.shift, self._placed)
+        return self.skinner.carry(self._placed, upright, matrices, out, normals, method)
 
     def chosen(self, rows: npt.NDArray[np.intp]) -> HeadOnBody:
         """The same for some of the face's vertices, rows (N,), each once: `skin` takes and gives these."""
         some = copy.copy(self)
-        some._skinner = self._skinner.chosen(rows)
+        some.skinner = self.skinner.chosen(rows)
         some._placed = np.empty((len(rows), 3), dtype=np.float32)
         return some
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,41 @@ METHODS = ("dual", "linear")
 """Ways to blend the motion of several joints."""
 BLOCK = 64
 """Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
+
+
+class SkinTables(NamedTuple):
+    """The vertices of a `Skinner`, a row each."""
+
+    vertices: Float32
+    """(V, 3) as modelled."""
+    upright: Float32
+    """(V, 3) normals as modelled."""
+    joints: Int32
+    """(V, 4)"""
+    weights: Float32
+    """(V, 4), 0 where a joint does not carry it."""
+    wring: Float32
+    """(V, 4): the bone that it is turned about beforehand, -1 for none, its shares of both twists, and how
+    far matrices draw it straight (`fba.body.girdle`)."""
+    around: Int32
+    """(V, 4), see `fba.body.rings`, -1 where the normal only turns."""
+    numbers: Float32
+    """(V, 3), likewise."""
+    axis: Float64
+    """(B, 3) directions of the bones, as modelled."""
+    centre: Float64
+    """(B, 3) their beginnings."""
+
+
+class JointMotion(NamedTuple):
+    """Joints in one pose: see `fba.body.skinning_loops.motion_of_joints`."""
+
+    duals: Float32
+    """(J, 8), from the root."""
+    angles: Float32
+    """(B, 2)"""
+    root: Float64
+    """(3,) where the root is."""
 
 
 class Skinner:
@@ -119,6 +155,38 @@ class Skinner:
         """(N,) the rows and those that their normals are taken from, rising."""
         around = self._around[rows]
         return np.union1d(rows, np.where(around < 0, rows[:, None], around))
+
+    def tables(self) -> SkinTables:
+        """What it knows of its vertices, for those that carry them by other means."""
+        wring = np.zeros((len(self._modelled), 4), dtype=np.float32)
+        wring[:, 0] = -1
+        for bone in range(len(self._twists.joint)):
+            part = slice(self._twists.starts[bone], self._twists.starts[bone + 1])
+            wring[self._twists.rows[part], 0] = bone
+            wring[self._twists.rows[part], 1:3] = self._twists.shares[part]
+        wring[self._girdle.rows, 3] = self._girdle.shares
+        return SkinTables(
+            self._modelled,
+            self._upright_modelled,
+            self._joints,
+            self._weights,
+            wring,
+            self._around,
+            self._numbers,
+            self._twists.axis,
+            self._twists.centre,
+        )
+
+    def motion(self, matrices: npt.ArrayLike) -> JointMotion:
+        """What joint matrices (J, 4, 4) do to any vertices, with dual quaternions. Errors as of `skin`."""
+        frames, _ = self._frames(matrices)
+        duals = np.empty((len(self._inverse), 8), dtype=np.float32)
+        angles = np.empty((len(self._twists.joint), 2), dtype=np.float32)
+        with np.errstate(all="ignore"):
+            self._loops.motion_of_joints(
+                frames[0], self._inverse, self._parents, self._twists, self._girdle, duals, angles
+            )
+        return JointMotion(duals, angles, frames[0, 0, :3, 3].copy())
 
     def _run(
         self,

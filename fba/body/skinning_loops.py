@@ -90,6 +90,20 @@ def linear_frames(
 
 
 @compiled
+def motion_of_joints(
+    matrices: Float64, inverse: Float64, parents: Int64, twists: Twisting, girdle: Girdle,
+    duals: Float32, angles: Float32,
+) -> None:  # fmt: skip
+    """What `dual_frames` makes of a frame's joints, (J, 4, 4), before it comes to the vertices: duals (J, 8)
+    with the girdles turned; angles (B, 2), by which the joints at both ends of a bone twist."""
+    _duals(matrices, inverse, parents, duals)
+    for bone in range(len(twists.joint)):
+        angles[bone, 0] = _twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
+        angles[bone, 1] = _twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
+    lift(duals, girdle)
+
+
+@compiled
 def _duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Float32) -> None:
     """Joint matrices (J, 4, 4) as unit dual quaternions (J, 8), w x y z: rotation, then half the shift
     (from the root) times it.

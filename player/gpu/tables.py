@@ -1,0 +1,124 @@
+"""What does not change in a face or body that a graphics card deforms, a row for each vertex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.skinning import JointMotion, Skinner
+from fba.face.deformer import Deformer, FaceMotion
+from fba.face.deformer_surface import Surface
+from fba.face.deformer_tables import Shifts
+from player.places import Whole
+
+Float32 = npt.NDArray[np.float32]
+Int32 = npt.NDArray[np.int32]
+
+
+class FaceTables:
+    """A face's vertices and what FAPs do to them, from its deformer.
+
+    rest (V, 3); spans (V, 2): each vertex's first entry and that after its last one. entries (E, 2): a track,
+    and the place of its first interval in `shifts`. shifts (S, 3): for each interval of the track where the
+    vertex is at its beginning, then the slope. part (V,). around (V, 2): likewise into triangles (C, 4),
+    whose areas make the normal; none where it is neutral (V, 3).
+    """
+
+    def __init__(self, deformer: Deformer) -> None:
+        tables = deformer.tables
+        self.rest = np.ascontiguousarray(deformer.model.vertices, dtype=np.float32)
+        count = len(self.rest)
+        self.spans, self.entries, self.shifts = _tracks(tables.shifts, count)
+        self.part = np.repeat(np.arange(len(tables.part_start) - 1), np.diff(tables.part_start))
+        self.around, self.triangles = _fans(tables.surface)
+        self.neutral = np.ascontiguousarray(tables.surface.neutral[:, tables.surface.sum_of].T)
+
+
+class BodyTables:
+    """A body's vertices and the joints that carry them: see `fba.body.skinning.SkinTables`."""
+
+    def __init__(self, skinner: Skinner) -> None:
+        self.rows = skinner.tables()
+
+
+@dataclass(frozen=True, eq=False)
+class MovedFace:
+    """A face in one pose."""
+
+    tables: FaceTables
+    motion: FaceMotion
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedBody:
+    """A body in one pose."""
+
+    tables: BodyTables
+    motion: JointMotion
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedFace:
+    """A face on a body. face: its vertices, without the body; size, shift (3,): put there as modelled."""
+
+    face: Whole
+    tables: BodyTables
+    motion: JointMotion
+    size: float
+    shift: Float32
+
+
+def _tracks(shifts: Shifts, count: int) -> tuple[Int32, Int32, Float32]:
+    """spans, entries and shifts, see `FaceTables`. An entry holds all intervals of its track: of these, one
+    counts at a time."""
+    vertices, tracks, places, found = [], [], [], [np.zeros((0, 3), dtype=np.float32)]
+    filled = 0
+    for track in range(len(shifts.column)):
+        intervals = range(int(shifts.first[track]), int(shifts.first[track + 1]))
+        parts = [slice(int(shifts.start[s]), int(shifts.start[s + 1])) for s in intervals]
+        moved = np.zeros(count, dtype=bool)
+        for part in parts:
+            moved[shifts.rows[part]] = True
+        rows = np.flatnonzero(moved)
+        number = np.zeros(count, dtype=np.int64)
+        number[rows] = np.arange(len(rows))
+        table = np.zeros((len(rows), len(parts), 2, 3), dtype=np.float32)
+        for k, (s, part) in enumerate(zip(intervals, parts, strict=True)):
+            at = number[shifts.rows[part]]
+            table[at, k, 1] = shifts.slopes[part]
+            base = int(shifts.base[s])
+            if base >= 0:
+                table[at, k, 0] = shifts.bases[base : base + len(at)]
+        size = 2 * len(parts)
+        vertices.append(rows)
+        tracks.append(np.full(len(rows), track))
+        places.append(filled + size * np.arange(len(rows)))
+        found.append(table.reshape(-1, 3))
+        filled += size * len(rows)
+    if not vertices:
+        return np.zeros((count, 2), np.int32), np.zeros((0, 2), np.int32), found[0]
+    of = np.concatenate(vertices)
+    order = np.argsort(of, kind="stable")
+    entries = np.stack([np.concatenate(tracks), np.concatenate(places)], axis=1)[order]
+    ends = np.cumsum(np.bincount(of, minlength=count))
+    spans = np.stack([np.concatenate([[0], ends[:-1]]), ends], axis=1)
+    return spans.astype(np.int32), entries.astype(np.int32), np.concatenate(found)
+
+
+def _fans(surface: Surface) -> tuple[Int32, Int32]:
+    """around and triangles, see `FaceTables`."""
+    changing = int(surface.changing_start[-1])
+    corners = surface.corners.ravel().astype(np.int64)
+    order = np.argsort(corners, kind="stable")
+    order = order[: int((corners < changing).sum())]
+    triangles = np.zeros((len(order), 4), dtype=np.int32)
+    triangles[:, :3] = surface.triangles[order // 3]
+    starts = np.searchsorted(corners[order], np.arange(changing + 1))
+    sums = surface.sum_of.astype(np.int64)
+    still = sums >= changing
+    sums = np.where(still, 0, sums)
+    spans = np.stack([starts[sums], starts[np.minimum(sums + 1, changing)]], axis=1)
+    spans[still] = 0
+    return spans.astype(np.int32), triangles

@@ -1,0 +1,151 @@
+"""The way that the vertices of figures take: made here and sent, or made on the graphics card."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from player.gpu.choice import FAILED, Choice
+from player.gpu.deformer import GpuDeformer
+from player.places import Places, Whole
+from player.shapes import FaceMesh
+
+WRONG = 1e-4
+"""By this share of its size a figure on the graphics card may be off."""
+Parts = dict[str, Any]
+
+
+class Way:
+    """Brings vertices into buffers. Owns what it allocates on the moderngl context; `close` gives it back.
+
+    wish: one of `player.gpu.choice.DEFORM`. What goes wrong on the graphics card is done without it.
+    """
+
+    def __init__(self, context: Any, wish: str = "auto") -> None:
+        self._gl = context
+        self._choice = Choice(context.info, wish)
+        self._deformer: GpuDeformer | None = None
+        self._proven: set[int] = set()
+        self.on_gpu = False
+        """Whether the graphics card makes the vertices of the picture that was prepared last."""
+
+    @property
+    def reason(self) -> str:
+        """Why it does, or does not."""
+        return self._choice.reason
+
+    def prepare(self, meshes: list[FaceMesh], draw: Callable[[list[FaceMesh]], None]) -> None:
+        """Before anything of a picture: everything that is then drawn. draw: draws it into what is bound, to
+        find out how long that takes; called for the first picture of a kind alone."""
+        wholes = _wholes(meshes)
+        count = sum(whole.count for whole in wholes if whole.moves)
+        on_gpu = count > 0 and self._choice.on_gpu(count, lambda gpu: self._trial(meshes, draw, gpu))
+        self._prepared(wholes, on_gpu)
+        if self.on_gpu and count not in self._proven:
+            if self._is_right(meshes):
+                self._proven.add(count)
+            else:
+                self._give_up("vertices come out wrong")
+                self._prepared(wholes, False)
+
+    def write(self, places: Places, parts: Parts) -> None:
+        """Positions and normals of a part into its buffers, parts["positions"] and parts["normals"]. parts
+        keeps what else that needs."""
+        if self.on_gpu and places.whole.moves and self._deformer is not None:
+            try:
+                self._written(self._deformer, places, parts)
+                return
+            except Exception as error:  # whatever a driver cannot do, the processor can
+                self._give_up(_said(error))
+        parts["made"] = None
+        for name, array in (("positions", places.positions), ("normals", places.normals)):
+            parts[name].orphan()
+            parts[name].write(np.ascontiguousarray(array, dtype="f4"))
+
+    def close(self) -> None:
+        """Free everything allocated on the graphics card."""
+        if self._deformer is not None:
+            self._deformer.close()
+            self._deformer = None
+
+    def _prepared(self, wholes: list[Whole], on_gpu: bool) -> None:
+        self.on_gpu = on_gpu
+        if on_gpu:
+            target, viewport = self._gl.fbo, self._gl.viewport
+            try:
+                if self._deformer is None:
+                    self._deformer = GpuDeformer(self._gl)
+                self._deformer.prepare([whole for whole in wholes if whole.moves])
+            except Exception as error:  # as above
+                self._give_up(_said(error))
+            target.use()
+            self._gl.viewport = viewport
+        for whole in wholes:
+            if not (self.on_gpu and whole.moves):
+                _ = whole.arrays
+
+    def _give_up(self, reason: str) -> None:
+        self._choice.give_up(reason)
+        self.on_gpu = False
+        self.close()
+
+    def _written(self, deformer: GpuDeformer, places: Places, parts: Parts) -> None:
+        whole = places.whole
+        if parts.get("made") is whole:  # drawn a second time
+            return
+        of = (id(deformer), places.start, id(places.chosen), type(whole.motion), whole.count)
+        if parts.get("rows_of") != of:
+            release(parts)
+            parts["rows"], parts["rows_of"] = deformer.rows(places), of
+        deformer.write(places, parts["rows"], parts["positions"], parts["normals"])
+        parts["made"] = whole
+
+    def _trial(self, meshes: list[FaceMesh], draw: Callable[[list[FaceMesh]], None], on_gpu: bool) -> float:
+        """Seconds that a picture takes; more than any where the graphics card cannot do it."""
+        made: dict[int, Whole] = {}
+        again = [mesh.afresh(made) for mesh in meshes]
+        self._gl.finish()
+        start = perf_counter()
+        self._prepared(_wholes(again), on_gpu)
+        if self.on_gpu != on_gpu:
+            return FAILED
+        draw(again)
+        self._gl.finish()
+        return perf_counter() - start if self.on_gpu == on_gpu else FAILED
+
+    def _is_right(self, meshes: list[FaceMesh]) -> bool:
+        """Whether the graphics card makes of the figures what the processor does."""
+        for mesh in meshes:
+            count = len(mesh.places)
+            if not mesh.places.whole.moves or not count:
+                continue
+            rooms: Parts = {name: self._gl.buffer(reserve=12 * count) for name in ("positions", "normals")}
+            self.write(mesh.places, rooms)
+            found = np.frombuffer(rooms["positions"].read(), dtype=np.float32).reshape(-1, 3)
+            release(rooms)
+            for name in ("positions", "normals"):
+                rooms[name].release()
+            size = float(np.abs(mesh.positions).max(initial=1e-9))
+            if not (self.on_gpu and np.abs(found - mesh.positions).max(initial=0.0) <= WRONG * size):
+                return False
+        return True
+
+
+def release(parts: Parts) -> None:
+    """Free what `Way.write` keeps with a part."""
+    for part in parts.pop("rows", ()):
+        part.release()
+    parts.pop("rows_of", None)
+    parts["made"] = None
+
+
+def _said(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _wholes(meshes: list[FaceMesh]) -> list[Whole]:
+    found = {id(mesh.places.whole): mesh.places.whole for mesh in meshes}
+    return list(found.values())
