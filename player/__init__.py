@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from player.live import LiveAnimation, LiveTimeline
     from player.notebook import Preview
     from player.offscreen import Offscreen
+    from player.playing import play
     from player.pyrender_bridge import to_pyrender
     from player.recorder import Recorder
     from player.recording import record, render
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from player.scene import Scene, default_camera
     from player.timeline import Timeline
     from player.transport import Transport
-    from player.window import play
 
 _PLACES = {
     "Audio": "player.audio",
@@ -49,7 +49,7 @@ _PLACES = {
     "default_camera": "player.scene",
     "film_sheet": "player.film_sheet",
     "open_audio": "player.audio",
-    "play": "player.window",
+    "play": "player.playing",
     "record": "player.recording",
     "render": "player.recording",
     "to_pyrender": "player.pyrender_bridge",

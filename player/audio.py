@@ -57,7 +57,7 @@ class Audio:
         self.duration = file.duration
         self.rate = file.rate
         self.clock = SoundClock(file.rate, (PERIODS - 1) * PERIOD)
-        self._origin = transport.start + offset
+        self._offset = offset
         self._blocks = SoundBlocks(file, self._wanted)
         self._mixer = SoundMixer(self._blocks.take, file.rate, lambda: transport.motion, self._origin)
         self._device: Any = None
@@ -71,6 +71,20 @@ class Audio:
             self.close()
             raise NoDeviceError(", ".join(str(one) for one in error.args) or type(error).__name__) from error
         transport.use_clock(self.clock, self.clock.latency)
+
+    @property
+    def offset(self) -> float:
+        """Seconds by which the sound begins after the first frame; it may be set while it is heard."""
+        return self._offset
+
+    @offset.setter
+    def offset(self, offset: float) -> None:
+        self._offset = float(offset)
+        self._mixer.origin = self._origin
+
+    @property
+    def _origin(self) -> float:
+        return self.transport.start + self._offset
 
     @property
     def volume(self) -> float:

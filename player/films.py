@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import DisplayError
-from player.sound import Soundtrack
+from player.sound import FilmedSound, Soundtrack
 from player.whole import PathLike, cannot, written
 
 UInt8 = npt.NDArray[np.uint8]
@@ -50,7 +51,7 @@ class Mp4:
         path: PathLike,
         size: tuple[int, int],
         rate: Fraction,
-        audio: PathLike | None = None,
+        audio: PathLike | FilmedSound | None = None,
         audio_start: float | Fraction = 0,
     ) -> None:
         self._av = import_av()
@@ -63,7 +64,11 @@ class Mp4:
         self._container: Any = None
         with contextlib.ExitStack() as undo:
             undo.callback(self.abort)
-            soundtrack = Soundtrack(audio, Fraction(audio_start)) if audio is not None else None
+            soundtrack: FilmedSound | None
+            if audio is None or not isinstance(audio, str | os.PathLike):
+                soundtrack = audio
+            else:
+                soundtrack = Soundtrack(audio, Fraction(audio_start))
             if soundtrack is not None:
                 self._keep.callback(soundtrack.close)
             name = _encoder(self._av)
@@ -130,7 +135,7 @@ class _Abandoned(Exception):  # noqa: N818 - never seen outside
 class _Voice:
     """The sound as AAC: encoded as far as the pictures are."""
 
-    def __init__(self, container: Any, soundtrack: Soundtrack) -> None:
+    def __init__(self, container: Any, soundtrack: FilmedSound) -> None:
         self._container, self._soundtrack = container, soundtrack
         self._stream = container.add_stream("aac", rate=soundtrack.rate)
         self._stream.codec_context.layout = soundtrack.layout

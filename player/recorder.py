@@ -16,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import UnsupportedError
+from player.prompt_threads import prompt_threads
+from player.sound import FilmedSound
 from player.whole import PathLike
 
 UInt8 = npt.NDArray[np.uint8]
@@ -50,7 +52,8 @@ class Recorder:
 
     path: .mp4 (H.264, with sound) or .gif. size: width and height in pixels; MP4 loses the last column or
     row of odd ones. rate: frames a second. audio: a file whose sound goes along (MP4 only), from
-    audio_start seconds in it (it may be negative: silence first), for as long as the film lasts.
+    audio_start seconds in it (it may be negative: silence first), for as long as the film lasts; or a
+    `player.sound.FilmedSound`, which the film closes.
 
     Use it as a context manager: it closes at the end, and aborts where an exception leaves the block. The
     film appears under its name, whole, when it is closed.
@@ -65,7 +68,7 @@ class Recorder:
         size: tuple[int, int],
         *,
         rate: Fraction | int | str = 30,
-        audio: PathLike | None = None,
+        audio: PathLike | FilmedSound | None = None,
         audio_start: float | Fraction = 0,
     ) -> None:
         width, height = (int(v) for v in size)
@@ -209,10 +212,11 @@ class Recorder:
     def _encode(self) -> None:
         """The thread. After an error it goes on taking pictures, so that nobody waits for it."""
         try:
-            while (item := self._full.get()) is not None:
-                if not self._stop:
-                    self._sink.write(*item)
-                self._free.put(item[0])
+            with prompt_threads():
+                while (item := self._full.get()) is not None:
+                    if not self._stop:
+                        self._sink.write(*item)
+                    self._free.put(item[0])
             if not self._stop:
                 self._result = self._sink.finish(self._last + 1)
         except BaseException as error:
@@ -234,7 +238,7 @@ def _opened(
     path: Path,
     size: tuple[int, int],
     rate: Fraction,
-    audio: PathLike | None,
+    audio: PathLike | FilmedSound | None,
     audio_start: float | Fraction,
 ) -> Sink:
     suffix = path.suffix.lower()

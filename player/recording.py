@@ -47,6 +47,7 @@ def render(
     start: float | None = None,
     end: float | None = None,
     audio: PathLike | None = None,
+    audio_offset: float = 0.0,
     transparent: bool = False,
     replace: bool = False,
     progress: Progress | None = None,
@@ -60,7 +61,8 @@ def render(
     "three-quarter", "profile", "body", or None for the one that suits the content. For a picture: frame,
     its position in the animation (negative from the end), or time in seconds; by default the first frame.
     For a film: fps (by default the animation's own rate), and start and end in seconds; audio: a file whose
-    sound goes with an MP4; it begins with the animation's first frame. transparent: PNG without a
+    sound goes with an MP4; it begins with the animation's first frame, or audio_offset seconds later
+    (earlier where negative). transparent: PNG without a
     background, opaque only where something is. replace: numbered pictures that exist may be overwritten.
     progress: called with (done, total) frames.
 
@@ -79,7 +81,7 @@ def render(
             )
         return record(
             scene, path, fps=fps, size=size, camera=camera, start=start, end=end, audio=audio,
-            transparent=transparent, replace=replace, progress=progress,
+            audio_offset=audio_offset, transparent=transparent, replace=replace, progress=progress,
         )  # fmt: skip
     transparent = transparent or _clear(scene)
     check_picture(target, transparent=transparent)
@@ -108,6 +110,7 @@ def record(
     start: float | None = None,
     end: float | None = None,
     audio: PathLike | None = None,
+    audio_offset: float = 0.0,
     transparent: bool = False,
     replace: bool = False,
     progress: Progress | None = None,
@@ -117,6 +120,8 @@ def record(
     MP4: H.264, yuv420p, and AAC; it needs even sizes: odd ones lose their last column or row.
     """
     shown = as_scene(scene)
+    if not math.isfinite(audio_offset):
+        raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     gif, numbered = suffix == ".gif", is_sequence(path)
     transparent = transparent or _clear(shown)
@@ -146,9 +151,8 @@ def record(
             sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
             recorder = Recorder.into(sink, path, (width, height), rate)
         else:
-            recorder = Recorder(
-                path, (width, height), rate=rate, audio=audio, audio_start=first - shown.timeline.start
-            )
+            into = first - shown.timeline.start - Fraction(audio_offset).limit_denominator(10**6)
+            recorder = Recorder(path, (width, height), rate=rate, audio=audio, audio_start=into)
         stack.enter_context(recorder)
         stack.enter_context(_background(shown, clear=transparent))
         samples = PICTURE_SAMPLES if transparent else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,20 @@ Float32 = npt.NDArray[np.float32]
 AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
 BLOCK = 1024
 """Samples at a time; AAC's own."""
+
+
+class FilmedSound(Protocol):
+    """What the sound track of a film is made of: samples as far as they are known."""
+
+    rate: int
+    channels: int
+    layout: str
+
+    def frames(self, samples: int) -> Iterator[Any]:
+        """The next samples, or as many of them as are there, as `av.AudioFrame`s ("fltp") without times."""
+
+    def close(self) -> None:
+        """Give back what it holds; safe to call twice."""
 
 
 def beside(path: PathLike) -> Path | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +31,8 @@ class SoundFile:
     """The first sound of an audio or video file, as stereo samples at one rate.
 
     path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rate: samples a second, the file's own
-    where devices play it. duration: seconds as the file says itself, None where it does not. Mono goes to
-    both sides; more than two channels are mixed down.
+    where devices play it, or where it is one of `rates`. duration: seconds as the file says itself, None
+    where it does not. Mono goes to both sides; more than two channels are mixed down.
 
     Not for several threads at once. Raises FormatError where it cannot be read or holds no sound.
     """
@@ -40,7 +40,7 @@ class SoundFile:
     _container: Any = None
     _stream: Any = None
 
-    def __init__(self, path: PathLike) -> None:
+    def __init__(self, path: PathLike, rates: Collection[int] = ()) -> None:
         try:
             import av
         except ImportError as error:
@@ -51,6 +51,7 @@ class SoundFile:
         self._av = av
         self.path = Path(path)
         self._damaged = False
+        self._rates = rates
         self._open()
         self.rate = self._rate(int(self._stream.rate or 0))
         length, base = self._stream.duration, self._stream.time_base
@@ -125,7 +126,8 @@ class SoundFile:
     def _rate(self, rate: int) -> int:
         if rate < 1:
             raise FormatError(f"says {rate} samples a second", path=self.path)
-        return rate if RATES[0] <= rate <= RATES[1] else USUAL_RATE
+        fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
+        return rate if fits else USUAL_RATE
 
     def _seek(self, start: int) -> int:
         """Let `_parts` begin at or before a sample; the one it begins with."""

@@ -25,7 +25,7 @@ class SoundMixer:
     """Samples for a device from where the performance is when they are heard.
 
     take: gives samples, `SoundBlocks.take`. rate: of both. motion: where the performance is. origin: time of
-    the animation, seconds, at which the first sample is heard.
+    the animation, seconds, at which the first sample is heard; it may change at any time.
 
     At other speeds the sound is that of a tape: faster is higher. volume: 0 to 1; muted: silence, whatever
     the volume.
@@ -39,7 +39,7 @@ class SoundMixer:
         self._take = take
         self._rate = rate
         self._motion = motion
-        self._origin = origin
+        self.origin = origin
         self._cursor: float | None = None  # sample that follows the last; None in silence
         self._speed = 1.0
         self._risen = math.inf  # samples since the sound began or jumped
@@ -55,7 +55,7 @@ class SoundMixer:
             now = clock + done / rate + AFTER
             turn = motion.until_turn(now) * rate
             piece = min(count - done, max(math.ceil(turn), 1)) if turn < count else count - done
-            due = (motion.time(now) - self._origin) * rate if motion.moving(now) else None
+            due = (motion.time(now) - self.origin) * rate if motion.moving(now) else None
             self._go(due, motion.speed)
             if self._cursor is not None:
                 mixed[done : done + piece] = self._risen_by(self._heard(self._cursor, self._speed, piece))

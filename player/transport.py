@@ -91,6 +91,11 @@ class Transport:
         return self._settle().time(self._clock())
 
     @property
+    def clock(self) -> float:
+        """What the clock that it follows says, seconds from any origin."""
+        return self._clock()
+
+    @property
     def frame(self) -> int:
         """Position, in the animation, of the frame shown now or the last one before."""
         return self._timeline.position(self.time)[0]

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import time as wall
 import warnings
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
 from player.camera import Camera
 from player.context import import_moderngl
 from player.controls import Controls
 from player.overlay import Overlay
 from player.renderer import Renderer
-from player.scene import Scene
 from player.screen import FullScreen
 from player.target import Target
 from player.transport import Transport
@@ -49,57 +46,8 @@ SETTLES = 4
 """Pictures drawn after an input, until panels have settled."""
 
 
-def play(
-    animation: Animation | Showable,
-    *,
-    title: str | None = None,
-    size: tuple[int, int] = (1280, 720),
-    camera: Camera | str | None = None,
-    loop: bool = True,
-    speed: float = 1.0,
-    start: float | None = None,
-    paused: bool = False,
-    interpolate: bool = True,
-    audio: PathLike | None = None,
-    file: PathLike | None = None,
-    bap_steps: str = "iso",
-    panels: tuple[str, ...] = (),
-) -> None:
-    """Open a window, play an animation in it, and return when it is closed.
-
-    title: of the window; the animation's name by default. size: of the window. camera: a `Camera`, the
-    name of a preset, or None for the one that suits the content. speed: 0.1 to 4. start: seconds.
-    interpolate: whether motion is smooth between frames. audio: a sound file to be heard with it; the
-    sound's clock then leads. file: where the animation was read from (with bap_steps), for what the window
-    tells about it. panels: names of those open at the beginning ("file", "view", "camera", "help").
-    F1 shows the keys. Motion follows the clock: a slow machine shows fewer pictures, not slower ones.
-
-    Raises DisplayError where there is no display or no OpenGL 3.3, or where it stops working, saying what
-    to do; ValueError for a speed, size or preset that does not exist; FormatError for a sound file that
-    cannot be read.
-    """
-    scene: Any = animation if hasattr(animation, "timeline") else Scene(animation)
-    source = Source(scene, file, bap_steps=bap_steps)
-    with Window(scene, title=title, size=size, camera=camera, loop=loop, source=source) as window:
-        window.transport.set_speed(speed)
-        window.transport.interpolate = interpolate
-        window.session.open |= set(panels)
-        with contextlib.ExitStack() as stack:
-            if audio is not None:
-                from player.audio import open_audio
-
-                window.session.audio = open_audio(audio, window.transport)
-                if window.session.audio is not None:
-                    stack.enter_context(window.session.audio)
-            if start is not None:
-                window.transport.seek(start)
-            if not paused:
-                window.transport.play()
-            window.run()
-
-
 class Window:
-    """A window that shows a scene; see `play`. A context manager; one at a time, in the main thread.
+    """A window that shows a scene; see `player.play`. A context manager; one at a time, in the main thread.
 
     panels: False for the plain timeline without panels, which there also is where imgui is missing. folder:
     where pictures and films go, by default the current one.
@@ -312,6 +260,7 @@ class Window:
             self._target = Target(self._gl, size, samples=0)
         assert self._renderer is not None
         time = self.transport.time
+        self.keeper.moment()
         self._target.begin()
         within = self._renderer.draw(session.view(time), session.camera(time), size)
         self._target.finish(self._gl.screen, within)

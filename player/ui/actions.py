@@ -6,6 +6,9 @@ from collections.abc import Callable
 
 from player.ui.session import Session
 
+SHIFT = 0.02
+"""Seconds by which a key moves the sound."""
+
 
 def act(session: Session, name: str) -> bool:
     """Do what a name of the table of keys says ("toggle", "camera front", "panel file").
@@ -87,10 +90,24 @@ def _points(session: Session) -> None:
 
 def _mute(session: Session) -> None:
     if session.audio is None:
-        session.say("there is no sound", "warning")
+        what = "there is no sound" if session.sound is None else "there is no sound device"
+        session.say(what, "warning")
         return
     session.audio.muted = not session.audio.muted
     session.say("sound off" if session.audio.muted else "sound on")
+
+
+def _shift_sound(seconds: float) -> Callable[[Session], None]:
+    def shift(session: Session) -> None:
+        if session.sound is None:
+            session.say("there is no sound", "warning")
+            return
+        session.shift_sound(seconds)
+        now = session.sound_offset
+        way = f"{abs(now):.2f} s {'later' if now > 0 else 'earlier'}" if now else "with the first frame"
+        session.say(f"sound {way}")
+
+    return shift
 
 
 def _bare(session: Session) -> None:
@@ -130,6 +147,8 @@ _PLAIN: dict[str, Callable[[Session], None]] = {
     "follow": _follow,
     "points": _points,
     "mute": _mute,
+    "sound_earlier": _shift_sound(-SHIFT),
+    "sound_later": _shift_sound(SHIFT),
     "bare": _bare,
     "close": _close,
     **{name: _wish(name) for name in ("screenshot", "transparent", "record", "fullscreen")},

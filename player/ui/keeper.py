@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FbaError
+from player.film_sound import FilmSound
 from player.picture_files import write_picture
 from player.recorder import Recorder
 from player.ui.session import Session
@@ -32,6 +33,7 @@ class Keeper:
         self.session = session
         self.folder = Path(folder) if folder is not None else Path()
         self._recorder: Recorder | None = None
+        self._sound: FilmSound | None = None
         self._begun = 0.0
 
     @property
@@ -56,35 +58,65 @@ class Keeper:
             self._finish()
             return
         path = self._name("-film", ".mp4")
+        sound = self._heard()
         try:
-            self._recorder = Recorder(path, self.session.size, rate=RATE)
+            self._recorder = Recorder(path, self.session.size, rate=RATE, audio=sound)
         except (OSError, FbaError, ValueError) as error:
+            if sound is not None:
+                sound.close()
             self.session.say(f"No film can be recorded: {error}", "error", 8.0)
             return
+        self._sound = sound
         self._begun = self.session.clock()
         self.session.recording = 0.0
 
-    def picture(self, read: Callable[[], UInt8]) -> None:
-        """A picture was drawn; `read` gives it, uint8 (H, W, 4), and is called only if it is needed."""
+    def moment(self) -> None:
+        """The next picture shows where the transport is now."""
         if self._recorder is None:
             return
-        seconds = self.session.clock() - self._begun
-        self.session.recording = seconds
-        if not self._recorder.wants(seconds):
+        self.session.recording = self.session.clock() - self._begun
+        if self._sound is not None:
+            self._sound.advance(self.session.recording)
+
+    def picture(self, read: Callable[[], UInt8]) -> None:
+        """The picture of the last `moment` is there; `read` gives it, uint8 (H, W, 4), where it is needed."""
+        seconds = self.session.recording
+        if self._recorder is None or seconds is None or not self._recorder.wants(seconds):
             return
         try:
             self._recorder.add(read(), seconds, wait=False)
         except (OSError, FbaError) as error:
-            self._recorder, self.session.recording = None, None
+            self._recorder = self._sound = self.session.recording = None
             self.session.say(f"The film was given up: {error}", "error", 8.0)
 
     def close(self) -> Path | None:
         """Finish a film that is still being made; raises what went wrong, as nobody can be told later."""
         if self._recorder is None:
             return None
-        recorder, self._recorder = self._recorder, None
-        self.session.recording = None
+        recorder, sound = self._recorder, self._sound
+        self._recorder = self._sound = self.session.recording = None
+        if sound is not None:
+            sound.advance(self.session.clock() - self._begun)
+            sound.end()
         return recorder.close()
+
+    def _heard(self) -> FilmSound | None:
+        """The sound of the film that begins; None where there is none, which the user is told if need be."""
+        session = self.session
+        if session.sound is None:
+            return None
+        if session.audio is not None and session.audio.muted:
+            session.say("The sound is off: the film is silent until it is on (V)", "warning")
+        try:
+            return FilmSound(
+                session.sound,
+                session.transport,
+                offset=lambda: session.sound_offset,
+                muted=lambda: session.audio is not None and session.audio.muted,
+            )
+        except (OSError, FbaError) as error:
+            session.say(f"The film is silent: {error}", "warning", 8.0)
+            return None
 
     def _finish(self) -> None:
         try:

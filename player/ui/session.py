@@ -5,6 +5,7 @@ Panels read and change this; it knows no imgui and no OpenGL.
 
 from __future__ import annotations
 
+import os
 import time as wall
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 Faps = npt.NDArray[np.float32]
 Baps = npt.NDArray[np.float64]
+PathLike = str | os.PathLike[str]
 Hook = Callable[[Faps, Baps], None]
 
 NOTICE_SECONDS = 4.0
@@ -72,6 +74,8 @@ class Session:
 
     wishes: what the window is to do after this picture; see `wish`. recording: seconds recorded so far,
     None where nothing is being recorded. values: faps and baps of the last picture, after the hooks.
+    sound: the file that belongs to what is played, whether a device makes it heard (audio) or not; it begins
+    sound_offset seconds after the first frame, see `shift_sound`.
     rolling: names of what changes the picture by itself, or counts on being drawn.
     """
 
@@ -102,6 +106,8 @@ class Session:
         self.recording: float | None = None
         self.rolling: set[str] = set()
         self.audio: Audio | None = None
+        self.sound: PathLike | None = None
+        self.sound_offset = 0.0
         self.values: tuple[Faps, Baps] = (np.zeros(68, np.float32), np.zeros(296))
         self.clock = clock
         self.last_input = clock()
@@ -147,6 +153,12 @@ class Session:
         filming = self.recording is not None
         moving = self.transport.playing or self.viewpoint.gliding
         return moving or bool(self.rolling) or filming or leaving
+
+    def shift_sound(self, seconds: float) -> None:
+        """Let the sound begin this much later than now, or earlier where negative."""
+        self.sound_offset = round(self.sound_offset + seconds, 6)
+        if self.audio is not None:
+            self.audio.offset = self.sound_offset
 
     def view(self, time: float) -> View:
         """What is drawn at a time, after `before_frame`."""
