@@ -28,7 +28,7 @@ from fba.formats import merge, read
 moderngl = pytest.importorskip("moderngl")
 FRAMES = 90
 GL = {
-    "VertexArray": ("render",),
+    "VertexArray": ("render", "transform"),
     "Buffer": ("write", "orphan"),
     "Framebuffer": ("use", "clear", "read_into"),
     "Texture": ("use", "write"),

@@ -64,6 +64,7 @@ MOST = 8
 @options.camera_option
 @options.view_option
 @options.show_option
+@options.deform_option
 @options.axes_option
 @options.bap_steps_option
 @options.salvage_option

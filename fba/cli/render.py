@@ -111,6 +111,7 @@ class SheetType(click.ParamType[str | int]):
 @options.camera_option
 @options.view_option
 @options.show_option
+@options.deform_option
 @options.axes_option
 @options.bap_steps_option
 @options.salvage_option
