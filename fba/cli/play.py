@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from fba.cli import options
+from fba.cli import options, scene_options
+from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
     from player.showable import Showable
-
-MOST = 8
-"""Files in one window."""
 
 
 @click.command(
@@ -27,27 +24,13 @@ MOST = 8
         "fba play --model face.glb",
     )
 )
-@click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")
+@scene_options.files_argument
 @click.option(
     "--compare",
     is_flag=True,
     help="Two files or more: the others as drawings over the first, and by how much each parameter differs.",
 )
-@click.option(
-    "--arrange",
-    type=click.Choice(["side", "over"]),
-    help="Several files: side by side (default), or over each other (default with --compare).",
-)
-@options.model_option
-@options.body_option
-@click.option(
-    "--audio",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Sound from the first frame on. Default: the WAV of the same name beside the file.",
-)
-@click.option("--no-audio", is_flag=True, help="No sound.")
-@options.fps_option("Frame rate of a file without a header.")
+@scene_options.sound_options()
 @click.option(
     "--speed", type=click.FloatRange(0.1, 4.0), default=1.0, show_default=True, help="1: as recorded."
 )
@@ -61,34 +44,21 @@ MOST = 8
     help="Smooth motion between frames, or frame by frame.",
 )
 @click.option("--size", type=options.SizeType(), default="1280x720", show_default=True, metavar="WxH")
-@options.camera_option
-@options.view_option
-@options.show_option
-@options.deform_option
-@options.axes_option
-@options.bap_steps_option
-@options.salvage_option
+@scene_options.scene_options(
+    fps="Frame rate of a file without a header.",
+    arrange="Several files: side by side (default), or over each other (default with --compare).",
+)
 def command(
     files: tuple[Path, ...],
     compare: bool,
-    arrange: str | None,
-    model: Path | None,
-    body: Path | None,
-    audio: Path | None,
-    no_audio: bool,
-    fps: Fraction | None,
+    sound: SoundOptions,
     speed: float,
     loop: bool,
     start: float | None,
     paused: bool,
     interpolate: bool,
     size: tuple[int, int],
-    camera: str | None,
-    view: str,
-    shows: tuple[tuple[str, object], ...],
-    axes: str,
-    bap_steps: str,
-    salvage: bool,
+    how: SceneOptions,
 ) -> None:
     """Play files in a window: space plays and pauses, arrows step, F1 shows all keys.
 
@@ -96,57 +66,51 @@ def command(
     shown together. Without a file, --model or --body opens a neutral figure with sliders to move it by hand.
     Without a display, use `fba render`.
     """
+    if len(files) < 2 and compare:
+        one = f"; {files[0]} is one" if files else ""
+        raise click.UsageError(f"--compare needs two files or more{one}")
+    check_files(files, how, sound, "window")
+    if [str(file) for file in files].count("-") > 1:
+        raise click.UsageError("standard input (-) can be shown once")
     if not files:
-        if model is None and body is None:
+        if sound.audio is not None:
+            raise click.UsageError("--audio goes with a file to play")
+        if how.model is None and how.body is None:
             raise click.UsageError("give a file to play, or a --model or --body to move by hand")
-        _check(files, compare=compare, arrange=arrange, audio=audio, no_audio=no_audio)
-        _puppet(model, body, axes=axes, view=view, shows=shows, size=size, camera=camera)
+        _puppet(how, size)
         return
-    _check(files, compare=compare, arrange=arrange, audio=audio, no_audio=no_audio)
     import player
     from fba.cli import showing
 
-    sound = audio
-    if sound is not None:
-        from player.sound import check
-
-        check(sound)
-    elif not no_audio:
-        sound = showing.voice(files)
-    face, figure = options.read_model(model), showing.read_body(body)
+    voice = showing.voice(files, sound, "played without sound")
     streams = []
     try:
-        scenes = []
+        opened = []
         for file in files:
-            animation, growing = showing.opened(file, bap_steps=bap_steps, fps=fps, salvage=salvage)
-            if growing:
-                streams.append(animation)
-            scenes.append(showing.scene_of(animation, growing, model=face, body=figure, axes=axes, view=view))
+            opened.append(showing.opened(file, how))
+            if opened[-1][1]:
+                streams.append(opened[-1][0])
         names = [
-            scene.title if str(file) == "-" else file.name for scene, file in zip(scenes, files, strict=True)
+            animation.name if str(file) == "-" else file.name
+            for file, (animation, _) in zip(files, opened, strict=True)
         ]
-        scene: Any = scenes[0]
-        if len(scenes) > 1:
-            from player.compare import CompareScene
-
-            scene = CompareScene(scenes, arrangement=arrange or ("over" if compare else "side"), names=names)
-        for switch, state in shows:
-            scene.show(switch, state)
+        scene = showing.scene(opened, names, how, over=compare)
         _check_start(scene, start, growing=bool(streams))
-        one = len(files) == 1 and not streams and str(files[0]) != "-" and not showing.is_pipe(files[0])
+        single = len(files) == 1 and not streams and str(files[0]) != "-" and not showing.is_pipe(files[0])
         player.play(
             scene,
             title=" | ".join(names),
             size=size,
-            camera=camera,
+            camera=how.camera,
             loop=loop,
             speed=speed,
             start=start,
             paused=paused,
             interpolate=interpolate,
-            audio=sound,
-            file=files[0] if one else None,
-            bap_steps=bap_steps,
+            audio=voice,
+            audio_offset=sound.audio_offset,
+            file=files[0] if single else None,
+            bap_steps=how.bap_steps,
             panels=("differences",) if compare else (),
         )
     finally:
@@ -156,44 +120,15 @@ def command(
             stream.close()  # type: ignore[union-attr]
 
 
-def _puppet(
-    model: Path | None, body: Path | None, *, shows: tuple[tuple[str, object], ...], **how: Any
-) -> None:
+def _puppet(how: SceneOptions, size: tuple[int, int]) -> None:
     """A window with a neutral figure and the sliders that move it."""
     import player
     from fba.cli import showing
     from player.performing import neutral
 
-    face, figure = options.read_model(model), showing.read_body(body)
-    scene = showing.scene_of(
-        neutral(body=body is not None),
-        False,
-        model=face,
-        body=figure,
-        axes=how.pop("axes"),
-        view=how.pop("view"),
-    )
-    for switch, state in shows:
-        scene.show(switch, state)
-    title = " ".join(file.name for file in (model, body) if file is not None)
-    player.play(scene, title=title, loop=True, paused=True, panels=("puppet",), **how)
-
-
-def _check(
-    files: tuple[Path, ...], *, compare: bool, arrange: str | None, audio: Path | None, no_audio: bool
-) -> None:
-    """Raises click.UsageError for options that contradict each other or the files."""
-    if audio is not None and no_audio:
-        raise click.UsageError("--audio and --no-audio contradict each other")
-    if len(files) < 2 and (compare or arrange):
-        option = "--compare" if compare else "--arrange"
-        raise click.UsageError(f"{option} needs two files or more{f'; {files[0]} is one' if files else ''}")
-    if not files and audio is not None:
-        raise click.UsageError("--audio goes with a file to play")
-    if len(files) > MOST:
-        raise click.UsageError(f"{len(files)} files are too many for one window; at most {MOST}")
-    if [str(file) for file in files].count("-") > 1:
-        raise click.UsageError("standard input (-) can be shown once")
+    title = " ".join(file.name for file in (how.model, how.body) if file is not None)
+    scene = showing.scene([(neutral(body=how.body is not None), False)], [title], how)
+    player.play(scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",))
 
 
 def _check_start(scene: Showable, start: float | None, *, growing: bool) -> None:

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli import options
-from fba.errors import FbaWarning, FormatError
+from fba.cli import options, scene_options
+from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
-    from fba.animation import Animation
     from player.showable import Showable
 
-MOST = 8
-"""Files in one picture."""
 SHEETS = ("faps", "visemes", "expressions", "all")
 
 
@@ -48,7 +43,7 @@ class SheetType(click.ParamType[str | int]):
         "fba render --contact-sheet expressions -o expressions.png",
     )
 )
-@click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")
+@scene_options.files_argument
 @click.option(
     "-o",
     "--output",
@@ -86,35 +81,18 @@ class SheetType(click.ParamType[str | int]):
     help="With a file: N of its frames, at even distances, on one sheet. Without: all FAPs, visemes or "
     "expressions. --size is that of one picture.",
 )
-@options.model_option
-@options.body_option
-@click.option(
-    "--arrange",
-    type=click.Choice(["side", "over"]),
-    help="Several files: side by side (default), or the others as drawings over the first.",
-)
 @click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
-@options.fps_option("Frame rate of the film; default: the input's own, or a part of it.")
 @click.option("--frame", type=int, help="For a picture: which frame; -1 is the last.")
 @click.option("--time", type=float, metavar="SECONDS", help="For a picture: at what time.")
 @click.option("--start", type=float, metavar="SECONDS", help="For a film or a sheet: from when.")
 @click.option("--end", type=float, metavar="SECONDS", help="For a film or a sheet: until when.")
-@click.option(
-    "--audio",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="For an MP4: its sound. Default: the WAV of the same name beside the file, where there is one.",
-)
-@click.option("--no-audio", is_flag=True, help="For an MP4: no sound.")
+@scene_options.sound_options("Sound of an MP4,")
 @click.option("--transparent", is_flag=True, help="PNG without a background.")
 @click.option("--replace", is_flag=True, help="Numbered pictures that exist are overwritten.")
-@options.camera_option
-@options.view_option
-@options.show_option
-@options.deform_option
-@options.axes_option
-@options.bap_steps_option
-@options.salvage_option
+@scene_options.scene_options(
+    fps="Frame rate of the film; default: the input's own, or a part of it.",
+    arrange="Several files: side by side (default), or the others as drawings over the first.",
+)
 def command(
     files: tuple[Path, ...],
     output: str,
@@ -122,25 +100,15 @@ def command(
     visemes: tuple[str, ...],
     expressions: tuple[str, ...],
     sheet: str | int | None,
-    model: Path | None,
-    body: Path | None,
-    arrange: str | None,
     size: tuple[int, int] | None,
-    fps: Fraction | None,
     frame: int | None,
     time: float | None,
     start: float | None,
     end: float | None,
-    audio: Path | None,
-    no_audio: bool,
+    sound: SoundOptions,
     transparent: bool,
     replace: bool,
-    camera: str | None,
-    view: str,
-    shows: tuple[tuple[str, object], ...],
-    axes: str,
-    bap_steps: str,
-    salvage: bool,
+    how: SceneOptions,
 ) -> None:
     """Render files, or a face in a given pose, to a picture, numbered pictures, or a film (MP4 or GIF).
 
@@ -157,25 +125,19 @@ def command(
         raise click.UsageError(f"--contact-sheet {sheet} shows frames of a file: give one")
     if not files and not given:
         raise click.UsageError("give a file, or a face by --fap, --viseme, --expression or --contact-sheet")
-    moments = {"--frame": frame, "--time": time, "--start": start, "--end": end, "--fps": fps}
-    for name, value in (*moments.items(), ("--audio", audio)):
+    moments = {"--frame": frame, "--time": time, "--start": start, "--end": end, "--fps": how.fps}
+    for name, value in (*moments.items(), ("--audio", sound.audio)):
         if not files and value is not None:
             raise click.UsageError(f"{name} goes with a file; {given[0]} makes a single picture")
-    if len(files) > MOST or (arrange is not None and len(files) < 2):
-        raise click.UsageError(
-            f"{len(files)} files are too many for one picture; at most {MOST}"
-            if len(files) > MOST
-            else "--arrange goes with several files"
-        )
-    film = is_film(output)
-    if audio is not None and (no_audio or not output.lower().endswith(".mp4")):
-        raise click.UsageError(
-            "--audio and --no-audio contradict each other" if no_audio else "--audio goes into an .mp4 alone"
-        )
+    check_files(files, how, sound, "picture")
+    film, mp4 = is_film(output), output.lower().endswith(".mp4")
+    if not mp4 and (sound.audio is not None or sound.audio_offset):
+        name = "--audio" if sound.audio is not None else "--audio-offset"
+        raise click.UsageError(f"{name} goes into an .mp4 alone")
     if isinstance(sheet, str):
-        if given != ["--contact-sheet"] or camera is not None or view != "figure" or shows:
+        if given != ["--contact-sheet"] or how.camera is not None or how.view != "figure" or how.shows:
             raise click.UsageError("--contact-sheet has poses and cameras of its own; leave the others out")
-        _kinds_sheet(sheet, Path(output), model, size)
+        _kinds_sheet(sheet, Path(output), how.model, size)
         return
     if sheet is not None and (film or transparent or frame is not None or time is not None):
         raise click.UsageError(
@@ -183,38 +145,39 @@ def command(
         )
     if not files and film:
         raise click.UsageError("a face in one pose is a picture: write it to a .png")
+    from fba.cli import showing
     from fba.cli.still import still
     from player.recording import render
 
     animations = [
-        options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage) for file in files
+        options.read_input(file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage)
+        for file in files
     ] or [still(faps, visemes, expressions)]
-    scene = _scene(animations, files, arrange or "side", model=model, body=body, axes=axes, view=view)
-    for switch, on in shows:
-        scene.show(switch, on)
+    names = [file.name for file in files] or [""]
+    scene = showing.scene([(animation, False) for animation in animations], names, how)
     if sheet is not None:
-        _frames_sheet(scene, sheet, Path(output), tile=size, camera=camera, start=start, end=end)
+        _frames_sheet(scene, sheet, Path(output), tile=size, camera=how.camera, start=start, end=end)
         return
-    if audio is None and not no_audio and output.lower().endswith(".mp4"):
-        audio = _voice(files)
+    audio = showing.voice(files, sound, "the film has no sound") if mp4 else None
     with options.progress("rendering", None) as step, options.usage_errors():
         written = render(
             scene,
             output,
             size=size,
-            fps=fps if film else None,
-            camera=camera,
+            fps=how.fps if film else None,
+            camera=how.camera,
             frame=frame,
             time=time,
             start=start,
             end=end,
             audio=audio,
+            audio_offset=sound.audio_offset,
             transparent=transparent,
             replace=replace,
             progress=step.of,
         )
-    sound = f", with the sound of {audio}" if audio is not None else ""
-    click.echo(f"{written}: {_size(size, output)}{sound}")
+    heard = f", with the sound of {audio}" if audio is not None else ""
+    click.echo(f"{written}: {_size(size, output)}{heard}")
 
 
 def _size(size: tuple[int, int] | None, output: str) -> str:
@@ -222,45 +185,6 @@ def _size(size: tuple[int, int] | None, output: str) -> str:
 
     width, height = picture_size(size, output)
     return f"{width}x{height}"
-
-
-def _scene(
-    animations: list[Animation],
-    files: tuple[Path, ...],
-    arrange: str,
-    *,
-    model: Path | None,
-    body: Path | None,
-    **how: Any,
-) -> Any:
-    """One scene, or several in one."""
-    from player.scene import Scene
-
-    face, figure = options.read_model(model), None
-    if body is not None:
-        from fba.body.model import BodyModel
-
-        figure = BodyModel.load(body)
-    scenes = [Scene(animation, face, body=figure, **how) for animation in animations]
-    if len(scenes) == 1:
-        return scenes[0]
-    from player.compare import CompareScene
-
-    return CompareScene(scenes, arrangement=arrange, names=[file.name for file in files])
-
-
-def _voice(files: tuple[Path, ...]) -> Path | None:
-    """The sound beside the first of the files that has one, where it can be read."""
-    from player.sound import beside, check
-
-    found = next((voice for voice in map(beside, files) if voice is not None), None)
-    if found is not None:
-        try:
-            check(found)
-        except FormatError as error:
-            warnings.warn(f"the film has no sound: {error}", FbaWarning, stacklevel=2)
-            return None
-    return found
 
 
 def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> None:

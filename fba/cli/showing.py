@@ -1,4 +1,4 @@
-"""What `fba play` shows: files, and streams that are still arriving."""
+"""What `fba play` and `fba render` show: files, and streams that are still arriving."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import tempfile
 import warnings
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import click
 
 from fba.animation import Animation
 from fba.cli import options
+from fba.cli.scene_options import SceneOptions, SoundOptions
 from fba.errors import FbaError, FbaWarning, FormatError
 
 if TYPE_CHECKING:
@@ -28,14 +29,17 @@ STREAMS = (b"\0\0\1\xba", b"\0\0\1\x01", b"\0\0\1\xb0", b"\0\0\1\xb5")
 """How an FBA stream begins: the object, or the layers around it."""
 
 
-def opened(
-    file: Path, *, bap_steps: str, fps: Fraction | None, salvage: bool
-) -> tuple[Animation | LiveAnimation, bool]:
+Shown = tuple["Animation | LiveAnimation", bool]
+"""What a file holds, and whether it is a stream that grows."""
+
+
+def opened(file: Path, how: SceneOptions) -> Shown:
     """A file's animation; of an FBA stream on standard input or in a FIFO, one that grows. And whether it is.
 
     What arrives in another format is read to its end first. Raises click.UsageError where standard input is a
     terminal, what `options.read_input` raises, and what `LiveAnimation.wait` raises.
     """
+    bap_steps, fps, salvage = how.bap_steps, how.fps, how.salvage
     name = "standard input" if str(file) == "-" else file.name
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- is standard input, which is the keyboard here: pipe a stream into it")
@@ -67,33 +71,40 @@ def is_pipe(file: Path) -> bool:
     return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
 
 
-def scene_of(
-    animation: Animation | LiveAnimation,
-    growing: bool,
-    *,
-    model: FaceModel | None,
-    body: BodyModel | None,
-    axes: str,
-    view: str,
-) -> Scene:
-    """A scene of what `opened` gave."""
-    from player.scene import Scene
+def scene(shown: list[Shown], names: list[str], how: SceneOptions, *, over: bool = False) -> Any:
+    """One scene of what `opened` gave, or several in one. over: over each other, but for `--arrange`."""
+    face, figure = options.read_model(how.model), _body(how.body)
+    scenes = [_scene_of(animation, growing, face, figure, how) for animation, growing in shown]
+    found: Any = scenes[0]
+    if len(scenes) > 1:
+        from player.compare import CompareScene
 
-    if not growing:
-        return Scene(animation, model, body=body, axes=axes, view=view)  # type: ignore[arg-type]
-    from fba.face.model import FaceModel
-    from player.live import LiveTimeline
-
-    face = model or FaceModel.default()
-    timeline = LiveTimeline(animation, face)  # type: ignore[arg-type]
-    return Scene(animation, face, body=body, axes=axes, view=view, timeline=timeline)  # type: ignore[arg-type]
+        found = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
+    for switch, state in how.shows:
+        found.show(switch, state)
+    return found
 
 
-def voice(files: tuple[Path, ...]) -> Path | None:
-    """The sound that lies beside one of the files, the first that has one and can be read."""
-    from player.audio import beside
-    from player.sound import check
+def voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+    """The sound that is asked for, or that lies beside the first of the files that has one which can be read.
 
+    without: what is said of those that cannot. Raises FormatError where what was asked for cannot be read,
+    click.UsageError for an offset of no sound.
+    """
+    found = _voice(files, sound, without)
+    if found is None and sound.audio_offset:
+        raise click.UsageError("--audio-offset moves a sound, and there is none: give one with --audio")
+    return found
+
+
+def _voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+    from player.sound import beside, check
+
+    if sound.audio is not None:
+        check(sound.audio)
+        return sound.audio
+    if sound.no_audio:
+        return None
     for file in files:
         found = None if str(file) == "-" or is_pipe(file) else beside(file)
         if found is None:
@@ -101,13 +112,33 @@ def voice(files: tuple[Path, ...]) -> Path | None:
         try:
             check(found)
         except FormatError as error:
-            warnings.warn(f"played without sound: {error}", FbaWarning, stacklevel=2)
+            warnings.warn(f"{without}: {error}", FbaWarning, stacklevel=3)
             continue
         return found
     return None
 
 
-def read_body(path: Path | None) -> BodyModel | None:
+def _scene_of(
+    animation: Animation | LiveAnimation,
+    growing: bool,
+    model: FaceModel | None,
+    body: BodyModel | None,
+    how: SceneOptions,
+) -> Scene:
+    from player.scene import Scene
+
+    given: dict[str, Any] = {"body": body, "axes": how.axes, "view": how.view}
+    if not growing:
+        return Scene(animation, model, **given)  # type: ignore[arg-type]
+    from fba.face.model import FaceModel
+    from player.live import LiveTimeline
+
+    face = model or FaceModel.default()
+    timeline = LiveTimeline(animation, face)  # type: ignore[arg-type]
+    return Scene(animation, face, timeline=timeline, **given)  # type: ignore[arg-type]
+
+
+def _body(path: Path | None) -> BodyModel | None:
     """The body of `--body`, or None for the built-in one."""
     if path is None:
         return None

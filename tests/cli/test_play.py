@@ -73,7 +73,8 @@ def test_a_file_is_played(run: Run, window: Window, talk: Path) -> None:
     assert window.scene.timeline.frames == 50
     assert window.options == {
         "title": "talk.fba", "size": (1280, 720), "camera": None, "loop": False, "speed": 1.0, "start": None,
-        "paused": False, "interpolate": True, "audio": None, "file": talk, "bap_steps": "iso", "panels": (),
+        "paused": False, "interpolate": True, "audio": None, "audio_offset": 0.0, "file": talk,
+        "bap_steps": "iso", "panels": (),
     }  # fmt: skip
 
 
@@ -92,6 +93,8 @@ def test_the_sound_beside_it_is_found(run: Run, window: Window, talk: Path, tmp_
     sound = write_wav(tmp_path / "talk.wav")
     assert run("play", talk).code == 0
     assert window.options["audio"] == sound
+    assert run("play", talk, "--audio-offset", "-0.25").code == 0
+    assert (window.options["audio"], window.options["audio_offset"]) == (sound, -0.25)
     assert run("play", talk, "--no-audio").code == 0
     assert window.options["audio"] is None
     other = write_wav(tmp_path / "other.wav")

@@ -241,6 +241,23 @@ def test_the_sound_beside_a_file_goes_along(run: Run, clip: Path, tmp_path: Path
 
 
 @pytest.mark.usefixtures("opengl")
+@pytest.mark.parametrize("offset", [0.12, -0.08])
+def test_the_sound_begins_later_or_earlier(run: Run, clip: Path, tmp_path: Path, offset: float) -> None:
+    av = pytest.importorskip("av")
+    silence = np.zeros(16000, "<i2")
+    silence[1600:1632] = 30000  # a click at 0.1 s
+    with wave.open(str(clip.with_suffix(".wav")), "wb") as file:
+        file.setparams((1, 2, 16000, 0, "NONE", ""))
+        file.writeframes(silence.tobytes())
+    path = tmp_path / "film.mp4"
+    assert run("render", clip, "-o", path, "--audio-offset", str(offset), *SMALL).code == 0
+    with av.open(str(path)) as film:
+        samples = np.concatenate([frame.to_ndarray()[0] for frame in film.decode(audio=0)])
+    loud = np.abs(samples)
+    assert np.argmax(loud > loud.max() / 2) / 16000 == pytest.approx(0.1 + offset, abs=0.006)
+
+
+@pytest.mark.usefixtures("opengl")
 def test_sound_that_cannot_be_read(run: Run, clip: Path, tmp_path: Path) -> None:
     broken = clip.with_suffix(".wav")
     broken.write_bytes(b"no sound")
@@ -305,10 +322,13 @@ def test_several_files_stand_in_one_picture(run: Run, clip: Path, tmp_path: Path
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("-o", "a.png", "--arrange", "over"), "--arrange goes with several files"),
+        (("-o", "a.png", "--arrange", "over"), "--arrange needs two files or more"),
         (("-o", "a.png", *["clip.fba"] * 8), "9 files are too many"),
         (("-o", "a.mp4", "--audio", "clip.fba", "--no-audio"), "contradict"),
         (("-o", "a.gif", "--audio", "clip.fba"), "--audio goes into an .mp4"),
+        (("-o", "a.png", "--audio-offset", "0.1"), "--audio-offset goes into an .mp4"),
+        (("-o", "a.mp4", "--audio-offset", "0.1"), "there is none: give one with --audio"),
+        (("-o", "a.mp4", "--audio-offset", "nan"), "nan is not a number of seconds"),
         (("-o", "a.png", "--contact-sheet", "0"), "neither a number of frames nor one of 'faps'"),
         (("-o", "a.png", "--contact-sheet", "faps"), "--contact-sheet faps makes a picture without a file"),
         (("-o", "a.mp4", "--contact-sheet", "3"), "makes one picture"),
