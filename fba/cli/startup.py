@@ -14,17 +14,34 @@ WITHOUT = {"numba.np.arraymath": "scipy.linalg", "numba.core.typing.cffi_utils":
 """Modules of numba, and what each imports in vain: for one function of statistics (cov), and for what a C
 compiler made. Both do without where it is missing; no loop here needs it, and each takes a tenth of a second
 to import."""
-MANY = 20_000
-"""Objects that the garbage collector lets pass before it looks for cycles; Python's own 700 is for programs
-that do not import a hundred thousand."""
+MANY, OFTEN = 20_000, 15
+"""Objects that the garbage collector lets pass before it looks for cycles, and how often it does not look
+at all: what a start makes stays anyway. Python's own 700 is for programs that import less."""
 
 
 def hasten() -> None:
     """Prepare this process for one command: call it before anything large is imported."""
-    gc.set_threshold(MANY, *gc.get_threshold()[1:])
+    _let_pass()
     # At the end, Python looks through all objects for cycles, several times, although the memory goes anyway.
     atexit.register(gc.freeze)
     sys.meta_path.insert(0, _Finder())
+
+
+def _let_pass() -> None:
+    usual, passed = gc.get_threshold(), 0
+
+    def freeze(phase: str, _about: object) -> None:
+        nonlocal passed
+        if phase != "start":
+            return
+        gc.freeze()  # takes no time, and leaves nothing to look at
+        passed += 1
+        if passed == OFTEN:
+            gc.callbacks.remove(freeze)
+            gc.set_threshold(*usual)
+
+    gc.callbacks.append(freeze)
+    gc.set_threshold(MANY, *usual[1:])
 
 
 class _Finder:

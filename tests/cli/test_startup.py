@@ -22,6 +22,22 @@ import scipy.linalg
 print(scipy.linalg.det([[2.0, 0.0], [0.0, 3.0]]))
 """
 
+COLLECTED = """
+import gc, weakref
+from fba.cli import startup
+usual = gc.get_threshold()
+startup.hasten()
+print(gc.get_threshold() == usual)
+kept = [[] for _ in range(startup.MANY * (startup.OFTEN + 1))]
+print(gc.get_threshold() == usual, gc.callbacks)
+class Cycle: pass
+cycle = Cycle()
+cycle.itself, gone = cycle, weakref.ref(cycle)
+del cycle
+kept += [[] for _ in range(2 * usual[0])]
+print(gone() is None)
+"""
+
 MAIN = """
 import gc, sys
 from fba.cli import main
@@ -46,3 +62,7 @@ def test_numba_comes_without_what_no_loop_needs() -> None:
 
 def test_a_process_that_calls_main_stays_as_it_is() -> None:
     assert ran(MAIN)[-1] == "True"
+
+
+def test_after_the_start_garbage_is_collected_as_ever() -> None:
+    assert ran(COLLECTED) == ["False", "True", "[]", "True"]
