@@ -33,12 +33,17 @@ FINEST = 1_000_000
 
 @dataclass(frozen=True)
 class Arrived:
-    """All frames that were there at one moment; the fields of `fba.Animation`."""
+    """All frames that were there at one moment: the fields of `fba.Animation`, and what their planes take.
+
+    plane_bits: int64 (T,). plane_intra: bool (T,).
+    """
 
     rate: Fraction
     index: npt.NDArray[np.int64]
     face: FaceTrack | None
     body: BodyTrack | None
+    plane_bits: npt.NDArray[np.int64]
+    plane_intra: npt.NDArray[np.bool_]
 
 
 class GrowingFrames:
@@ -48,12 +53,15 @@ class GrowingFrames:
     """
 
     def __init__(self) -> None:
-        self.now = Arrived(Fraction(25), np.zeros(0, dtype=np.int64), None, None)
+        none = np.zeros(0, dtype=np.int64)
+        self.now = Arrived(Fraction(25), none, None, None, none, np.zeros(0, dtype=np.bool_))
         self.left_out = ""
         self._count = 0
         self._room = FIRST_ROOM
         self._rate: Fraction | None = None
         self._index: npt.NDArray[np.int64] = np.zeros(self._room, dtype=np.int64)
+        self._bits: npt.NDArray[np.int64] = np.zeros(self._room, dtype=np.int64)
+        self._intra: npt.NDArray[np.bool_] = np.zeros(self._room, dtype=np.bool_)
         self._face: Rows | None = None
         self._body: Rows | None = None
         self._settled = False
@@ -74,6 +82,8 @@ class GrowingFrames:
         self._make_room(self._count + count)
         new = slice(self._count, self._count + count)
         self._index[new] = self._indices(block)
+        self._bits[new] = np.diff(block.borders)
+        self._intra[new] = block.settings.intra
         for rows, track in ((self._face, block.face), (self._body, block.body)):
             if rows is not None and track is not None:
                 for name, row in rows.items():
@@ -83,8 +93,9 @@ class GrowingFrames:
         self._count += count
         assert self._rate is not None
         self.now = Arrived(
-            self._rate, _seen(self._index, self._count), self._face_track(), self._body_track()
-        )
+            self._rate, _seen(self._index, self._count), self._face_track(), self._body_track(),
+            _seen(self._bits, self._count), _seen(self._intra, self._count),
+        )  # fmt: skip
 
     def _wanted(self, what: str) -> bool:
         if self._settled:
@@ -106,7 +117,9 @@ class GrowingFrames:
         if need <= self._room:
             return
         self._room = max(need, int(self._room * GROWTH))
-        self._index = _larger(self._index, self._room)
+        self._index, self._bits, self._intra = (
+            _larger(one, self._room) for one in (self._index, self._bits, self._intra)
+        )
         for part in (self._face, self._body):
             if part is not None:
                 for name, rows in part.items():

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba.codec import Decoder
+from fba.codec import Decoder, StreamInfo
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
 from player.growing import GrowingFrames
@@ -60,6 +60,8 @@ class LiveAnimation:
         self.message = ""
         self.details = ""
         self.growing = True
+        self.received = 0
+        """Bytes that have arrived."""
         self._source = source
         self._at_end = at_end
         self._decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
@@ -109,6 +111,26 @@ class LiveAnimation:
 
     # ---- a stream
 
+    def info(self) -> StreamInfo:
+        """What has arrived: planes, their bits, the bit rate. Of no parameters."""
+        now, size = self._frames.now, self.received
+        first, last = (int(now.index[0]), int(now.index[-1])) if len(now.index) else (0, -1)
+        return StreamInfo(
+            format="fba",
+            size=size,
+            rate=now.rate,
+            frames=len(now.index),
+            duration=Fraction(last - first + 1) / now.rate,
+            start=first / now.rate,
+            skipped=last - first + 1 - len(now.index),
+            face=None,
+            body=None,
+            intra_planes=int(now.plane_intra.sum()),
+            plane_bits=now.plane_bits,
+            plane_intra=now.plane_intra,
+            frame_index=now.index,
+        )
+
     @property
     def arrived(self) -> int:
         """Changes with every frame, and at the end."""
@@ -148,6 +170,7 @@ class LiveAnimation:
         try:
             chunk = head or self._source.read1(CHUNK)
             while chunk and not self._closing:
+                self.received += len(chunk)
                 self._take(self._decoder.push_blocks(chunk))
                 chunk = self._source.read1(CHUNK)
             if not self._closing:

@@ -85,7 +85,7 @@ def sound_options(kind: str = "Sound") -> Callable[[Command], Command]:
             metavar="FILE",
             help=f"{kind} from the first frame on. Default: the WAV of the same name beside the file.",
         ),
-        click.option("--no-audio", is_flag=True, help="Without it."),
+        click.option("--no-audio", is_flag=True, help="No sound."),
         click.option(
             "--audio-offset",
             type=float,

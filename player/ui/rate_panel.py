@@ -87,7 +87,7 @@ class RatePanel(Panel):
             return None, "Reading..."
         animation = getattr(session.scene, "animation", None)
         if not isinstance(animation, Animation):
-            return None, "The planes of what is still arriving are not counted."
+            return None, "There are no planes."
         if self._would is None or self._would[0] is not animation:
             result: list[StreamInfo | None] = []
             self._would = (animation, result)

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import os
 import threading
+import time as wall
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fba.animation import Animation
 from fba.errors import FbaError
+from player.ui.trace import trace_of_motion, trace_of_planes
 
 if TYPE_CHECKING:
     from fba.codec import StreamInfo
     from player.showable import Showable
     from player.ui.trace import Trace
+
+REFRESH = 0.2
+"""Seconds between looks at what has arrived of a stream."""
 
 
 class Source:
@@ -38,6 +44,11 @@ class Source:
         self._probed: StreamInfo | None = None
         self._own: StreamInfo | None = None
         self._of = ("animation", 0)
+        animation = getattr(scene, "animation", None)
+        several = hasattr(scene, "scenes")
+        self._live: Callable[[], StreamInfo] | None = None if several else getattr(animation, "info", None)
+        self._told = -REFRESH
+        self._traced: StreamInfo | None = None
         self._trace: Trace | None = None
         self._thread: threading.Thread | None = None
 
@@ -51,9 +62,12 @@ class Source:
         """What it holds; the same object until something changes."""
         if self._probed is not None:
             return self._probed
-        frames = self._scene.timeline.frames
-        if self._own is None or self._own.frames != frames:
-            self._own = self._of_scene()
+        own, timeline, now = self._own, self._scene.timeline, wall.monotonic()
+        if own is None or own.frames != timeline.frames:
+            growing = bool(getattr(timeline, "growing", False))
+            if own is None or not growing or now - self._told >= REFRESH:
+                self._own, self._told = self._of_scene(), now
+        assert self._own is not None
         return self._own
 
     def look(self, *, wait: bool = False) -> None:
@@ -73,11 +87,16 @@ class Source:
     @property
     def trace(self) -> Trace | None:
         """What is behind the timeline, once `look` has found it: the planes' bits, or how much moves."""
+        if self._live is not None and self._traced is not self.info:
+            self._traced = self.info
+            self._trace = trace_of_planes(self._traced)
         return self._trace
 
     def _of_scene(self) -> StreamInfo:
         from fba.codec import StreamInfo
 
+        if self._live is not None:
+            return self._live()
         animation, times = getattr(self._scene, "animation", None), self._scene.timeline
         if isinstance(animation, Animation) and len(animation) == times.frames:
             return StreamInfo.of_animation(animation, *self._of)
@@ -95,7 +114,6 @@ class Source:
 
     def _probe(self) -> None:
         from fba.formats import format_of, probe
-        from player.ui.trace import trace_of_motion, trace_of_planes
 
         try:
             if self.path is not None and (found := format_of(self.path).name) == "fba":

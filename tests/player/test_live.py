@@ -134,6 +134,27 @@ def test_playing_begins_with_the_first_i_plane_and_waits_for_what_is_late(wire: 
     assert not player.waiting
 
 
+def test_the_planes_are_counted_as_they_arrive(wire: Wire) -> None:
+    data, ends = stream(performance(), intra_period=2)
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[99]])
+    until(lambda: len(live) == 100)
+    half = live.info()
+    wire.send(data[ends[99] :])
+    wire.end()
+    assert live.wait_end(20)
+    whole, file = live.info(), fba.codec.probe_stream(data)
+    assert (half.frames, half.size) == (100, ends[99])
+    assert file.plane_bits is not None
+    assert half.plane_bits is not None
+    assert half.plane_bits.tolist() == file.plane_bits.tolist()[:100]
+    for name in ("format", "size", "rate", "frames", "duration", "start", "skipped", "intra_planes"):
+        assert getattr(whole, name) == getattr(file, name), name
+    np.testing.assert_array_equal(whole.plane_bits, file.plane_bits)
+    np.testing.assert_array_equal(whole.plane_intra, file.plane_intra)
+    np.testing.assert_array_equal(whole.frame_index, file.frame_index)
+
+
 def test_paused_it_stays_where_it_is_while_more_arrives(wire: Wire) -> None:
     data, ends = stream(performance(100))
     live = LiveAnimation(wire.out)

@@ -145,6 +145,30 @@ def test_the_bit_rate_of_a_stream(opened: Opened, talking: Animation, tmp_path: 
     assert studio.session.transport.time == pytest.approx(0.27, abs=0.003)
 
 
+def test_the_bit_rate_of_a_stream_that_arrives(opengl: None, talking: Animation) -> None:
+    from io import BufferedReader, BytesIO
+
+    from player.live import LiveAnimation, LiveTimeline
+
+    live = LiveAnimation(BufferedReader(BytesIO(fba.encode(talking))))  # type: ignore[arg-type]
+    assert live.wait(20)
+    assert live.wait_end(20)
+    scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
+    session = Session(scene, Transport(scene.timeline), source=Source(scene), size=SIZE)  # type: ignore[arg-type]
+    session.open.add("rate")
+    with Studio(session) as studio:
+        picture = studio.draw(4)
+        left, top, right, bottom = (round(v) for v in panel_of(studio, "rate").bars)
+        bars = picture[top:bottom, left:right, :3].astype(int)
+        x0, y0, x1, y1 = (round(v) for v in studio.gui.bar.place)
+        line = picture[y0:y1, x0:x1, :3].astype(int)
+    for part in (bars, line):
+        warm = part[..., 0] - part[..., 2]
+        wide = part.shape[1]
+        assert (warm[:, 3 : wide // 12] > 60).mean() > 0.5  # the I plane, the first of ten
+        assert not (warm[:, wide // 8 :] > 60).any()
+
+
 def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animation) -> None:
     studio = opened(talking)
     studio.session.open.add("rate")
