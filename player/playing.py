@@ -79,5 +79,7 @@ def _sounded(session: Session, path: PathLike, offset: float) -> Audio | None:
     session.sound, session.sound_offset = path, offset
     if session.audio is None:
         name = os.path.basename(os.fspath(path))
-        session.say(f"{name} is not heard: there is no sound device. Films have it", "warning", 8.0)
+        session.say(
+            f"There is no sound device: {name} is not heard, but recorded films have it", "warning", 8.0
+        )
     return session.audio

@@ -72,7 +72,7 @@ def _normal_speed(session: Session) -> None:
 def _interpolate(session: Session) -> None:
     transport = session.transport
     transport.interpolate = not transport.interpolate
-    session.say("smooth between frames" if transport.interpolate else "frame by frame")
+    session.say("smooth between frames" if transport.interpolate else "frame by frame", about="motion")
 
 
 def _reset_view(session: Session) -> None:
@@ -81,7 +81,7 @@ def _reset_view(session: Session) -> None:
 
 def _follow(session: Session) -> None:
     session.viewpoint.toggle_follow(session.transport.time)
-    session.say("the camera follows" if session.viewpoint.follow else "the camera stays")
+    session.say("the camera follows" if session.viewpoint.follow else "the camera stays", about="camera")
 
 
 def _points(session: Session) -> None:
@@ -94,7 +94,7 @@ def _mute(session: Session) -> None:
         session.say(what, "warning")
         return
     session.audio.muted = not session.audio.muted
-    session.say("sound off" if session.audio.muted else "sound on")
+    session.say("sound off" if session.audio.muted else "sound on", about="mute")
 
 
 def _shift_sound(seconds: float) -> Callable[[Session], None]:
@@ -105,7 +105,7 @@ def _shift_sound(seconds: float) -> Callable[[Session], None]:
         session.shift_sound(seconds)
         now = session.sound_offset
         way = f"{abs(now):.2f} s {'later' if now > 0 else 'earlier'}" if now else "with the first frame"
-        session.say(f"sound {way}")
+        session.say(f"sound {way}", about="sound")
 
     return shift
 

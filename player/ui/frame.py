@@ -10,6 +10,8 @@ from player.ui.docks import EDGE
 from player.ui.panel import Panel, tooltip
 from player.ui.session import Session
 
+ABOVE = 40.0
+"""Points from the bar to words: what the timeline tells under the mouse stands between."""
 FADE = 0.4
 """Seconds in which a word goes."""
 MOST_OF_WIDTH = 0.55
@@ -97,7 +99,7 @@ def _flat_button(label: str, *, lit: bool) -> bool:
 def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
     """Words to the user, in the middle above the bar."""
     to = imgui.get_foreground_draw_list()
-    y = display[1] - above - 20
+    y = display[1] - above - ABOVE
     for notice in reversed(session.notices()):
         alpha = min((notice.until - session.clock()) / FADE, 1.0)
         colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)

@@ -39,11 +39,15 @@ NOTICE_GOES = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A word to the user: text; kind "done", "warning" or "error"; until, on the session's clock."""
+    """A word to the user: text; kind "done", "warning" or "error"; until, on the session's clock.
+
+    about: what it tells of; a newer word about the same takes its place.
+    """
 
     text: str
     kind: str
     until: float
+    about: str
 
 
 @dataclass
@@ -121,10 +125,14 @@ class Session:
         else:
             self.open ^= {name}
 
-    def say(self, text: str, kind: str = "done", seconds: float = NOTICE_SECONDS) -> None:
-        """Show a short text for some seconds; kind "done", "warning" or "error"."""
-        self._notices = [one for one in self.notices() if one.text != text][-2:]
-        self._notices.append(Notice(text, kind, self.clock() + seconds))
+    def say(self, text: str, kind: str = "done", seconds: float = NOTICE_SECONDS, *, about: str = "") -> None:
+        """Show a short text for some seconds; kind "done", "warning" or "error".
+
+        It takes the place of an older one about the same, by default of the same text.
+        """
+        about = about or text
+        self._notices = [one for one in self.notices() if one.about != about][-2:]
+        self._notices.append(Notice(text, kind, self.clock() + seconds, about))
 
     def notices(self) -> list[Notice]:
         """What is to be shown now, oldest first."""
@@ -196,7 +204,7 @@ class Session:
             if self.switch_key(switch).lower() == key:
                 self.touched()
                 self.scene.switches.press(name)
-                self.say(f"{switch.label}: {self.scene.switches.text(name)}")
+                self.say(f"{switch.label}: {self.scene.switches.text(name)}", about=name)
                 return True
         return False
 
