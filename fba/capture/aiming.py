@@ -68,14 +68,14 @@ def aim_all(axes: Float, start: Float, targets: Sequence[Target], weights: Float
             length = np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-12)
             line = line / length
             slopes = np.zeros((len(angles), 3, count))
-            for number, axis in enumerate(world):
+            for number, axis in enumerate(world[: max(used for _, used in target.pieces)]):
                 moved = sum(
                     (t for t, (_, used) in zip(turned, target.pieces, strict=True) if used > number),
                     np.zeros(3),
                 )
-                slope = np.cross(axis, np.broadcast_to(moved, line.shape)) / length
-                slopes[:, :, number] = slope - line * np.sum(slope * line, axis=1, keepdims=True)
-            normal += np.einsum("tik,til->tkl", slopes, slopes)
+                slope = rotations.cross(axis, np.broadcast_to(moved, line.shape)) / length
+                slopes[:, :, number] = slope - line * np.einsum("ti,ti->t", slope, line)[:, None]
+            normal += np.swapaxes(slopes, 1, 2) @ slopes
             pull += np.einsum("tik,ti->tk", slopes, target.wanted - line)
         step = np.linalg.solve(normal, pull[:, :, None])[:, :, 0]
         largest = np.abs(step).max(axis=1, keepdims=True)

@@ -45,14 +45,24 @@ def matrices(quaternions: Float) -> Float:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def cross(a: Float, b: Float) -> Float:
+    """a x b, for vectors (..., 3); NumPy's takes three times as long for some hundreds."""
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    result[..., 0] = ay * bz - az * by
+    result[..., 1] = az * bx - ax * bz
+    result[..., 2] = ax * by - ay * bx
+    return result
+
+
 def turn(axis: Float, angle: Float) -> Float:
     """Matrices (..., 3, 3) of turns about unit axes (3,) or (..., 3) by angles (...)."""
     axis = np.asarray(axis, dtype=np.float64)
-    cross = np.tensordot(axis, LEVI_CIVITA, axes=1)
+    across = np.tensordot(axis, LEVI_CIVITA, axes=1)
     s = np.sin(angle)[..., None, None]
     c = np.cos(angle)[..., None, None]
     square = axis[..., :, None] * axis[..., None, :]
-    result: Float = c * (np.eye(3) - square) + s * cross + square
+    result: Float = c * (np.eye(3) - square) + s * across + square
     return result
 
 
@@ -116,7 +126,7 @@ def between_all(start: Float, end: Float) -> Float:
     turns."""
     a = start / np.linalg.norm(start, axis=-1, keepdims=True)
     b = end / np.linalg.norm(end, axis=-1, keepdims=True)
-    axis = np.cross(a, b)
+    axis = cross(a, b)
     sine = np.linalg.norm(axis, axis=-1)
     angle = np.arctan2(sine, np.sum(a * b, axis=-1))
     axis = np.where(sine[..., None] > 1e-12, axis / np.maximum(sine, 1e-300)[..., None], [1.0, 0.0, 0.0])
