@@ -181,6 +181,13 @@ class Animation:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __repr__(self) -> str:
+        """One line, not the arrays."""
+        parts = [name for name in ("face", "body") if getattr(self, name) is not None]
+        about = f"{len(self)} frames at {float(self.rate):g} frames/s, {float(self.duration):g} s"
+        named = f"{self.name}: " if self.name else ""
+        return f"<Animation {named}{', '.join([about, *parts])}>"
+
     def _repr_html_(self) -> str | None:
         """A small film, for notebooks; None where the player is not installed."""
         try:

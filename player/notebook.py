@@ -20,6 +20,7 @@ from fba.errors import DisplayError, FbaError
 from player.camera import Camera
 from player.showable import Showable
 from player.times import clock_text
+from player.whole import PathLike
 
 WIDTH, SHAPE = 480, 4 / 3
 """Of the film: pixels, and width by height."""
@@ -36,7 +37,8 @@ class Preview:
     """A film of an animation that a notebook shows where this is the value of a cell.
 
     subject: an animation or a scene. width: pixels, at least 16; the height is three quarters of it. camera:
-    as `Offscreen` takes it. start, end: seconds, which part of it; at most 15 s are shown.
+    as `Offscreen` takes it. start, end: seconds, which part of it; at most 15 s are shown. audio: a file whose
+    sound is heard with it, audio_offset seconds later than the first frame.
 
     Without a video encoder it is a still picture, without OpenGL a line of text; it says so.
     """
@@ -49,6 +51,8 @@ class Preview:
         camera: Camera | str | None = None,
         start: float | None = None,
         end: float | None = None,
+        audio: PathLike | None = None,
+        audio_offset: float = 0.0,
     ) -> None:
         if width < NARROWEST:
             raise ValueError(f"a preview is at least {NARROWEST} pixels wide, not {width}")
@@ -60,6 +64,7 @@ class Preview:
         self._animation: Animation = subject if isinstance(subject, Animation) else shown.animation
         self._size = (width // 2 * 2, round(width / SHAPE) // 2 * 2)
         self._camera, self._start, self._end = camera, start, end
+        self._audio, self._audio_offset = audio, audio_offset
         self._html: str | None = None
 
     def __repr__(self) -> str:
@@ -106,7 +111,7 @@ class Preview:
             path = Path(folder) / "preview.mp4"
             record(
                 scene, path, fps=rate, size=self._size, camera=self._camera,
-                start=float(begin), end=float(last),
+                start=float(begin), end=float(last), audio=self._audio, audio_offset=self._audio_offset,
             )  # fmt: skip
             data = path.read_bytes()
         if len(data) > MOST_BYTES:
@@ -116,8 +121,9 @@ class Preview:
             )
             return self._still(scene), text
         width, height = self._size
+        sound = "muted " if self._audio is None else ""
         return (
-            f'<video controls loop muted playsinline width="{width}" height="{height}" '
+            f'<video controls loop {sound}playsinline width="{width}" height="{height}" '
             f'src="data:video/mp4;base64,{base64.b64encode(data).decode()}"></video>'
         ), note
 

@@ -8,11 +8,13 @@ import subprocess
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 from player_tracks import face_track
+from test_films import click_time, write_click
 
 import player.films
 import player.notebook
@@ -134,3 +136,19 @@ def test_importing_fba_does_not_import_the_player() -> None:
     code = "import sys, fba; fba.Animation; print({'player', 'av', 'PIL', 'moderngl'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+def test_a_preview_has_the_sound_that_is_given(opengl: None, talking: Animation, tmp_path: Path) -> None:
+    wav = write_click(tmp_path / "talk.wav", 0.1)
+    text = Preview(talking, width=32, audio=wav)._repr_html_()
+    assert " muted" not in text
+    path = tmp_path / "shown.mp4"
+    path.write_bytes(base64.b64decode(text.partition("base64,")[2].partition('"')[0]))
+    assert click_time(path) == pytest.approx(0.1, abs=0.006)
+    with av.open(str(path)) as film:
+        assert film.streams.video
+
+
+def test_in_a_terminal_it_is_one_line(talking: Animation, walking: Animation) -> None:
+    assert repr(talking) == "<Animation talking: 10 frames at 25 frames/s, 0.4 s, face>"
+    assert repr(walking) == "<Animation walking: 10 frames at 25 frames/s, 0.4 s, face, body>"
