@@ -185,11 +185,9 @@ def _picture(part: Part) -> FacePicture | None:
     """The part's texture, or None where there is none that can be read."""
     if part.material.texture is None:
         return None
-    from PIL import Image
-
     try:
         return FacePicture(part.material.texture)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+    except (OSError, ValueError, SyntaxError) as error:
         warnings.warn(
             f"the texture of part {part.name!r} cannot be read ({error}): its colour is shown instead",
             FbaWarning,

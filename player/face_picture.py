@@ -24,11 +24,7 @@ MAKING = 1
 
 
 class FacePicture:
-    """A picture in a file of PNG or JPEG.
-
-    Raises what Pillow raises where that cannot be read: OSError, ValueError, SyntaxError, or
-    PIL.Image.DecompressionBombError.
-    """
+    """A picture in a file of PNG or JPEG. Raises OSError, ValueError or SyntaxError where it cannot be read."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -49,11 +45,14 @@ class FacePicture:
         """(H, W, 4), decoded anew."""
         from PIL import Image
 
-        with Image.open(io.BytesIO(self._data), formats=("PNG", "JPEG")) as image:
-            if max(image.size) > LARGEST:
-                image.draft("RGB", (LARGEST, LARGEST))
-                image.thumbnail((LARGEST, LARGEST))
-            return np.asarray(image.convert("RGBA"))
+        try:
+            with Image.open(io.BytesIO(self._data), formats=("PNG", "JPEG")) as image:
+                if max(image.size) > LARGEST:
+                    image.draft("RGB", (LARGEST, LARGEST))
+                    image.thumbnail((LARGEST, LARGEST))
+                return np.asarray(image.convert("RGBA"))
+        except Image.DecompressionBombError as error:
+            raise ValueError(str(error)) from error
 
     def seen(self, factor: int) -> UInt8:
         """Every `factor` texels made one, (h, w, 4), and the square roots of their linear light."""
