@@ -37,8 +37,8 @@ class Preview:
     """A film of an animation that a notebook shows where this is the value of a cell.
 
     subject: an animation or a scene. width: pixels, at least 16; the height is three quarters of it. camera:
-    as `Offscreen` takes it. start, end: seconds, which part of it; at most 15 s are shown. audio: a file whose
-    sound is heard with it, audio_offset seconds later than the first frame.
+    as `Offscreen` takes it. start, end: seconds, which part of it; at most 15 s are shown. audio: a file
+    whose sound is heard with it, audio_offset seconds later than the first frame.
 
     Without a video encoder it is a still picture, without OpenGL a line of text; it says so.
     """
