@@ -8,6 +8,8 @@ vertices, and spread over the others.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -53,18 +55,36 @@ FOLDS = 0.75
 
 
 class LitBody:
-    """The light on a body in one pose, worked out where it is asked for."""
+    """The light on a body in one pose, worked out where it is asked for.
 
-    def __init__(self, some: Callable[[slice, Rows | None], Float32]) -> None:
+    capsules: float32 (K, 11), what is in its way, see `_capsules`; None where nothing is.
+    """
+
+    def __init__(
+        self, some: Callable[[slice, Rows | None], Float32], capsules: Float32 | None = None
+    ) -> None:
         self._some = some
+        self.capsules = capsules
 
     def __call__(self, part: slice, rows: Rows | None) -> Float32:
         """float32 (N, 4) at some vertices (N,) of a part, or at all."""
         return self._some(part, rows)
 
-    def of(self, part: slice) -> Callable[[Rows | None], Float32]:
+    def of(self, part: slice) -> LitPart:
         """The same for one part."""
-        return lambda rows: self._some(part, rows)
+        return LitPart(self, part)
+
+
+@dataclass(frozen=True, eq=False)
+class LitPart:
+    """The light on a part of a body in one pose."""
+
+    body: LitBody
+    part: slice
+
+    def __call__(self, rows: Rows | None) -> Float32:
+        """float32 (N, 4) at some vertices (N,), or at all."""
+        return self.body(self.part, rows)
 
 
 class BodyLight:
@@ -80,7 +100,6 @@ class BodyLight:
         tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else TALL
         head = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or the neck
         self._radii = np.array([row[2] for row in known]) * (tall / head / TALL if tall > 0 else 1.0)
-        self._made: Prepared | None = None
         self._kept: dict[tuple[int, int, int], tuple[Rows | None, Prepared]] = {}
 
     def reaching(self, places: Float32, normals: Float32, joints: Float64) -> Float32:
@@ -94,7 +113,7 @@ class BodyLight:
 
     def lit_at(self, reached: Callable[[Rows], tuple[Float32, Float32]], joints: Float64) -> LitBody:
         """The same. reached: gives places and normals (V, 3) that are right at rows (N,)."""
-        if not is_compiled() or not len(self._ends):
+        if self.is_free:
             return LitBody(_free)
         capsules = _capsules(joints[self._ends.ravel(), :3, 3].reshape(-1, 2, 3), self._radii)
 
@@ -106,24 +125,28 @@ class BodyLight:
             _spread(past, near, shares, folds, light)
             return light
 
-        return LitBody(some)
+        return LitBody(some, capsules)
 
     def _some(self, part: slice, rows: Rows | None) -> Prepared:
-        """As `_prepared` for some of a part's vertices; kept for as long as these are."""
+        """As `prepared` for some of a part's vertices; kept for as long as these are."""
         key = (part.start, part.stop, id(rows))
         if key not in self._kept:
             while len(self._kept) >= MOST_KEPT:
                 del self._kept[next(iter(self._kept))]
-            if self._made is None:
-                self._made = self._prepared()
-            at, near, shares, folds = self._made
+            at, near, shares, folds = self.prepared
             chosen = np.arange(part.start, part.stop) if rows is None else rows + part.start
             used, places = np.unique(near[chosen], return_inverse=True)
             near = places.reshape(len(chosen), -1).astype(np.int32)
             self._kept[key] = (rows, (at[used], near, shares[chosen], folds[chosen]))
         return self._kept[key][1]
 
-    def _prepared(self) -> Prepared:
+    @property
+    def is_free(self) -> bool:
+        """Whether nothing can be in its way."""
+        return not is_compiled() or not len(self._ends)
+
+    @cached_property
+    def prepared(self) -> Prepared:
         """Vertices at which light is worked out; for each vertex (V, NEAREST) the places among these that it
         takes it from and their shares; and how much of the sky its folds leave it."""
         body = self._body

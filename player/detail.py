@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fba.compiled import compiled
 from player.coarse import TOLERANCES
-from player.shapes import FaceMesh, FaceShape
+from player.shapes import ChosenLight, FaceMesh, FaceShape
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -27,7 +27,7 @@ class _Level:
 
     shape: FaceShape
     rows: npt.NDArray[np.intp]
-    light: tuple[object, Float32] | None = None
+    light: tuple[object, Float32 | ChosenLight] | None = None
 
 
 class Details:
@@ -51,7 +51,9 @@ class Details:
         if level is None:
             return mesh
         if level.light is None or not _same_light(level.light[0], mesh.reaching):
-            level.light = (mesh.reaching, mesh.light_at(level.rows))
+            reaching = mesh.reaching
+            chosen = ChosenLight(reaching, level.rows) if callable(reaching) else mesh.light_at(level.rows)
+            level.light = (reaching, chosen)
         places = mesh.places.some(level.rows)
         return FaceMesh(level.shape, places, level.light[1], mesh.matrix, mesh.turn, mesh.centre)
 

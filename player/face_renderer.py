@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from player.detail import distance, same
+from player.detail import distance
 from player.gpu.way import Way, release
 from player.programs import load_program, matrix_bytes, set_uniform
 from player.relief import RELIEF, relief
@@ -107,12 +107,7 @@ class FaceRenderer:
 
     def _draw(self, mesh: FaceMesh) -> None:
         parts, shape = self._parts(mesh), mesh.shape
-        self.way.write(mesh.places, parts)
-        light = mesh.light
-        if parts["lit"] is None or not same(parts["lit"], light):
-            parts["lit"] = light
-            parts["light"].orphan()
-            parts["light"].write(np.ascontiguousarray(light, dtype="f4"))
+        self.way.write(mesh, parts)
         wide = self._camera[2] * distance(mesh, self._camera[0])
         picture = parts["pictures"].suited(wide)
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None

@@ -22,7 +22,7 @@ from player.shapes import Eye, FaceMesh, FaceShape
 
 if TYPE_CHECKING:
     from fba.body.skinning import JointMotion
-    from player.gpu.tables import BodyTables, CarriedBody, CarriedFace
+    from player.gpu.tables import BodyTables, CarriedBody, CarriedFace, LightTables
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -104,7 +104,8 @@ class Person:
         def motion() -> CarriedBody:
             from player.gpu.tables import CarriedBody
 
-            return CarriedBody(self._tables, self._motion(joints))
+            light = None if self._light.is_free else self._light_tables
+            return CarriedBody(self._tables, self._motion(joints), light)
 
         return Whole(len(self._places), make, lambda rows: self._probe.at(joints, rows)[0], motion)
 
@@ -138,6 +139,13 @@ class Person:
         from player.gpu.tables import BodyTables
 
         return BodyTables(self.body.skinner)
+
+    @cached_property
+    def _light_tables(self) -> LightTables:
+        """And of the light on it."""
+        from player.gpu.tables import LightTables
+
+        return LightTables(self._tables.rows, self._light.prepared)
 
     @cached_property
     def _face_tables(self) -> BodyTables:

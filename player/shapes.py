@@ -134,6 +134,21 @@ class FaceMesh:
         return self.reaching(rows) if callable(self.reaching) else self.reaching.take(rows, axis=0)
 
 
+class ChosenLight:
+    """What reaches chosen vertices (N,), worked out where it is asked for; of: what gives it."""
+
+    def __init__(self, of: Callable[[Rows | None], Float32], rows: Rows) -> None:
+        self.of = of
+        self._rows = rows
+        self._found: Float32 | None = None
+
+    def __call__(self, rows: Rows | None) -> Float32:
+        """float32 (M, 4) at some of them, (M,), or at all; of all the same array each time."""
+        if self._found is None:
+            self._found = self.of(self._rows)
+        return self._found if rows is None else self._found.take(rows, axis=0)
+
+
 @dataclass(frozen=True, eq=False)
 class Eye:
     """An eyeball. matrix (4, 4): its frame (looking along +z, radius 1) into the world.

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from player.gpu.tables import BodyTables, CarriedBody, CarriedFace, FaceTables, MovedFace
+from player.body_light import KEY, REACH
+from player.gpu.programs import deforming_program, use
+from player.gpu.tables import CarriedBody, CarriedFace, MovedFace, Tables
 from player.gpu.textures import Table, grid
 from player.places import Places, Whole
 from player.programs import set_uniform
 
-MOST_TABLES = 8
+Float32 = npt.NDArray[np.float32]
+
+MOST_TABLES = 64
 """Models remembered on the graphics card; the longest unused goes first."""
 
 
@@ -30,92 +35,91 @@ class GpuDeformer:
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
         self._corners = context.buffer(corners.tobytes())
         self._whole_arrays: dict[str, Any] = {}
-        self._tables: dict[int, tuple[FaceTables | BodyTables, dict[str, Table]]] = {}
+        self._tables: dict[int, tuple[Tables, dict[str, Table]]] = {}
         self._held: dict[tuple[int, str], Any] = {}
-        self._moved: dict[int, tuple[Whole, Any, Any]] = {}
+        self._drawn: dict[tuple[str, int], tuple[Whole, Any, Any]] = {}
 
-    def prepare(self, wholes: list[Whole]) -> None:
-        """Move all vertices of faces and bodies. Changes which framebuffer is bound, and the viewport."""
-        wanted = {id(base): base for base in map(_base, wholes)}
-        free = [key for key, (whole, _, _) in self._moved.items() if wanted.get(key) is not whole]
-        spare = [self._moved.pop(key)[1:] for key in free]
+    def prepare(self, wholes: list[Whole], capsules: Mapping[int, Float32] | None = None) -> None:
+        """Move all vertices of faces and bodies. Changes which framebuffer is bound, and the viewport.
+
+        capsules: float32 (K, 11), what hides light from bodies, by the id of their wholes: see
+        `player.body_light`. Their parts can then be written with their light.
+        """
+        bases = {id(base): base for base in map(_base, wholes)}
+        limbs = {key: rows for key, rows in (capsules or {}).items() if key in bases}
+        wanted = {("moved", key): base for key, base in bases.items()}
+        wanted |= {("past", key): bases[key] for key in limbs if bases[key].motion.light is not None}
+        free = [key for key, (whole, _, _) in self._drawn.items() if wanted.get(key) is not whole]
+        spare = [self._drawn.pop(key)[1:] for key in free]
         for key, base in wanted.items():
-            if key in self._moved:
+            if key in self._drawn:
                 continue
-            size = grid(self._gl, base.count)
-            room = next((one for one in spare if one[0].size == size), None)
-            if room is None:
-                texture = self._gl.texture(size, 4, dtype="f4")
-                texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
-                room = (texture, self._gl.framebuffer([texture]))
+            count = base.count if key[0] == "moved" else len(base.motion.light.at)
+            room = self._room(grid(self._gl, count), spare)
+            if key[0] == "moved":
+                self._move(base.motion, count, room[1])
             else:
-                spare.remove(room)
-            self._move(base.motion, base.count, room[1])
-            self._moved[key] = (base, *room)
+                self._pass(base, limbs[key[1]], count, room[1])
+            self._drawn[key] = (base, *room)
         for texture, framebuffer in spare:
             framebuffer.release()
             texture.release()
 
-    def rows(self, places: Places) -> list[Any]:
+    def is_lit(self, whole: Whole) -> bool:
+        """Whether its parts are written with their light."""
+        return ("past", id(whole)) in self._drawn
+
+    def rows(self, places: Places, *, lit: bool = False) -> list[Any]:
         """What `write` needs for a part, or some of its vertices, in every pose of it. To be released by who
-        asks, in this order."""
+        asks, in this order. lit: with its light."""
         motion, chosen = places.whole.motion, _rows(places)
+        parts = [(chosen, "1i", "in_row")]
         if isinstance(motion, CarriedBody):
-            name, parts = (
-                "body",
-                [
-                    (chosen, "1i", "in_row"),
-                    *_attributes(motion.tables, chosen, ("around", "numbers", "upright")),
-                ],
-            )
+            name = "lit" if lit else "body"
+            parts += _attributes(motion.tables.rows, chosen, "around", "numbers", "upright")
+            if lit:
+                parts += _attributes(motion.light, chosen, "near", "shares", "folds")
         else:
             face = motion.face.motion if isinstance(motion, CarriedFace) else motion
-            name, tables = "face", face.tables
-            parts = [
-                (chosen, "1i", "in_row"),
-                (tables.part[chosen], "1i", "in_part"),
-                (tables.around[chosen], "2i", "in_around"),
-                (tables.neutral[chosen], "3f", "in_neutral"),
-            ]
+            name = "face"
+            parts += _attributes(face.tables, chosen, "part", "around", "neutral")
         if isinstance(motion, CarriedFace):
             name = "carried"
-            parts += _attributes(motion.tables, chosen, ("wring",))
+            parts += _attributes(motion.tables.rows, chosen, "wring")
         if name != "face":
-            parts += _attributes(motion.tables, chosen, ("joints", "weights"))
+            parts += _attributes(motion.tables.rows, chosen, "joints", "weights")
         buffers = [
-            (
-                self._gl.buffer(np.ascontiguousarray(array, dtype=format_[1] + "4").tobytes()),
-                format_,
-                attribute,
-            )
-            for array, format_, attribute in parts
+            (self._gl.buffer(np.ascontiguousarray(array, dtype=kind[1] + "4").tobytes()), kind, attribute)
+            for array, kind, attribute in parts
         ]
         array = self._gl.vertex_array(self._program(name), buffers)
         return [array, *(buffer for buffer, _, _ in buffers)]
 
-    def write(self, places: Places, rows: list[Any], positions: Any, normals: Any) -> None:
-        """Positions and normals, float32 (V, 3), of a part of what was prepared, into buffers; rows: what
-        `rows` gave."""
+    def write(self, places: Places, rows: list[Any], buffers: list[Any]) -> None:
+        """Of a part of what was prepared: positions and normals, float32 (V, 3), and where it is lit, light
+        (V, 4), into as many buffers; rows: what `rows` gave."""
         motion = places.whole.motion
         program = rows[0].program
         base = _base(places.whole)
-        self._use(program, moved=self._moved[id(base)][1])
+        use(program, moved=self._drawn["moved", id(base)][1])
         if not isinstance(motion, CarriedBody):
             face = base.motion
             tables = self._of(face.tables)
             self._hold(face.tables, "parts", face.motion, face.motion.poses.reshape(-1, 4))
-            self._use(program, triangles=tables["triangles"].texture, parts=tables["parts"].texture)
+            use(program, triangles=tables["triangles"].texture, parts=tables["parts"].texture)
         if not isinstance(motion, MovedFace):
-            self._use(program, pose=self._pose(program, motion))
-            set_uniform(program, "root", tuple(float(v) for v in motion.motion.root))
+            self._carry(program, motion)
         if isinstance(motion, CarriedFace):
             set_uniform(program, "size", motion.size)
             set_uniform(program, "offset", tuple(float(v) for v in motion.shift))
-        rows[0].transform([positions, normals], self._gl.POINTS, vertices=len(places))
+        if len(buffers) > 2:
+            use(program, past=self._drawn["past", id(places.whole)][1])
+            set_uniform(program, "reach", REACH)
+        rows[0].transform(buffers, self._gl.POINTS, vertices=len(places))
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""
-        for _, texture, framebuffer in self._moved.values():
+        for _, texture, framebuffer in self._drawn.values():
             framebuffer.release()
             texture.release()
         for _, tables in self._tables.values():
@@ -123,42 +127,75 @@ class GpuDeformer:
                 table.release()
         for part in (*self._whole_arrays.values(), self._corners, *self._programs.values()):
             part.release()
-        for kept in (self._moved, self._tables, self._held, self._whole_arrays, self._programs):
+        for kept in (self._drawn, self._tables, self._held, self._whole_arrays, self._programs):
             kept.clear()
+
+    def _room(self, size: tuple[int, int], spare: list[Any]) -> tuple[Any, Any]:
+        """A texture and its framebuffer: one of those to spare, or a new one."""
+        for one in spare:
+            if one[0].size == size:
+                spare.remove(one)
+                return one[0], one[1]
+        texture = self._gl.texture(size, 4, dtype="f4")
+        texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
+        return texture, self._gl.framebuffer([texture])
 
     def _move(self, motion: MovedFace | CarriedBody, count: int, framebuffer: Any) -> None:
         """Draws the places of all vertices into a texture."""
         name = "face_moved" if isinstance(motion, MovedFace) else "body_moved"
         program = self._program(name)
-        if name not in self._whole_arrays:
-            self._whole_arrays[name] = self._gl.vertex_array(program, [(self._corners, "2f", "in_corner")])
         tables = self._of(motion.tables)
         if isinstance(motion, MovedFace):
             self._hold(motion.tables, "tracks", motion.motion, motion.motion.tracks)
             names: tuple[str, ...] = ("rest", "spans", "entries", "shifts", "tracks")
-            self._use(program, **{one: tables[one].texture for one in names})
         else:
+            self._carry(program, motion)
             names = ("rest", "joints", "weights", "wring")
-            self._use(
-                program, pose=self._pose(program, motion), **{one: tables[one].texture for one in names}
+        use(program, **{one: tables[one].texture for one in names})
+        self._draw(name, count, framebuffer)
+
+    def _pass(self, whole: Whole, capsules: Float32, count: int, framebuffer: Any) -> None:
+        """Draws what light comes past a body's limbs into a texture."""
+        motion, program = whole.motion, self._program("past_limbs")
+        self._carry(program, motion)
+        limbs = np.zeros((len(capsules), 3, 4), dtype=np.float32)
+        limbs[:, 0, :3], limbs[:, 0, 3] = capsules[:, :3], capsules[:, 9]
+        limbs[:, 1] = capsules[:, 3:7]
+        limbs[:, 2, :2], limbs[:, 2, 2] = capsules[:, 7:9], capsules[:, 10]
+        self._hold(motion.light, "capsules", capsules, limbs.reshape(-1, 4))
+        set_uniform(program, "limbs", len(capsules))
+        set_uniform(program, "key", KEY)
+        tables = self._of(motion.light)
+        use(program, moved=self._drawn["moved", id(whole)][1], modelled=tables["upright"].texture)
+        names = ("at", "around", "numbers", "joints", "weights", "capsules")
+        use(program, **{one: tables[one].texture for one in names})
+        self._draw("past_limbs", count, framebuffer)
+
+    def _draw(self, name: str, count: int, framebuffer: Any) -> None:
+        """One pixel a row."""
+        if name not in self._whole_arrays:
+            self._whole_arrays[name] = self._gl.vertex_array(
+                self._program(name), [(self._corners, "2f", "in_corner")]
             )
-        set_uniform(program, "count", count)
+        set_uniform(self._program(name), "count", count)
         framebuffer.use()
         self._gl.viewport = (0, 0, *framebuffer.size)
         self._gl.enable_only(self._gl.NOTHING)
         self._whole_arrays[name].render()
 
-    def _pose(self, program: Any, motion: CarriedBody | CarriedFace) -> Any:
-        """The joints' texture, as they stand now."""
+    def _carry(self, program: Any, motion: CarriedBody | CarriedFace) -> None:
+        """The joints as they stand now."""
         own, joints = motion.tables.rows, motion.motion
-        bones = np.empty((2 * len(joints.angles), 4), dtype=np.float32)
-        bones[::2, :3], bones[1::2, :3] = own.axis, own.centre
-        bones[::2, 3], bones[1::2, 3] = joints.angles.T
-        self._hold(motion.tables, "pose", joints, np.concatenate([joints.duals.reshape(-1, 4), bones]))
+        if self._held.get((id(motion.tables), "pose")) is not joints:
+            bones = np.empty((2 * len(joints.angles), 4), dtype=np.float32)
+            bones[::2, :3], bones[1::2, :3] = own.axis, own.centre
+            bones[::2, 3], bones[1::2, 3] = joints.angles.T
+            self._hold(motion.tables, "pose", joints, np.concatenate([joints.duals.reshape(-1, 4), bones]))
+        use(program, pose=self._of(motion.tables)["pose"].texture)
         set_uniform(program, "bones", 2 * len(joints.duals))
-        return self._of(motion.tables)["pose"].texture
+        set_uniform(program, "root", tuple(joints.root.tolist()))
 
-    def _hold(self, tables: FaceTables | BodyTables, name: str, motion: Any, rows: Any) -> None:
+    def _hold(self, tables: Tables, name: str, motion: Any, rows: Any) -> None:
         """A table that changes with the pose, with these rows in it."""
         found = self._of(tables)
         if name not in found:
@@ -167,7 +204,7 @@ class GpuDeformer:
             found[name].write(rows)
         self._held[id(tables), name] = motion
 
-    def _of(self, tables: FaceTables | BodyTables) -> dict[str, Table]:
+    def _of(self, tables: Tables) -> dict[str, Table]:
         """What stays the same of a model, on the graphics card."""
         key = id(tables)
         if key in self._tables:
@@ -178,49 +215,13 @@ class GpuDeformer:
             for table in self._tables.pop(oldest)[1].values():
                 table.release()
             self._held = {place: motion for place, motion in self._held.items() if place[0] != oldest}
-        if isinstance(tables, FaceTables):
-            arrays = {
-                name: getattr(tables, name) for name in ("rest", "spans", "entries", "shifts", "triangles")
-            }
-        else:
-            own = tables.rows
-            arrays = {"rest": own.vertices, "joints": own.joints, "weights": own.weights, "wring": own.wring}
-        self._tables[key] = (tables, {name: Table(self._gl, array) for name, array in arrays.items()})
+        self._tables[key] = (tables, {name: Table(self._gl, array) for name, array in tables.arrays.items()})
         return self._tables[key][1]
-
-    def _use(self, program: Any, **textures: Any) -> None:
-        for name, texture in textures.items():
-            unit = UNITS.index(name)
-            set_uniform(program, name, unit)
-            texture.use(unit)
 
     def _program(self, name: str) -> Any:
         if name not in self._programs:
-            shader, words, is_whole = PROGRAMS[name]
-            if is_whole:
-                self._programs[name] = self._gl.program(
-                    vertex_shader=_source("smooth.vert"), fragment_shader=_source(f"{shader}.frag")
-                )
-            else:
-                self._programs[name] = self._gl.program(
-                    vertex_shader=_source(f"{shader}.vert", *words),
-                    varyings=("position", "normal"),
-                    varyings_capture_mode="separate",
-                )
+            self._programs[name] = deforming_program(self._gl, name)
         return self._programs[name]
-
-
-PROGRAMS: dict[str, tuple[str, tuple[str, ...], bool]] = {
-    "face_moved": ("gpu_face", (), True),
-    "body_moved": ("gpu_body", (), True),
-    "face": ("gpu_face", (), False),
-    "carried": ("gpu_face", ("CARRIED",), False),
-    "body": ("gpu_body", (), False),
-}
-"""Shader, words for the preprocessor, and whether it draws all vertices into a texture."""
-UNITS = ("moved", "triangles", "parts", "pose", "rest", "spans", "entries", "shifts", "tracks", "joints",
-         "weights", "wring")  # fmt: skip
-"""Places of textures, by the names that shaders have for them."""
 
 
 def _base(whole: Whole) -> Whole:
@@ -234,24 +235,11 @@ def _rows(places: Places) -> Any:
     return chosen + places.start
 
 
-def _attributes(tables: BodyTables, chosen: Any, names: tuple[str, ...]) -> list[tuple[Any, str, str]]:
-    formats = {
-        "around": "4i",
-        "numbers": "3f",
-        "upright": "3f",
-        "joints": "4i",
-        "weights": "4f",
-        "wring": "4f",
-    }
-    return [(getattr(tables.rows, name)[chosen], formats[name], f"in_{name}") for name in names]
-
-
-def _source(name: str, *words: str) -> str:
-    folder = files("player") / "shaders"
-    lines = []
-    for line in (folder / name).read_text(encoding="utf-8").splitlines():
-        included = line.startswith("//include ")
-        lines.append((folder / line.split()[1]).read_text(encoding="utf-8") if included else line)
-        if line.startswith("#version"):
-            lines += [f"#define {word}" for word in words]
-    return "\n".join(lines)
+def _attributes(tables: Any, chosen: Any, *names: str) -> list[tuple[Any, str, str]]:
+    """What vertex arrays are made of: rows of tables, their formats, and the shaders' names for them."""
+    found = []
+    for name in names:
+        rows = getattr(tables, name)[chosen]
+        kind = "i" if rows.dtype.kind in "iu" else "f"
+        found.append((rows, f"{rows[0].size if len(rows) else 1}{kind}", f"in_{name}"))
+    return found

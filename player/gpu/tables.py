@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.skinning import JointMotion, Skinner
+from fba.body.skinning import JointMotion, Skinner, SkinTables
 from fba.face.deformer import Deformer, FaceMotion
 from fba.face.deformer_surface import Surface
 from fba.face.deformer_tables import Shifts
@@ -15,6 +16,7 @@ from player.places import Whole
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
+Array = npt.NDArray[Any]
 
 
 class FaceTables:
@@ -35,12 +37,23 @@ class FaceTables:
         self.around, self.triangles = _fans(tables.surface)
         self.neutral = np.ascontiguousarray(tables.surface.neutral[:, tables.surface.sum_of].T)
 
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What goes into textures."""
+        return {name: getattr(self, name) for name in ("rest", "spans", "entries", "shifts", "triangles")}
+
 
 class BodyTables:
     """A body's vertices and the joints that carry them: see `fba.body.skinning.SkinTables`."""
 
     def __init__(self, skinner: Skinner) -> None:
         self.rows = skinner.tables()
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What goes into textures."""
+        own = self.rows
+        return {"rest": own.vertices, "joints": own.joints, "weights": own.weights, "wring": own.wring}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +64,37 @@ class MovedFace:
     motion: FaceMotion
 
 
+class LightTables:
+    """Where the light on a body is worked out, and who takes it from there: see `player.body_light`.
+
+    at (A, 1): vertices; around, numbers, upright, joints, weights: theirs, as in `SkinTables`. near, shares
+    (V, 3), folds (V, 1): of each vertex.
+    """
+
+    def __init__(self, rows: SkinTables, prepared: tuple[Int32, Int32, Float32, Float32]) -> None:
+        at, self.near, self.shares, folds = prepared
+        self.at, self.folds = at[:, None], folds[:, None]
+        self.around, self.numbers, self.upright = rows.around[at], rows.numbers[at], rows.upright[at]
+        self.joints, self.weights = rows.joints[at], rows.weights[at]
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What goes into textures."""
+        return {
+            name: getattr(self, name) for name in ("at", "around", "numbers", "upright", "joints", "weights")
+        }
+
+
+Tables = FaceTables | BodyTables | LightTables
+
+
 @dataclass(frozen=True, eq=False)
 class CarriedBody:
-    """A body in one pose."""
+    """A body in one pose. light: None where nothing is in the light's way."""
 
     tables: BodyTables
     motion: JointMotion
+    light: LightTables | None = None
 
 
 @dataclass(frozen=True, eq=False)

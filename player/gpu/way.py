@@ -7,14 +7,20 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from player.body_light import LitPart
+from player.detail import same
 from player.gpu.choice import FAILED, Choice
 from player.gpu.deformer import GpuDeformer
 from player.places import Places, Whole
-from player.shapes import FaceMesh
+from player.shapes import ChosenLight, FaceMesh
 
 WRONG = 1e-4
 """By this share of its size a figure on the graphics card may be off."""
+CLEARLY, FEW = 0.05, 0.01
+"""Its normals and its light may be off by more than the first in no more than the second of all places, where
+a rounding decides what they are."""
 Parts = dict[str, Any]
 
 
@@ -40,31 +46,33 @@ class Way:
     def prepare(self, meshes: list[FaceMesh], draw: Callable[[list[FaceMesh]], None]) -> None:
         """Before anything of a picture: everything that is then drawn. draw: draws it into what is bound, to
         find out how long that takes; called for the first picture of a kind alone."""
-        wholes = _wholes(meshes)
-        count = sum(whole.count for whole in wholes if whole.moves)
+        count = sum(whole.count for whole in _wholes(meshes) if whole.moves)
         on_gpu = count > 0 and self._choice.on_gpu(count, lambda gpu: self._trial(meshes, draw, gpu))
-        self._prepared(wholes, on_gpu)
+        self._prepared(meshes, on_gpu)
         if self.on_gpu and count not in self._proven:
             if self._is_right(meshes):
                 self._proven.add(count)
             else:
                 if self.on_gpu:
                     self._give_up("vertices come out wrong")
-                self._prepared(wholes, False)
+                self._prepared(meshes, False)
 
-    def write(self, places: Places, parts: Parts) -> None:
-        """Positions and normals of a part into its buffers, parts["positions"] and parts["normals"]. parts
-        keeps what else that needs."""
-        if self.on_gpu and places.whole.moves and self._deformer is not None:
+    def write(self, mesh: FaceMesh, parts: Parts) -> None:
+        """Positions, normals and light of a part into its buffers, which parts has by these names; it keeps
+        what else that needs."""
+        if self.on_gpu and mesh.places.whole.moves and self._deformer is not None:
             try:
-                self._written(self._deformer, places, parts)
+                lit = _limbs(mesh) is not None and self._deformer.is_lit(mesh.places.whole)
+                self._written(self._deformer, mesh.places, parts, lit)
+                if not lit:
+                    _send_light(mesh, parts)
                 return
             except Exception as error:  # whatever a driver cannot do, the processor can
                 self._give_up(_said(error))
         parts["made"] = None
-        for name, array in (("positions", places.positions), ("normals", places.normals)):
-            parts[name].orphan()
-            parts[name].write(np.ascontiguousarray(array, dtype="f4"))
+        _send(parts["positions"], mesh.positions)
+        _send(parts["normals"], mesh.normals)
+        _send_light(mesh, parts)
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""
@@ -72,14 +80,16 @@ class Way:
             self._deformer.close()
             self._deformer = None
 
-    def _prepared(self, wholes: list[Whole], on_gpu: bool) -> None:
+    def _prepared(self, meshes: list[FaceMesh], on_gpu: bool) -> None:
+        wholes = _wholes(meshes)
         self.on_gpu = on_gpu
         if on_gpu:
             target, viewport = self._gl.fbo, self._gl.viewport
             try:
                 if self._deformer is None:
                     self._deformer = GpuDeformer(self._gl)
-                self._deformer.prepare([whole for whole in wholes if whole.moves])
+                capsules = {id(m.places.whole): rows for m in meshes if (rows := _limbs(m)) is not None}
+                self._deformer.prepare([whole for whole in wholes if whole.moves], capsules)
             except Exception as error:  # as above
                 self._give_up(_said(error))
             target.use()
@@ -93,16 +103,19 @@ class Way:
         self.on_gpu = False
         self.close()
 
-    def _written(self, deformer: GpuDeformer, places: Places, parts: Parts) -> None:
+    def _written(self, deformer: GpuDeformer, places: Places, parts: Parts, lit: bool) -> None:
         whole = places.whole
-        if parts.get("made") is whole:  # drawn a second time
+        if parts.get("made") == (whole, lit):  # drawn a second time
             return
-        of = (id(deformer), places.start, id(places.chosen), type(whole.motion), whole.count)
+        of = (id(deformer), places.start, id(places.chosen), type(whole.motion), whole.count, lit)
         if parts.get("rows_of") != of:
             release(parts)
-            parts["rows"], parts["rows_of"] = deformer.rows(places), of
-        deformer.write(places, parts["rows"], parts["positions"], parts["normals"])
-        parts["made"] = whole
+            parts["rows"], parts["rows_of"] = deformer.rows(places, lit=lit), of
+        buffers = [parts[name] for name in ("positions", "normals", "light")]
+        if lit:
+            parts["lit"] = None
+        deformer.write(places, parts["rows"], buffers if lit else buffers[:2])
+        parts["made"] = (whole, lit)
 
     def _trial(self, meshes: list[FaceMesh], draw: Callable[[list[FaceMesh]], None], on_gpu: bool) -> float:
         """Seconds that a picture takes; more than any where the graphics card cannot do it."""
@@ -110,7 +123,7 @@ class Way:
         again = [mesh.afresh(made) for mesh in meshes]
         self._gl.finish()
         start = perf_counter()
-        self._prepared(_wholes(again), on_gpu)
+        self._prepared(again, on_gpu)
         if self.on_gpu != on_gpu:
             return FAILED
         draw(again)
@@ -123,15 +136,18 @@ class Way:
             count = len(mesh.places)
             if not mesh.places.whole.moves or not count:
                 continue
-            rooms: Parts = {name: self._gl.buffer(reserve=12 * count) for name in ("positions", "normals")}
-            self.write(mesh.places, rooms)
-            found = np.frombuffer(rooms["positions"].read(), dtype=np.float32).reshape(-1, 3)
+            wanted = {"positions": mesh.positions, "normals": mesh.normals, "light": mesh.light}
+            rooms: Parts = {name: self._gl.buffer(reserve=4 * array.size) for name, array in wanted.items()}
+            self.write(mesh, rooms)
+            found = {name: np.frombuffer(rooms[name].read(), dtype=np.float32) for name in wanted}
             release(rooms)
-            for name in ("positions", "normals"):
+            for name in wanted:
                 rooms[name].release()
             size = float(np.abs(mesh.positions).max(initial=1e-9))
-            if not (self.on_gpu and np.abs(found - mesh.positions).max(initial=0.0) <= WRONG * size):
-                return False
+            for name, most in (("positions", WRONG * size), ("normals", CLEARLY), ("light", CLEARLY)):
+                off = ~(np.abs(found[name] - wanted[name].reshape(-1)) <= most)  # so that NaN is off
+                if not self.on_gpu or off.mean() > (0.0 if name == "positions" else FEW):
+                    return False
         return True
 
 
@@ -141,6 +157,24 @@ def release(parts: Parts) -> None:
         part.release()
     parts.pop("rows_of", None)
     parts["made"] = None
+
+
+def _limbs(mesh: FaceMesh) -> npt.NDArray[np.float32] | None:
+    """What may be in the light's way to the body that a mesh is a part of: see `player.body_light`."""
+    reaching = mesh.reaching.of if isinstance(mesh.reaching, ChosenLight) else mesh.reaching
+    return reaching.body.capsules if isinstance(reaching, LitPart) else None
+
+
+def _send_light(mesh: FaceMesh, parts: Parts) -> None:
+    light = mesh.light
+    if parts.get("lit") is None or not same(parts["lit"], light):
+        parts["lit"] = light
+        _send(parts["light"], light)
+
+
+def _send(buffer: Any, array: npt.NDArray[np.float32]) -> None:
+    buffer.orphan()
+    buffer.write(np.ascontiguousarray(array, dtype="f4"))
 
 
 def _said(error: Exception) -> str:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from player.context import offscreen_context
 from player.gpu.deformer import GpuDeformer
 from player.places import Places, Whole
+from player.shapes import FaceMesh
 
 Float32 = npt.NDArray[np.float32]
 
@@ -23,6 +24,25 @@ class Reader:
         self._bound = context.simple_framebuffer((4, 4))  # type: ignore[attr-defined]
         self.deformer = GpuDeformer(context)
 
+    def lit(self, meshes: list[FaceMesh]) -> list[Float32]:
+        """Light (V, 4) on parts of bodies."""
+        gl, found = self._gl, []
+        wholes = {id(mesh.places.whole): mesh.places.whole for mesh in meshes}
+        limbs = {id(mesh.places.whole): mesh.reaching.body.capsules for mesh in meshes}  # type: ignore[union-attr]
+        self.deformer.prepare(list(wholes.values()), limbs)
+        self._bound.use()
+        for mesh in meshes:
+            count = len(mesh.places)
+            assert self.deformer.is_lit(mesh.places.whole)
+            rows = self.deformer.rows(mesh.places, lit=True)
+            buffers = [gl.buffer(reserve=size * count) for size in (12, 12, 16)]  # type: ignore[attr-defined]
+            self.deformer.write(mesh.places, rows, buffers)
+            found.append(np.frombuffer(buffers[2].read(), np.float32).reshape(-1, 4))
+            for part in (*rows, *buffers):
+                part.release()
+        assert gl.error == "GL_NO_ERROR"  # type: ignore[attr-defined]
+        return found
+
     def __call__(self, places: list[Places]) -> list[tuple[Float32, Float32]]:
         """Positions and normals (V, 3) of all of these; they are in one picture."""
         gl, found = self._gl, []
@@ -32,7 +52,7 @@ class Reader:
         for one in places:
             rows = self.deformer.rows(one)
             buffers = [gl.buffer(reserve=12 * len(one)) for _ in range(2)]  # type: ignore[attr-defined]
-            self.deformer.write(one, rows, *buffers)
+            self.deformer.write(one, rows, buffers)
             found.append(tuple(np.frombuffer(b.read(), np.float32).reshape(-1, 3) for b in buffers))
             for part in (*rows, *buffers):
                 part.release()

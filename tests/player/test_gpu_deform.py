@@ -20,7 +20,9 @@ from fba.body import BapSolver
 from fba.body.limits import Limits
 from fba.body.model import BodyModel
 from fba.body.skinning import Skinner
+from fba.compiled import is_compiled
 from fba.face.model import FaceModel
+from player.body_light import LitPart
 from player.face import FaceFigure
 from player.gpu.tables import BodyTables, CarriedBody
 from player.person import Person
@@ -112,6 +114,22 @@ def test_twists_and_lifted_arms(reader: Reader, person: Person) -> None:
     assert (tables.wring[:, 0] >= 0).sum() > 500
     assert (tables.wring[:, 3] > 0).sum() > 20
     check(reader, person.meshes(random_faps(1), joints), 2e-6)
+
+
+@pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
+@pytest.mark.parametrize("seed", range(3))
+def test_light_on_a_body(reader: Reader, person: Person, seed: int) -> None:
+    """Where a rounding decides whether the key light is looked for at all, it may be another: hardly ever."""
+    faps = random_faps(seed)
+    meshes = [
+        m for m in person.meshes(faps, random_joints(person, faps, seed)) if isinstance(m.reaching, LitPart)
+    ]
+    assert len(meshes) > 3
+    for mesh, light in zip(meshes, reader.lit(meshes), strict=True):
+        apart = np.abs(light - mesh.light).max(axis=1)
+        assert np.ptp(mesh.light[:, 0]) > 0.3  # limbs are in the way
+        assert (apart < 1e-3).mean() > 0.995
+        assert np.median(apart) < 1e-5
 
 
 def test_some_vertices_in_any_order(reader: Reader, person: Person) -> None:

@@ -179,14 +179,22 @@ def test_a_card_that_fails_later_is_replaced_within_the_picture(monkeypatch: pyt
         assert (view.frame(0.0) == wanted[0]).all()
 
 
-def test_a_card_that_computes_wrongly_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("order", [(1, 0), (0, 0)], ids=["places", "normals"])
+def test_a_card_that_computes_wrongly_is_found_out(
+    monkeypatch: pytest.MonkeyPatch, order: tuple[int, int]
+) -> None:
     scene = small_scene()
     with Offscreen(scene, (48, 36), deform="cpu") as view:
         wanted = view.frame(0.0)
     original = GpuDeformer.write
 
-    def swapped(self: GpuDeformer, places: Places, rows: Any, positions: Any, normals: Any) -> None:
-        original(self, places, rows, normals, positions)
+    def swapped(self: GpuDeformer, places: Places, rows: Any, buffers: list[Any]) -> None:
+        spare = [self._gl.buffer(reserve=buffer.size) for buffer in buffers]
+        original(self, places, rows, spare)
+        for buffer, other in zip(buffers, order, strict=False):
+            buffer.write(spare[other].read())
+        for buffer in spare:
+            buffer.release()
 
     monkeypatch.setattr(GpuDeformer, "write", swapped)
     with Offscreen(scene, (48, 36), deform="gpu") as view:
@@ -220,7 +228,7 @@ def test_nothing_is_left_on_the_card() -> None:
         way.close()
         assert deformer is not None
         assert not deformer._tables
-        assert not deformer._moved
+        assert not deformer._drawn
         assert context.error == "GL_NO_ERROR"
     context.release()
 

@@ -1,0 +1,54 @@
+"""Shader programs that deform: some draw a pixel a vertex into a texture, others write vertices into
+buffers."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+from player.programs import set_uniform
+
+DRAWING = {"face_moved": "gpu_face", "body_moved": "gpu_body", "past_limbs": "gpu_past"}
+"""Programs that draw into a texture, and their fragment shaders."""
+WRITING = {
+    "face": ("gpu_face", (), ("position", "normal")),
+    "carried": ("gpu_face", ("CARRIED",), ("position", "normal")),
+    "body": ("gpu_body", (), ("position", "normal")),
+    "lit": ("gpu_body", ("LIT",), ("position", "normal", "light")),
+}
+"""Programs that write buffers: vertex shader, names that the preprocessor is to know, what is written."""
+UNITS = ("moved", "triangles", "parts", "pose", "rest", "spans", "entries", "shifts", "tracks", "joints",
+         "weights", "wring", "past", "capsules", "at", "around", "numbers", "modelled")  # fmt: skip
+"""Places of textures, by the names that shaders have for them."""
+
+
+def deforming_program(context: Any, name: str) -> Any:
+    """One of `DRAWING` or `WRITING` on a moderngl context."""
+    if name in DRAWING:
+        fragment = _source(f"{DRAWING[name]}.frag")
+        return context.program(vertex_shader=_source("smooth.vert"), fragment_shader=fragment)
+    shader, words, written = WRITING[name]
+    return context.program(
+        vertex_shader=_source(f"{shader}.vert", *words),
+        varyings=written,
+        varyings_capture_mode="separate",
+    )
+
+
+def use(program: Any, **textures: Any) -> None:
+    """Bind textures for a program, by the names that it has for them."""
+    for name, texture in textures.items():
+        unit = UNITS.index(name)
+        set_uniform(program, name, unit)
+        texture.use(unit)
+
+
+def _source(name: str, *words: str) -> str:
+    folder = files("player") / "shaders"
+    lines = []
+    for line in (folder / name).read_text(encoding="utf-8").splitlines():
+        included = line.startswith("//include ")
+        lines.append((folder / line.split()[1]).read_text(encoding="utf-8") if included else line)
+        if line.startswith("#version"):
+            lines += [f"#define {word}" for word in words]
+    return "\n".join(lines)
