@@ -24,7 +24,10 @@ MAKING = 1
 
 
 class FacePicture:
-    """A picture in a file of PNG or JPEG. Raises OSError, ValueError or SyntaxError where it cannot be read."""
+    """A picture in a file of PNG or JPEG.
+
+    Raises OSError, ValueError or SyntaxError where it cannot be read.
+    """
 
     def __init__(self, data: bytes) -> None:
         self._data = data

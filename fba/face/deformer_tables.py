@@ -92,8 +92,11 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
     Raises ModelError where a displacement is too large for numbers of that precision.
     """
     number = {part.name: place for place, part in enumerate(model.parts)}
-    column, part, first, upper, anchor, rows, slopes = ([] for _ in range(7))  # type: ignore[var-annotated]
-    bases, base, base_count = [], [], 0
+    column, part, first, upper, anchor, base, start = ([] for _ in range(7))  # type: ignore[var-annotated]
+    most = _most_rows(model, members, number)
+    rows = np.empty(most, dtype=np.uint32)
+    slopes, bases = np.empty((most, 3), dtype=dtype), np.empty((most, 3), dtype=dtype)
+    count = base_count = 0
     for table in model.tables:
         unit = model.fapu[faps()[table.fap - 1].unit]
         for mesh in table.meshes:
@@ -106,12 +109,14 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
                 _check(per_step, at_anchor, dtype, f"FaceDefTables of FAP {table.fap}, part {mesh.part!r}")
                 upper.append(limit)
                 anchor.append(from_value)
-                rows.append(moving.astype(np.uint32))
-                slopes.append(per_step.astype(dtype))
+                start.append(count)
+                stop = count + len(moving)
+                rows[count:stop], slopes[count:stop] = moving, per_step
+                count = stop
                 held = at_anchor.any()
                 base.append(base_count if held else -1)
                 if held:
-                    bases.append(at_anchor.astype(dtype))
+                    bases[base_count : base_count + len(at_anchor)] = at_anchor
                     base_count += len(at_anchor)
     return Shifts(
         column=np.array(column, dtype=np.int64),
@@ -119,13 +124,25 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
         first=np.array([*first, len(upper)], dtype=np.int64),
         upper=np.array(upper, dtype=np.float64),
         anchor=np.array(anchor, dtype=np.float64),
-        start=np.cumsum([0, *map(len, rows)], dtype=np.int64),
+        start=np.array([*start, count], dtype=np.int64),
         base=np.array(base, dtype=np.int64),
-        rows=np.concatenate([np.zeros(0, dtype=np.uint32), *rows]),
-        slopes=np.concatenate([np.zeros((0, 3), dtype=dtype), *slopes]),
-        bases=np.concatenate([np.zeros((0, 3), dtype=dtype), *bases]),
+        rows=rows[:count],
+        slopes=slopes[:count],
+        bases=bases[:base_count],
         amount=np.zeros(1, dtype=dtype),
     )
+
+
+def _most_rows(model: FaceModel, members: Members, number: dict[str, int]) -> int:
+    """How many rows the tables have, with those of displacements that are zero."""
+    most = 0
+    for table in model.tables:
+        for mesh in table.meshes:
+            place = number[mesh.part]
+            moved = np.zeros(len(model.parts[place].vertices), dtype=bool)
+            moved[mesh.vertices] = True
+            most += int(moved[members[place][0]].sum()) * (len(mesh.borders) - 1)
+    return most
 
 
 def chosen_shifts(shifts: Shifts, rows: npt.NDArray[np.intp], count: int) -> Shifts:
