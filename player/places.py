@@ -110,6 +110,7 @@ class Places:
         self.start = start
         self.chosen = chosen
         self._all = count
+        self._sample: Float32 | None = None
 
     @staticmethod
     def of(positions: Float32, normals: Float32) -> Places:
@@ -134,16 +135,20 @@ class Places:
         return self.whole.at(rows + self.start)[self.start : self.start + self._all]
 
     def sampled(self, step: int) -> Float32:
-        """Every so manieth position."""
+        """(N, 3) every so manieth position. Where not all are made, those first asked for: of `some`, too."""
         if self.whole.is_made:
             return self.positions[::step]
-        rows = np.arange(0, self._all, step) if self.chosen is None else self.chosen[::step]
-        rows = rows + self.start
-        return self.whole.at(rows)[rows]
+        if self._sample is None:
+            rows = np.arange(0, self._all, step) if self.chosen is None else self.chosen[::step]
+            rows = rows + self.start
+            self._sample = self.whole.at(rows)[rows]
+        return self._sample
 
     def some(self, rows: Rows) -> Places:
         """Some of them: (N,)."""
-        return Places(self.whole, self.start, self._all, rows)
+        found = Places(self.whole, self.start, self._all, rows)
+        found._sample = self._sample
+        return found
 
     def afresh(self, wholes: dict[int, Whole]) -> Places:
         """The same, not worked out yet. wholes: by the id of what they stand for, those made anew already."""

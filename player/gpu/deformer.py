@@ -37,6 +37,7 @@ class GpuDeformer:
         self._whole_arrays: dict[str, Any] = {}
         self._tables: dict[int, tuple[Tables, dict[str, Table]]] = {}
         self._held: dict[tuple[int, str], Any] = {}
+        self._ready: tuple[int, Any] | None = None
         self._drawn: dict[tuple[str, int], tuple[Whole, Any, Any]] = {}
 
     def prepare(self, wholes: list[Whole], capsules: Mapping[int, Float32] | None = None) -> None:
@@ -45,6 +46,7 @@ class GpuDeformer:
         capsules: float32 (K, 11), what hides light from bodies, by the id of their wholes: see
         `player.body_light`. Their parts can then be written with their light.
         """
+        self._ready = None
         bases = {id(base): base for base in map(_base, wholes)}
         limbs = {key: rows for key, rows in (capsules or {}).items() if key in bases}
         wanted = {("moved", key): base for key, base in bases.items()}
@@ -98,23 +100,10 @@ class GpuDeformer:
     def write(self, places: Places, rows: list[Any], buffers: list[Any]) -> None:
         """Of a part of what was prepared: positions and normals, float32 (V, 3), and where it is lit, light
         (V, 4), into as many buffers; rows: what `rows` gave."""
-        motion = places.whole.motion
-        program = rows[0].program
-        base = _base(places.whole)
-        use(program, moved=self._drawn["moved", id(base)][1])
-        if not isinstance(motion, CarriedBody):
-            face = base.motion
-            tables = self._of(face.tables)
-            self._hold(face.tables, "parts", face.motion, face.motion.poses.reshape(-1, 4))
-            use(program, triangles=tables["triangles"].texture, parts=tables["parts"].texture)
-        if not isinstance(motion, MovedFace):
-            self._carry(program, motion)
-        if isinstance(motion, CarriedFace):
-            set_uniform(program, "size", motion.size)
-            set_uniform(program, "offset", tuple(float(v) for v in motion.shift))
-        if len(buffers) > 2:
-            use(program, past=self._drawn["past", id(places.whole)][1])
-            set_uniform(program, "reach", REACH)
+        key = (id(places.whole), rows[0].program)
+        if self._ready != key:
+            self._make_ready(places.whole, rows[0].program, lit=len(buffers) > 2)
+            self._ready = key
         rows[0].transform(buffers, self._gl.POINTS, vertices=len(places))
 
     def close(self) -> None:
@@ -129,6 +118,24 @@ class GpuDeformer:
             part.release()
         for kept in (self._drawn, self._tables, self._held, self._whole_arrays, self._programs):
             kept.clear()
+
+    def _make_ready(self, whole: Whole, program: Any, *, lit: bool) -> None:
+        """All that a program takes to write parts of a whole."""
+        motion, base = whole.motion, _base(whole)
+        use(moved=self._drawn["moved", id(base)][1])
+        if not isinstance(motion, CarriedBody):
+            face = base.motion
+            tables = self._of(face.tables)
+            self._hold(face.tables, "parts", face.motion, face.motion.poses.reshape(-1, 4))
+            use(triangles=tables["triangles"].texture, parts=tables["parts"].texture)
+        if not isinstance(motion, MovedFace):
+            self._carry(program, motion)
+        if isinstance(motion, CarriedFace):
+            set_uniform(program, "size", motion.size)
+            set_uniform(program, "offset", tuple(float(v) for v in motion.shift))
+        if lit:
+            use(past=self._drawn["past", id(whole)][1])
+            set_uniform(program, "reach", REACH)
 
     def _room(self, size: tuple[int, int], spare: list[Any]) -> tuple[Any, Any]:
         """A texture and its framebuffer: one of those to spare, or a new one."""
@@ -151,7 +158,7 @@ class GpuDeformer:
         else:
             self._carry(program, motion)
             names = ("rest", "joints", "weights", "wring")
-        use(program, **{one: tables[one].texture for one in names})
+        use(**{one: tables[one].texture for one in names})
         self._draw(name, count, framebuffer)
 
     def _pass(self, whole: Whole, capsules: Float32, count: int, framebuffer: Any) -> None:
@@ -166,9 +173,9 @@ class GpuDeformer:
         set_uniform(program, "limbs", len(capsules))
         set_uniform(program, "key", KEY)
         tables = self._of(motion.light)
-        use(program, moved=self._drawn["moved", id(whole)][1], modelled=tables["upright"].texture)
+        use(moved=self._drawn["moved", id(whole)][1], modelled=tables["upright"].texture)
         names = ("at", "around", "numbers", "joints", "weights", "capsules")
-        use(program, **{one: tables[one].texture for one in names})
+        use(**{one: tables[one].texture for one in names})
         self._draw("past_limbs", count, framebuffer)
 
     def _draw(self, name: str, count: int, framebuffer: Any) -> None:
@@ -191,7 +198,7 @@ class GpuDeformer:
             bones[::2, :3], bones[1::2, :3] = own.axis, own.centre
             bones[::2, 3], bones[1::2, 3] = joints.angles.T
             self._hold(motion.tables, "pose", joints, np.concatenate([joints.duals.reshape(-1, 4), bones]))
-        use(program, pose=self._of(motion.tables)["pose"].texture)
+        use(pose=self._of(motion.tables)["pose"].texture)
         set_uniform(program, "bones", 2 * len(joints.duals))
         set_uniform(program, "root", tuple(joints.root.tolist()))
 

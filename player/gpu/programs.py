@@ -20,27 +20,31 @@ WRITING = {
 UNITS = ("moved", "triangles", "parts", "pose", "rest", "spans", "entries", "shifts", "tracks", "joints",
          "weights", "wring", "past", "capsules", "at", "around", "numbers", "modelled")  # fmt: skip
 """Places of textures, by the names that shaders have for them."""
+FIRST = 4
+"""The first of them: those before it are used by what draws between two parts that are written."""
 
 
 def deforming_program(context: Any, name: str) -> Any:
     """One of `DRAWING` or `WRITING` on a moderngl context."""
     if name in DRAWING:
         fragment = _source(f"{DRAWING[name]}.frag")
-        return context.program(vertex_shader=_source("smooth.vert"), fragment_shader=fragment)
-    shader, words, written = WRITING[name]
-    return context.program(
-        vertex_shader=_source(f"{shader}.vert", *words),
-        varyings=written,
-        varyings_capture_mode="separate",
-    )
+        program = context.program(vertex_shader=_source("smooth.vert"), fragment_shader=fragment)
+    else:
+        shader, words, written = WRITING[name]
+        program = context.program(
+            vertex_shader=_source(f"{shader}.vert", *words),
+            varyings=written,
+            varyings_capture_mode="separate",
+        )
+    for place, unit in enumerate(UNITS, FIRST):
+        set_uniform(program, unit, place)
+    return program
 
 
-def use(program: Any, **textures: Any) -> None:
-    """Bind textures for a program, by the names that it has for them."""
+def use(**textures: Any) -> None:
+    """Bind textures, by the names that programs have for them."""
     for name, texture in textures.items():
-        unit = UNITS.index(name)
-        set_uniform(program, name, unit)
-        texture.use(unit)
+        texture.use(FIRST + UNITS.index(name))
 
 
 def _source(name: str, *words: str) -> str:
