@@ -45,6 +45,7 @@ class Viewpoint:
         self._from = self._to = self.beginning
         self._until = -math.inf
         self._named = camera if not isinstance(camera, Camera) else ""
+        self._fitted_to = (aspect, self._to)
         self._sides = (0.0, 0.0)
         self._before = self._aside = NOWHERE
         self._aside_until = -math.inf
@@ -74,7 +75,19 @@ class Viewpoint:
         """A named view, or None for the one that suits the content, above what is covered."""
         free = 1.0 - min(max(self.covered, 0.0), 0.5)
         camera = self.scene.camera(preset, self.aspect / free)
-        return camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
+        camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
+        self._fitted_to = (self.aspect, camera)
+        return camera
+
+    def refit(self) -> None:
+        """The picture may have another shape now: a named view that nobody has moved fits it again."""
+        aspect, camera = self._fitted_to
+        if self.aspect == aspect:
+            return
+        if self._named != "" and self._to == camera:
+            self.camera = self.fitted(self._named)
+            self._aside = self._between(*self._sides)
+        self._fitted_to = (self.aspect, self._fitted_to[1])
 
     def glide(self, camera: Camera) -> None:
         """Go to another view smoothly."""

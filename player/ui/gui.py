@@ -80,6 +80,7 @@ class Gui:
         io.display_framebuffer_scale = imgui.ImVec2(scale, scale)
         io.delta_time = min(max(delta, 1e-4), 0.25)
         self._cover()
+        session.viewpoint.refit()
         imgui.new_frame()
         if imgui.get_frame_count() > 2:  # before, imgui does not know what is where
             self._mouse(io)

@@ -125,3 +125,19 @@ def test_a_view_of_ones_own_keeps_its_distance_between_columns(clock: Clock) -> 
     viewpoint = Viewpoint(Walking(), 2.0, Camera(distance=5.0), clock=clock)  # type: ignore[arg-type]
     viewpoint.uncover(0.3, 0.0, smoothly=False)
     assert viewpoint.at(0.0).distance == 5.0
+
+
+def test_a_named_view_fits_the_picture_again_when_its_shape_changes(talking: Animation, clock: Clock) -> None:
+    scene = Scene(talking)
+    viewpoint = Viewpoint(scene, 16 / 9, clock=clock)
+    viewpoint.preset("front")
+    clock.now += GLIDE
+    viewpoint.aspect = 0.4
+    viewpoint.refit()
+    assert viewpoint.camera == scene.camera("front", 0.4)
+    assert viewpoint.camera.distance > 1.5 * scene.camera("front", 16 / 9).distance
+    mine = viewpoint.camera.orbit(20, 0)
+    viewpoint.camera = mine
+    viewpoint.aspect = 2.0
+    viewpoint.refit()
+    assert viewpoint.camera == mine  # what was moved by hand stays

@@ -12,8 +12,9 @@ from open_windows import opened, settle, shown, until
 
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
+from player.playing import play
 from player.scene import Scene
-from player.window import Window, play
+from player.window import Window
 
 glfw = pytest.importorskip("glfw")
 
