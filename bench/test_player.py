@@ -1,14 +1,10 @@
-"""Speed of the player with software OpenGL, at 1280x720: pictures a second, its own time, the first picture.
+"""Speed of the player with software OpenGL, at 1280x720: pictures a second, its own time.
 
 A machine that has other things to do shows in the pictures a second, less in the times of the processor.
 """
 
 from __future__ import annotations
 
-import os
-import resource
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -119,25 +115,3 @@ def _timed(function: Callable[..., Any], within: list[float]) -> Callable[..., A
             within[0] += time.thread_time() - start
 
     return timed
-
-
-@pytest.mark.parametrize("name", ["hello.fap", "hello.bvh"])
-def test_first_picture(benchmark: Any, name: str, report: Callable[[str], None], tmp_path: Path) -> None:
-    """`fba render` of one picture in a process of its own, with what is kept on disk already there."""
-    pytest.importorskip("PIL")
-    source, out = str(files("fba") / "samples" / name), str(tmp_path / "one.png")
-    command = [sys.executable, "-m", "fba", "render", source, "-o", out]
-    if subprocess.run(command, capture_output=True, check=False).returncode:  # makes what is kept
-        pytest.skip("no picture can be made here")
-    spent = []
-
-    def one() -> None:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(command, capture_output=True, check=True, env=dict(os.environ))
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-
-    benchmark.pedantic(one, rounds=3)
-    took = median(benchmark.stats.stats.data)
-    report(f"first picture of {name}: {took:.2f} s, of the processors {median(spent):.2f} s")
-    assert median(spent) < 30
