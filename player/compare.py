@@ -223,9 +223,16 @@ class CompareScene(InTime[CompareTimeline]):
         """(3,) by which a figure stands elsewhere than alone."""
         if self._arrangement == "over":
             return self._height(number)
-        widest = self._apart or max(scene.subject.half_width for scene in self.scenes)
-        along = (number - (len(self.scenes) - 1) / 2) * 2 * widest * APART
-        return np.asarray(self._right() * along + self._height(number))
+        widths = [self._half_width(scene) for scene in self.scenes]
+        along = sum(widths[:number]) - sum(widths[number + 1 :])
+        return np.asarray(self._right() * along * APART + self._height(number))
+
+    def _half_width(self, scene: Scene) -> float:
+        """The room that one takes: all the same, but heads less than whole bodies."""
+        if self._apart is not None:
+            return self._apart
+        kin = [one.subject.half_width for one in self.scenes if one.has_body == scene.has_body]
+        return max(*kin, SHOULDERS) if self.has_body else max(kin)
 
     def _height(self, number: int) -> Float64:
         """(3,) that brings a head alone up to the heads on bodies."""
@@ -245,7 +252,10 @@ class CompareScene(InTime[CompareTimeline]):
         right = self._right()
         places = [np.array(one.centre) + self._place(n) for n, one in enumerate(subjects)]
         along = [float(place @ right) for place in places]
-        widths = [max(one.half_width, (self._apart or 0.0) * 0.7) for one in subjects]
+        widths = [
+            max(one.half_width, (self._apart or 0.0) * 0.7, SHOULDERS if self.has_body else 0.0)
+            for one in subjects
+        ]
         low = min(a - width for a, width in zip(along, widths, strict=True))
         high = max(a + width for a, width in zip(along, widths, strict=True))
         bottom = min(float(p[1]) - s.half_height for p, s in zip(places, subjects, strict=True))

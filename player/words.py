@@ -84,7 +84,8 @@ def placed_names(
     """Which names find room, and their upper left corners (M, 2), pixels.
 
     dots: (N, 2) pixels from the upper left, NaN where one cannot be seen. sizes: (N, 2) of the names.
-    None where more than `MOST_NAMES` dots are in the picture; each beside its dot, none over another.
+    None where more than `MOST_NAMES` dots are in the picture; each beside its dot, or above a place
+    without one (radius 0); none over another.
     """
     inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
     if inside.sum() > MOST_NAMES:
@@ -94,7 +95,9 @@ def placed_names(
     chosen, corners = [], []
     for number in np.flatnonzero(inside):
         (x, y), (wide, high) = dots[number], sizes[number]
+        above = [(min(max(x - wide / 2, 0.0), size[0] - wide), y - high)] if radius == 0 else []
         for left, top in (
+            *above,
             (x + reach, y - high / 2),
             (x - reach - wide, y - high / 2),
             (x - wide / 2, y - reach - high),

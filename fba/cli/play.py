@@ -91,8 +91,8 @@ def command(
             if opened[-1][1]:
                 streams.append(opened[-1][0])
         names = [
-            animation.name if str(file) == "-" else file.name
-            for file, (animation, _) in zip(files, opened, strict=True)
+            animation.name if name == "-" else name
+            for name, (animation, _) in zip(showing.names_of(files), opened, strict=True)
         ]
         scene = showing.scene(opened, names, how, over=compare)
         _check_start(scene, start, growing=bool(streams))

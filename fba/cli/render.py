@@ -153,7 +153,7 @@ def command(
         options.read_input(file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage)
         for file in files
     ] or [still(faps, visemes, expressions)]
-    names = [file.name for file in files] or [""]
+    names = showing.names_of(files) or [""]
     scene = showing.scene([(animation, False) for animation in animations], names, how)
     if sheet is not None:
         _frames_sheet(scene, sheet, Path(output), tile=size, camera=how.camera, start=start, end=end)

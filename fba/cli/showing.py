@@ -85,6 +85,15 @@ def scene(shown: list[Shown], names: list[str], how: SceneOptions, *, over: bool
     return found
 
 
+def names_of(files: tuple[Path, ...]) -> list[str]:
+    """What files are called where they are shown together: with their folder, where that tells them apart."""
+    given = [file.name for file in files]
+    return [
+        f"{file.absolute().parent.name}/{name}" if given.count(name) > 1 and name != "-" else name
+        for file, name in zip(files, given, strict=True)
+    ]
+
+
 def voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
     """The sound that is asked for, or that lies beside the first of the files that has one which can be read.
 

@@ -11,7 +11,7 @@ from player.ui import theme
 from player.ui.chooser import Chooser
 from player.ui.columns import Columns, amount, parameter
 from player.ui.lanes import COLOURS, Lane, Lanes
-from player.ui.panel import Panel, tooltip
+from player.ui.panel import Panel, chosen_name, tooltip
 from player.ui.session import Session
 from player.ui.stretch import Stretch
 
@@ -31,6 +31,8 @@ class CurvesPanel(Panel):
         self._columns: Columns | None = None
         self._of: Any = None
         self._begun = False
+        self.which = 0
+        """Of several performances, the one whose curves are shown."""
         self._lanes: list[Lane] = []
         self.stretch = Stretch()
         self.lanes = Lanes()
@@ -42,6 +44,9 @@ class CurvesPanel(Panel):
 
     def draw(self, session: Session) -> None:
         """Draw it."""
+        names = getattr(session.scene, "names", ())
+        if len(names) > 1:
+            self.which = chosen_name("##which", names, min(self.which, len(names) - 1))
         columns = self._known(session)
         transport = session.transport
         self.stretch.bound(
@@ -56,17 +61,18 @@ class CurvesPanel(Panel):
         courses = [columns.course(kind, number) for kind, number in chosen]
         if [lane.course for lane in self._lanes] != courses:
             self._lanes = [_lane(course, place) for place, course in enumerate(courses)]
-        self.lanes.draw(session, self._lanes, self.stretch, _now(session, chosen))
+        self.lanes.draw(session, self._lanes, self.stretch, _now(session, chosen, self.which))
 
     def closed(self, session: Session) -> None:
         """What has been worked out is kept."""
         session.rolling.discard(self.name)
 
     def _known(self, session: Session) -> Columns:
-        timeline = _timeline(session)
+        timeline = _timeline(session, self.which)
         if self._columns is None or self._of is not timeline:
-            later = getattr(session.scene.timeline, "later", (0,))[0]
-            self._columns = Columns(timeline, getattr(session.scene, "model", None), float(later))
+            later = getattr(session.scene.timeline, "later", (0,))[self.which]
+            scene = getattr(session.scene, "scenes", (session.scene,))[self.which]
+            self._columns = Columns(timeline, getattr(scene, "model", None), float(later))
             self._of, self._begun = timeline, False
         if self._columns.advance():
             session.rolling.add(self.name)
@@ -97,10 +103,10 @@ class CurvesPanel(Panel):
             tooltip("the whole time again; the wheel zooms, a right drag moves")
 
 
-def _timeline(session: Session) -> Any:
-    """Of what is shown, or of the first of several."""
+def _timeline(session: Session, which: int = 0) -> Any:
+    """Of what is shown, or of one of several."""
     scenes = getattr(session.scene, "scenes", None)
-    timeline = scenes[0].timeline if scenes else session.scene.timeline
+    timeline = scenes[which].timeline if scenes else session.scene.timeline
     return timeline if hasattr(timeline, "animation") else None
 
 
@@ -115,14 +121,16 @@ def _lane(course: Any, place: int) -> Lane:
     return Lane(course, f"{row.number} {row.name}", write, COLOURS[place % len(COLOURS)])
 
 
-def _now(session: Session, chosen: list[tuple[str, int]]) -> dict[tuple[str, int], float]:
+def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tuple[str, int], float]:
     """Values of this moment: with what hooks make of them."""
     kinds = {kind for kind, _ in chosen}
     if session.before_frame:
         faps, baps = session.values
     else:
-        timeline: Any = session.scene.timeline
-        time = session.transport.time
+        whole: Any = session.scene.timeline
+        timeline, time = _timeline(session, which), session.transport.time
+        if timeline is not whole:
+            time = whole.own_time(which, time)
         faps = timeline.faps(time) if "fap" in kinds else session.values[0]
         baps = timeline.baps(time) if "bap" in kinds else session.values[1]
     return {(kind, n): float((faps if kind == "fap" else baps)[n - 1]) for kind, n in chosen}

@@ -12,7 +12,7 @@ from imgui_bundle import imgui, implot
 from player.compare import ARRANGEMENTS
 from player.differences import Differences, Largest
 from player.ui import theme
-from player.ui.panel import Panel, heading, tooltip
+from player.ui.panel import Panel, chosen_name, heading, tooltip
 from player.ui.session import Session
 
 ROWS = 9
@@ -45,20 +45,14 @@ class DifferencesPanel(Panel):
         self._arrangement(session, scene)
         self._second = min(self._second, len(scene.scenes) - 1)
         if len(scene.scenes) > 2:
-            imgui.set_next_item_width(-1)
-            if imgui.begin_combo("##second", scene.names[self._second]):
-                for number in range(1, len(scene.scenes)):
-                    if imgui.selectable(scene.names[number], number == self._second)[0]:
-                        self._second = number
-                imgui.end_combo()
+            self._second = 1 + chosen_name("##second", scene.names[1:], self._second - 1)
         found = scene.differences(self._second)
         if self._known is None or self._known[0] is not found:
             self._known = (found, found.largest(ROWS))
         largest = self._known[1]
-        heading(f"{_short(scene.names[self._second])} minus {_short(scene.names[0])}")
+        heading(f"{_short(scene.names[self._second])} minus {_short(scene.names[0])}", exact=True)
         if not largest:
-            what = "nothing differs" if len(found.times) else "they have no time in common"
-            imgui.text_colored(theme.FAINT, what)
+            imgui.text_colored(theme.FAINT, _nothing(scene, self._second, found))
             return
         if self._chosen not in [(one.kind, one.number) for one in largest]:
             self._chosen = (largest[0].kind, largest[0].number)
@@ -128,6 +122,16 @@ class DifferencesPanel(Panel):
         implot.pop_style_color(2)
         now = float(np.interp(session.transport.time, times, values))
         imgui.text_colored(theme.FAINT, f"now {now:+.0f} {_unit(chosen.unit, now)}")
+
+
+def _nothing(scene: Any, second: int, found: Differences) -> str:
+    """Why nothing differs."""
+    one, other = (scene.scenes[number].animation for number in (0, second))
+    if not any(
+        getattr(one, part) is not None and getattr(other, part) is not None for part in ("face", "body")
+    ):
+        return "one is a face, the other a body: nothing to compare"
+    return "nothing differs" if len(found.times) else "they have no time in common"
 
 
 def thinned(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
+import numpy as np
 from imgui_bundle import imgui
 
 from fba.codec import PartInfo, StreamInfo
@@ -30,7 +32,7 @@ class FilePanel(Panel):
             self._told = (info, _all(session, info))
         for title, rows in self._told[1]:
             if title:
-                heading(title)
+                heading(title, exact=title[0].isdigit())
             facts(title or "file", rows)
         troubles = [*source.warnings, *(str(one.error) for one in info.damage)]
         if troubles:
@@ -47,12 +49,31 @@ class FilePanel(Panel):
 
 def _all(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
     """(heading, rows) of the panel."""
+    if hasattr(session.scene, "scenes"):
+        return _several(session.scene)
     parts = [("", _about(session, info))]
     if info.plane_bits is not None:
         parts.append(("Stream", _stream(info)))
     for title, name, part in (("Face", "FAPs", info.face), ("Body", "BAPs", info.body)):
         if part is not None:
             parts.append((title, _part(part, name, info.frames)))
+    return parts
+
+
+def _several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
+    """A heading and rows for each performance of several."""
+    parts = []
+    for number, (name, one) in enumerate(zip(scene.names, scene.scenes, strict=True)):
+        times, animation = one.timeline, one.animation
+        rows = [("frames", f"{times.frames}"), ("rate", f"{float(times.rate):g} frames/s")]
+        rows.append(("duration", clock_text(times.duration)))
+        if times.start:
+            rows.append(("starts at", clock_text(times.start)))
+        for title, track in (("FAPs", animation.face), ("BAPs", animation.body)):
+            if track is not None:
+                sent = tuple((np.flatnonzero(track.mask.any(axis=0)) + 1).tolist())
+                rows.append((title, f"{len(sent)}: {_ranges(sent)}" if sent else "none"))
+        parts.append((f"{number + 1}  {name}", rows))
     return parts
 
 

@@ -119,6 +119,8 @@ def draw_notices(session: Session, display: tuple[float, float], above: float) -
 
 
 def _facts(session: Session) -> str:
+    if hasattr(session.scene, "scenes"):
+        return ""  # each has its own
     info = session.source.info
     parts = [f"{session.scene.timeline.frames} frames", f"{float(session.scene.timeline.rate):g} frames/s"]
     if info.size and info.plane_bits is not None:

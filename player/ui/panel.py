@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from imgui_bundle import imgui
@@ -64,11 +64,11 @@ def facts(name: str, rows: list[tuple[str, str]]) -> None:
         imgui.end_table()
 
 
-def heading(text: str) -> None:
-    """A line that begins a part of a panel."""
+def heading(text: str, *, exact: bool = False) -> None:
+    """A line that begins a part of a panel; exact: with names in it, which stay as they are."""
     imgui.dummy((0, 2))
     imgui.push_font(None, theme.SMALL)
-    imgui.text_colored(theme.ACCENT, text.upper())
+    imgui.text_colored(theme.ACCENT, text if exact else text.upper())
     imgui.pop_font()
 
 
@@ -79,6 +79,17 @@ def shortened(text: str, wide: float) -> str:
     while text and imgui.calc_text_size(text + "...").x > wide:
         text = text[:-1]
     return text.rstrip(" ;,") + "..."
+
+
+def chosen_name(label: str, names: Sequence[str], now: int) -> int:
+    """A list of names of which one is chosen, by number."""
+    imgui.set_next_item_width(-1)
+    if imgui.begin_combo(label, names[now]):
+        for number, name in enumerate(names):
+            if imgui.selectable(f"{name}##{number}", number == now)[0]:
+                now = number
+        imgui.end_combo()
+    return now
 
 
 def tooltip(text: str, key: str = "") -> None:

@@ -115,6 +115,14 @@ def test_broken_sound(run: Run, window: Window, talk: Path, tmp_path: Path) -> N
     assert window.scene is None
 
 
+def test_files_of_the_same_name_are_told_apart(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
+    (tmp_path / "coarse").mkdir()
+    other = tmp_path / "coarse" / "talk.fba"
+    other.write_bytes(talk.read_bytes())
+    assert run("play", talk, other).code == 0
+    assert window.scene.names == (f"{tmp_path.name}/talk.fba", "coarse/talk.fba")
+
+
 def test_several_files_are_shown_together(
     run: Run, window: Window, talk: Path, tmp_path: Path, body: Animation
 ) -> None:

@@ -181,6 +181,22 @@ def test_a_head_beside_a_body_is_as_high_as_its_head() -> None:
     assert heights[0] > 1.4
 
 
+def test_heads_and_bodies_in_a_row_are_all_in_the_picture() -> None:
+    scene = CompareScene([Scene(talk([0, 0])), Scene(talk([0, 0])), Scene(walk([0, 0])), Scene(talk([0, 0]))])
+    camera, aspect = scene.camera(None, 16 / 9), 16 / 9
+    matrix = camera.projection_matrix(aspect) @ camera.view_matrix()
+    across = []
+    for eye in scene.at(0.0).eyes[::2]:
+        clip = matrix @ eye.matrix[:, 3]
+        across.append(float(clip[0] / clip[3]))
+    apart = np.diff(across)
+    assert (apart > 0).all()
+    assert apart[1] > 1.3 * apart[0]  # a body has more room than a head
+    shoulders = 0.25 * float(matrix[0, 0]) / camera.distance
+    assert across[0] - shoulders > -1
+    assert across[-1] + shoulders < 1
+
+
 def test_nothing_or_too_few_names_is_refused(pair: CompareScene) -> None:
     with pytest.raises(ValueError, match="no scene"):
         CompareScene([])

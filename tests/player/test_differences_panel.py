@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from player_tracks import face_track
+from player_tracks import body_track, face_track
+from studio_hand import panel_of
 
 from fba.animation import Animation
 from player.compare import CompareScene
@@ -72,3 +73,39 @@ def test_a_long_curve_keeps_its_peaks() -> None:
     assert (np.diff(times) > 0).all()
     short = np.arange(3.0)
     assert thinned(short, short, 3)[0] is short
+
+
+def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
+    session = studio.session
+    session.selection.faps = [3]
+    session.open.add("curves")
+    studio.draw(4)
+    panel = panel_of(studio, "curves")
+    assert panel._lanes[0].course.values.tolist() == [0, 10, 20, 30]
+    panel.which = 1
+    studio.draw(4)
+    assert panel._lanes[0].course.values.tolist() == [0, 10, 90, 30]
+
+
+def test_each_file_is_told_of(studio: Studio) -> None:
+    from player.ui.file_panel import _all
+
+    told = _all(studio.session, studio.session.source.info)
+    assert [title for title, _ in told] == ["1  a.fba", "2  b.fba"]
+    assert [row for row in told[0][1] if row[0] != "duration"] == [
+        ("frames", "4"),
+        ("rate", "10 frames/s"),
+        ("FAPs", "2: 3, 18"),
+    ]
+
+
+def test_why_nothing_differs() -> None:
+    from player.ui.differences_panel import _nothing
+
+    rest = body_track([{32: 0}] * 4)
+    face, body = Scene(talk([0] * 4)), Scene(Animation(Fraction(10), np.arange(4), body=rest))
+    for scene, said in (
+        (CompareScene([face, face]), "nothing differs"),
+        (CompareScene([face, body]), "one is a face, the other a body"),
+    ):
+        assert _nothing(scene, 1, scene.differences()).startswith(said)

@@ -286,6 +286,12 @@ class TestNames:
             for b in boxes[i + 1 :]:
                 assert not (a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3])
 
+    def test_without_a_dot_it_stands_above_its_place(self) -> None:
+        sizes = np.array([[30, 12]])
+        for x, left in ((100.0, 85.0), (4.0, 0.0), (197.0, 170.0)):  # the last two would leave the picture
+            _, corners = placed_names(np.array([[x, 50.0]]), sizes, 0.0, (200, 100))
+            assert corners.tolist() == [[left, 38.0]]
+
     def test_where_many_are_in_view_none_is_named(self) -> None:
         dots = np.stack(np.meshgrid(np.arange(10) * 40.0, np.arange(10) * 40.0), axis=-1).reshape(-1, 2)
         assert len(placed_names(dots, np.full((100, 2), 10), 3.0, (400, 400))[0]) == 0
