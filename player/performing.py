@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from player.ui.session import Session
 
 NEUTRAL_SECONDS = 10
+WHAT = "the last take"
 
 
 class Performer:
@@ -72,10 +73,19 @@ class Performer:
         self.session.rolling.discard("take")
         if recorder is not None and len(recorder):
             self.takes.add(recorder.take(f"take {len(self.takes) + 1}"))
+            self.session.unsaved.add(WHAT)
+
+    def undo(self) -> None:
+        """Forget the last take."""
+        self.stop()
+        self.takes.undo()
+        self.session.unsaved.discard(WHAT)
 
     def save(self, name: str) -> tuple[Path, str]:
         """Write the last take, with the BAP steps of what is played; returns and raises as `Takes.save`."""
-        return self.takes.save(name, bap_steps=self.session.source.bap_steps)
+        saved = self.takes.save(name, bap_steps=self.session.source.bap_steps)
+        self.session.unsaved.discard(WHAT)
+        return saved
 
     def _begin(self) -> None:
         self._begun = self.session.clock()

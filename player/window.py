@@ -116,7 +116,11 @@ class Window:
             glfw.poll_events()
         else:
             glfw.wait_events_timeout(IDLE)
-        if glfw.window_should_close(self._window) or session.closing:
+        if glfw.window_should_close(self._window) and not session.closing:
+            session.leave()
+            glfw.set_window_should_close(self._window, session.closing)
+            self._heard()
+        if session.closing:
             return False
         if not self._due:
             return True
@@ -252,7 +256,7 @@ class Window:
 
     def _draw(self, size: tuple[int, int]) -> None:
         session = self.session
-        session.size, session.scale = size, self._scale()
+        session.size, session.scale, session.whole_screen = size, self._scale(), self._screen.whole
         session.viewpoint.aspect = size[0] / size[1]
         if self._target is None or self._target.size != size:
             if self._target is not None:

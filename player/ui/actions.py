@@ -115,7 +115,11 @@ def _bare(session: Session) -> None:
 
 
 def _close(session: Session) -> None:
-    session.closing = True
+    session.leave()
+
+
+def _escape(session: Session) -> None:
+    session.escape()
 
 
 def _step(frames: int) -> Callable[[Session], None]:
@@ -151,6 +155,7 @@ _PLAIN: dict[str, Callable[[Session], None]] = {
     "sound_later": _shift_sound(SHIFT),
     "bare": _bare,
     "close": _close,
+    "escape": _escape,
     **{name: _wish(name) for name in ("screenshot", "transparent", "record", "fullscreen")},
 }
 _WITH: dict[str, Callable[[Session, str], None]] = {

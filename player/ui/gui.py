@@ -50,6 +50,7 @@ class Gui:
         self._cover()
         session.viewpoint.camera = session.viewpoint.beginning
         self._button = -1
+        self._listed = False
         self.shown = 1.0
         """How much of the bar is there, 0 to 1."""
 
@@ -90,6 +91,7 @@ class Gui:
             sides = (0.0, 0.0) if session.bare else self._places.sides
             session.viewpoint.uncover(*sides, smoothly=self.hides)
         draw_notices(session, display, self.bar.height(display) * self.shown if not session.bare else 0.0)
+        self._popups()
         imgui.render()
         self._renderer.draw(imgui.get_draw_data())
 
@@ -104,6 +106,15 @@ class Gui:
         implot.destroy_context(self._plots)
         imgui.destroy_context(self._context)
         self._context = None
+
+    def _popups(self) -> None:
+        """Whether a list is open, which the session may have closed."""
+        flags = imgui.PopupFlags_
+        there = imgui.is_popup_open("", flags.any_popup_id | flags.any_popup_level)
+        if there and self._listed and not self.session.popup:
+            imgui.internal.close_popup_to_level(0, True)
+            there = False
+        self._listed = self.session.popup = there
 
     def _cover(self) -> None:
         """Tell the camera how much of the picture the bar takes."""

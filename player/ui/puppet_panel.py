@@ -109,8 +109,7 @@ class PuppetPanel(Panel):
         tooltip("the last take, once")
         imgui.same_line()
         if self._button("Undo"):
-            performer.stop()
-            performer.takes.undo()
+            performer.undo()
             session.say("The last take is gone")
         tooltip("forget the last take")
         imgui.same_line(0, 12)

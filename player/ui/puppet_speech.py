@@ -22,7 +22,7 @@ def speech(performer: Performer) -> None:
                                 imgui.SliderFlags_.always_clamp)  # fmt: skip
     if (first, second, blend) != (now.select1, now.select2, now.blend):
         puppet.viseme = Viseme(first, second, blend)
-    if puppet.speaks and imgui.button("Release##viseme"):
+    if _release("viseme", there=puppet.speaks):
         puppet.viseme = Viseme()
 
 
@@ -42,7 +42,7 @@ def mood(performer: Performer) -> None:
         chosen += [select, intensity]
     if chosen != [now.select1, now.intensity1, now.select2, now.intensity2]:
         puppet.expression = Expression(*chosen)
-    if puppet.feels and imgui.button("Release##expression"):
+    if _release("expression", there=puppet.feels):
         puppet.expression = Expression()
     imgui.dummy((1, 4))
     imgui.push_text_wrap_pos(0.0)
@@ -52,6 +52,14 @@ def mood(performer: Performer) -> None:
         "Sliders win over both.",
     )
     imgui.pop_text_wrap_pos()
+
+
+def _release(what: str, *, there: bool) -> bool:
+    """A button that is always at its place, so that nothing moves away from under the mouse."""
+    imgui.begin_disabled(not there)
+    pressed = imgui.button(f"Release##{what}")
+    imgui.end_disabled()
+    return bool(pressed and there)
 
 
 def _choice(label: str, names: tuple[str, ...], now: int) -> int:

@@ -5,6 +5,7 @@ Panels read and change this; it knows no imgui and no OpenGL.
 
 from __future__ import annotations
 
+import math
 import os
 import time as wall
 from collections import deque
@@ -33,6 +34,8 @@ PathLike = str | os.PathLike[str]
 Hook = Callable[[Faps, Baps], None]
 
 NOTICE_SECONDS = 4.0
+LEAVING = 6.0
+"""Seconds in which closing once more closes."""
 NOTICE_GOES = 0.5
 """Seconds before its end from which on a notice fades."""
 
@@ -80,7 +83,8 @@ class Session:
     None where nothing is being recorded. values: faps and baps of the last picture, after the hooks.
     sound: the file that belongs to what is played, whether a device makes it heard (audio) or not; it begins
     sound_offset seconds after the first frame, see `shift_sound`.
-    rolling: names of what changes the picture by itself, or counts on being drawn.
+    rolling: names of what changes the picture by itself, or counts on being drawn. unsaved: what would be
+    lost with the window, see `leave`. popup: whether a list is open over the picture; False closes it.
     """
 
     def __init__(
@@ -109,6 +113,9 @@ class Session:
         self.wishes: deque[str] = deque()
         self.recording: float | None = None
         self.rolling: set[str] = set()
+        self.unsaved: set[str] = set()
+        self.whole_screen = False
+        self.popup = False
         self.audio: Audio | None = None
         self.sound: PathLike | None = None
         self.sound_offset = 0.0
@@ -116,6 +123,7 @@ class Session:
         self.clock = clock
         self.last_input = clock()
         self._notices: list[Notice] = []
+        self._asked = -math.inf
 
     def toggle_panel(self, name: str) -> None:
         """Open a panel, or close it. Where all is hidden, show it."""
@@ -143,6 +151,24 @@ class Session:
     def wish(self, what: str) -> None:
         """Ask the window for "screenshot", "transparent", "record" or "fullscreen"."""
         self.wishes.append(what)
+
+    def escape(self) -> None:
+        """Close the list that is open, else leave the full screen, else the window."""
+        if self.popup:
+            self.popup = False
+        elif self.whole_screen:
+            self.wish("fullscreen")
+        else:
+            self.leave()
+
+    def leave(self) -> None:
+        """Close the window; where something is not saved, only when asked a second time."""
+        if self.unsaved and self.clock() > self._asked:
+            self._asked = self.clock() + LEAVING
+            what = " and ".join(sorted(self.unsaved))
+            self.say(f"Not saved: {what}. Once more to close without", "warning", LEAVING, about="leave")
+            return
+        self.closing = True
 
     def touched(self) -> None:
         """The user moved the mouse or pressed something: what hides itself comes back."""

@@ -38,7 +38,7 @@ def test_keys_are_shown_as_people_write_them() -> None:
     assert key_of("faster") == "+"
     assert key_of("panel file") == "F2"
     assert key_of("no such thing") == ""
-    assert [row.shown for row in keys() if row.action == "close"] == ["Esc, Q"]
+    assert [row.shown for row in keys() if row.action == "fullscreen"] == ["F, F11"]
 
 
 def test_every_panel_has_a_key_and_every_key_its_panel() -> None:

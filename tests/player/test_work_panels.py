@@ -395,3 +395,53 @@ def test_a_panel_is_taken_out_of_its_column_and_brought_back(opened: Opened, tal
     hand.double_click(x + 60, y + 12)
     studio.draw(2)
     assert tuple(_window(studio, "camera").pos) == docked
+
+
+def test_escape_closes_a_list_before_the_window(opened: Opened, talking: Animation) -> None:
+    studio = opened(talking, "view")
+    session, window = studio.session, _window(studio, "view")
+    hand = StudioHand(studio)
+    for row in range(8):  # the first list of the panel
+        hand.click(window.pos.x + 60, window.pos.y + 120 + 25 * row)
+        if session.popup:
+            break
+    assert session.popup
+    studio.gui.controls.key("esc")
+    studio.draw(2)
+    assert not session.popup
+    assert not session.closing
+    studio.gui.controls.key("esc")
+    assert session.closing
+
+
+def test_a_take_that_is_not_saved_is_not_lost_by_one_key(
+    opened: Opened, talking: Animation, clock: Clock, tmp_path: Path
+) -> None:
+    studio = opened(talking, "puppet")
+    session = studio.session
+    performer = panel_of(studio, "puppet").performer(session)
+    performer.record()
+    studio.draw(1)
+    clock.now += 0.2
+    studio.draw(1)
+    performer.stop()
+    session.leave()
+    assert not session.closing
+    assert [notice.kind for notice in session.notices()] == ["warning"]
+    clock.now += 60
+    session.leave()
+    assert not session.closing  # it was too long ago
+    clock.now += 1
+    session.leave()
+    assert session.closing
+    session.closing = False
+    performer.save("mine")
+    session.leave()
+    assert session.closing
+
+
+def test_escape_leaves_the_full_screen_first(opened: Opened, talking: Animation) -> None:
+    session = opened(talking).session
+    session.whole_screen = True
+    session.escape()
+    assert (list(session.wishes), session.closing) == (["fullscreen"], False)
