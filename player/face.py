@@ -21,7 +21,7 @@ from player.places import Places, Probe, Whole
 from player.shapes import Eye, FaceMesh, FaceShape, rotation_vector
 
 if TYPE_CHECKING:
-    from player.gpu.tables import FaceTables, MovedFace
+    from player.gpu.tables import FaceLightTables, FaceTables, MovedFace
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -151,7 +151,7 @@ class FaceFigure:
         def motion() -> MovedFace:
             from player.gpu.tables import MovedFace
 
-            return MovedFace(self._tables, self.deformer.motion(faps))
+            return MovedFace(self._tables, self.deformer.motion(faps), self._light_tables)
 
         whole = Whole(len(self.model.vertices), make, lambda rows: self._probe.at(faps, rows)[0], motion)
         return Pose(faps, whole, self.deformer.head_matrices(faps))
@@ -162,6 +162,13 @@ class FaceFigure:
         from player.gpu.tables import FaceTables
 
         return FaceTables(self.deformer)
+
+    @cached_property
+    def _light_tables(self) -> FaceLightTables:
+        """The same of the light on it."""
+        from player.gpu.tables import FaceLightTables
+
+        return FaceLightTables(self._light)
 
     def _prepared(self, rows: Rows) -> Callable[[Float32, Float32], None]:
         """What writes the places of some vertices (N,), for FAPs (68,)."""

@@ -6,7 +6,7 @@ import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,6 @@ Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
 Bool = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.intp]
-Light = Callable[[Rows | None], Float32]
 
 KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
 """As in shaders/lighting.glsl."""
@@ -44,7 +43,7 @@ MOVES = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class _Baked:
+class Baked:
     """Visibility with the mouth shut and open, (V,) where these differ, and how far its lips are apart in
     both, metres."""
 
@@ -61,17 +60,47 @@ class LitFace:
         self, light: FaceLight, share: float, lights: Float32, tongues: list[tuple[slice, Float32]]
     ) -> None:
         self._light = light
-        self._args = (share, lights, tongues)
-        self._parts: dict[tuple[int, int], Light] = {}
+        self._args = (share, lights)
+        self._tongues = tongues
+        self._parts: dict[tuple[int, int], LitFacePart] = {}
 
-    def of(self, part: slice) -> Light:
-        """What gives float32 (N, 4), 0..1, for the vertices of a part, or those of its rows (N,) that are
-        asked for: what reaches them of the key light, of the open sky, through the skin from behind, and of
-        the rim light. The same object each time."""
+    def of(self, part: slice) -> LitFacePart:
+        """The same for one part; the same object each time."""
         key = (part.start, part.stop)
         if key not in self._parts:
-            self._parts[key] = partial(self._light.lit, part, *self._args)
+            outside = next((out for tongue, out in self._tongues if tongue == part and out.any()), None)
+            self._parts[key] = LitFacePart(self._light, part, *self._args, outside)
         return self._parts[key]
+
+
+@dataclass(frozen=True, eq=False)
+class LitFacePart:
+    """The light on a part of a face in one pose.
+
+    share: how far the mouth is wide open. lights: (2, 16) what weighs the harmonics for key and rim light,
+    for what goes with the head, then for what stands where that differs. outside (N,): how far each vertex of
+    a tongue is out between the lips, None where none is.
+    """
+
+    light: FaceLight
+    part: slice
+    share: float
+    lights: Float32
+    outside: Float32 | None
+
+    @property
+    def more(self) -> float:
+        """What share of the light that is missing falls in, as a photographer would have it."""
+        return ON_TEETH * self.share if self.light.is_of_teeth(self.part) else 0.0
+
+    def __call__(self, rows: Rows | None) -> Float32:
+        """float32 (N, 4), 0..1, for the part's vertices, or those of its rows (N,) that are asked for: what
+        reaches them of the key light, of the open sky, through the skin from behind, and of the rim light."""
+        found = self.light.some(self.part, rows).reaching(self.share, self.lights, self.more)
+        if self.outside is not None:
+            free = self.outside if rows is None else self.outside[rows]
+            found += (np.array(FREE, dtype=np.float32) - found) * free[:, None]
+        return found
 
 
 class FaceLight:
@@ -84,8 +113,7 @@ class FaceLight:
     def __init__(self, model: FaceModel, deformer: Deformer, sway: Float32) -> None:
         self._model = model
         self._deformer = deformer
-        self._sway = sway
-        self._baked: _Baked | None = None
+        self.sway = sway
         self._lit: tuple[tuple[object, ...], LitFace] | None = None
         self._kept: dict[tuple[int, int, int], tuple[Rows | None, _Some]] = {}
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
@@ -104,10 +132,8 @@ class FaceLight:
         """The light for a face whose positions without the head's turn (3, 3), (V, 3), `at` gives, right at
         rows (N,) at least; matrix: (3, 3) of the whole in the world. The same object while nothing changes.
         """
-        if self._baked is None:
-            self._baked = self._bake()
         positions = at(self._looked)
-        share = round(self._mouth_open(positions, self._baked.gaps), 2)
+        share = round(self._mouth_open(positions, self.baked.gaps), 2)
         out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
         # In steps that nobody sees, the same whatever was shown before.
         turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
@@ -118,33 +144,18 @@ class FaceLight:
             self._lit = (key, LitFace(self, share, lights, tongues))
         return self._lit[1]
 
-    def lit(
-        self,
-        part: slice,
-        share: float,
-        lights: Float32,
-        tongues: list[tuple[slice, Float32]],
-        rows: Rows | None,
-    ) -> Float32:
-        """As `LitFace` gives it for some of a part's vertices, or for all. lights: (2, 16) what weighs the
-        harmonics for what goes with the head, then for what stands where that differs."""
-        more = ON_TEETH * share if part in self._teeth else 0.0  # as a photographer would have it
-        found = self._some(part, rows).reaching(share, lights, more)
-        for tongue, outside in tongues:
-            if tongue == part and outside.any():
-                free = outside if rows is None else outside[rows]
-                found += (np.array(FREE, dtype=np.float32) - found) * free[:, None]
-        return found
+    def is_of_teeth(self, part: slice) -> bool:
+        """Whether a part is of teeth."""
+        return part in self._teeth
 
-    def _some(self, part: slice, rows: Rows | None) -> _Some:
+    def some(self, part: slice, rows: Rows | None) -> _Some:
         """What light at some of a part's vertices is worked out from; kept for as long as they are."""
         key = (part.start, part.stop, id(rows))
         if key not in self._kept:
             while len(self._kept) >= MOST_KEPT:
                 del self._kept[next(iter(self._kept))]
-            assert self._baked is not None
             chosen = np.arange(part.start, part.stop) if rows is None else rows + part.start
-            self._kept[key] = (rows, _Some(self._baked, chosen, self._sway))
+            self._kept[key] = (rows, _Some(self.baked, chosen, self.sway))
         return self._kept[key][1]
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
@@ -169,15 +180,17 @@ class FaceLight:
         share: Float32 = np.clip((depths - lips) / reach, 0.0, 1.0)
         return share.astype(np.float32)
 
-    def _bake(self) -> _Baked:
+    @cached_property
+    def baked(self) -> Baked:
+        """What hides what."""
         solid = [part for part in self._model.parts if part.kind not in ("brow", "lash")]
         joined = [part.triangles + self._model.starts[part.name] for part in solid]
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
         faps = np.zeros(68, dtype=np.float32)
         still, normals = self._posed(faps)
-        shut = kept_visibility(still, normals, triangles, self._sway > MOVES)
+        shut = kept_visibility(still, normals, triangles, self.sway > MOVES)
         if self._lips is None:
-            return _Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
+            return Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():
             faps[fap - 1] = value
         moved, normals = self._posed(faps)
@@ -187,10 +200,10 @@ class FaceLight:
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut.arrays, wide.arrays, strict=True)
         ]
-        return _Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
+        return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
 
     def _posed(self, faps: Float32) -> tuple[Float32, Float32]:
-        positions = np.empty((len(self._sway), 3), dtype=np.float32)
+        positions = np.empty((len(self.sway), 3), dtype=np.float32)
         normals = np.empty_like(positions)
         return self._deformer.local(faps, out=positions, normals=normals), normals
 
@@ -218,7 +231,7 @@ def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, with
 class _Some:
     """What the light at some vertices of the model is worked out from."""
 
-    def __init__(self, baked: _Baked, chosen: Rows, sway: Float32) -> None:
+    def __init__(self, baked: Baked, chosen: Rows, sway: Float32) -> None:
         self._all = _table(baked, chosen)
         swaying = np.flatnonzero(sway[chosen] < 1)
         self._still = _table(baked, chosen[swaying])
@@ -237,7 +250,7 @@ class _Some:
         return found
 
 
-def _table(baked: _Baked, chosen: Rows) -> Table:
+def _table(baked: Baked, chosen: Rows) -> Table:
     near = np.flatnonzero(baked.near[chosen])
     shut, wide = (
         [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]

@@ -15,7 +15,6 @@ from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
 from player.body_light import BodyLight
 from player.face import FaceFigure, Pose
-from player.face_light import Light
 from player.face_parts import coarser_part, part_shape, with_triangles
 from player.places import Places, Probe, SomeRows, Whole
 from player.shapes import Eye, FaceMesh, FaceShape
@@ -214,6 +213,6 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     return replace(kept, coarser=coarser)
 
 
-def _placed(shape: FaceShape, whole: Whole, rows: slice, light: Light) -> FaceMesh:
+def _placed(shape: FaceShape, whole: Whole, rows: slice, light: Callable[[Rows | None], Float32]) -> FaceMesh:
     places = Places(whole, rows.start, rows.stop - rows.start)
     return FaceMesh(shape, places, light, WORLD, NOWHERE, NOWHERE)

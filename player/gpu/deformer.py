@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from player.body_light import KEY, REACH
+from player.face_light import LitFacePart
 from player.gpu.programs import deforming_program, use
 from player.gpu.tables import CarriedBody, CarriedFace, MovedFace, Tables
 from player.gpu.textures import Table, grid
@@ -37,7 +38,7 @@ class GpuDeformer:
         self._whole_arrays: dict[str, Any] = {}
         self._tables: dict[int, tuple[Tables, dict[str, Table]]] = {}
         self._held: dict[tuple[int, str], Any] = {}
-        self._ready: tuple[int, Any] | None = None
+        self._ready: tuple[Any, ...] | None = None
         self._drawn: dict[tuple[str, int], tuple[Whole, Any, Any]] = {}
 
     def prepare(self, wholes: list[Whole], capsules: Mapping[int, Float32] | None = None) -> None:
@@ -77,13 +78,15 @@ class GpuDeformer:
         motion, chosen = places.whole.motion, _rows(places)
         parts = [(chosen, "1i", "in_row")]
         if isinstance(motion, CarriedBody):
-            name = "lit" if lit else "body"
+            name = "body"
             parts += _attributes(motion.tables.rows, chosen, "around", "numbers", "upright")
             if lit:
                 parts += _attributes(motion.light, chosen, "near", "shares", "folds")
         else:
             face = motion.face.motion if isinstance(motion, CarriedFace) else motion
             name = "face"
+            if lit:
+                parts += _attributes(face.light, chosen, "near", "sway")
             parts += _attributes(face.tables, chosen, "part", "around", "neutral")
         if isinstance(motion, CarriedFace):
             name = "carried"
@@ -94,15 +97,18 @@ class GpuDeformer:
             (self._gl.buffer(np.ascontiguousarray(array, dtype=kind[1] + "4").tobytes()), kind, attribute)
             for array, kind, attribute in parts
         ]
-        array = self._gl.vertex_array(self._program(name), buffers)
+        array = self._gl.vertex_array(self._program(f"{name}_lit" if lit else name), buffers)
         return [array, *(buffer for buffer, _, _ in buffers)]
 
-    def write(self, places: Places, rows: list[Any], buffers: list[Any]) -> None:
+    def write(
+        self, places: Places, rows: list[Any], buffers: list[Any], light: LitFacePart | None = None
+    ) -> None:
         """Of a part of what was prepared: positions and normals, float32 (V, 3), and where it is lit, light
-        (V, 4), into as many buffers; rows: what `rows` gave."""
-        key = (id(places.whole), rows[0].program)
+        (V, 4), into as many buffers; rows: what `rows` gave. light: of a face that is lit."""
+        lit = None if light is None else (id(light.lights), light.share, light.more)
+        key = (id(places.whole), rows[0].program, lit)
         if self._ready != key:
-            self._make_ready(places.whole, rows[0].program, lit=len(buffers) > 2)
+            self._make_ready(places.whole, rows[0].program, light, lit=len(buffers) > 2)
             self._ready = key
         rows[0].transform(buffers, self._gl.POINTS, vertices=len(places))
 
@@ -119,7 +125,7 @@ class GpuDeformer:
         for kept in (self._drawn, self._tables, self._held, self._whole_arrays, self._programs):
             kept.clear()
 
-    def _make_ready(self, whole: Whole, program: Any, *, lit: bool) -> None:
+    def _make_ready(self, whole: Whole, program: Any, light: LitFacePart | None, *, lit: bool) -> None:
         """All that a program takes to write parts of a whole."""
         motion, base = whole.motion, _base(whole)
         use(moved=self._drawn["moved", id(base)][1])
@@ -133,7 +139,14 @@ class GpuDeformer:
         if isinstance(motion, CarriedFace):
             set_uniform(program, "size", motion.size)
             set_uniform(program, "offset", tuple(float(v) for v in motion.shift))
-        if lit:
+        if light is not None:
+            shining = self._of(base.motion.light)
+            use(visible=shining["visible"].texture, wide=shining["wide"].texture)
+            set_uniform(program, "share", light.share)
+            set_uniform(program, "more", light.more)
+            for place, name in enumerate(("key", "rim", "still_key", "still_rim")):
+                set_uniform(program, name, light.lights[place % len(light.lights)].tobytes())
+        elif lit:
             use(past=self._drawn["past", id(whole)][1])
             set_uniform(program, "reach", REACH)
 

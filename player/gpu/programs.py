@@ -13,12 +13,15 @@ DRAWING = {"face_moved": "gpu_face", "body_moved": "gpu_body", "past_limbs": "gp
 WRITING = {
     "face": ("gpu_face", (), ("position", "normal")),
     "carried": ("gpu_face", ("CARRIED",), ("position", "normal")),
+    "face_lit": ("gpu_face", ("LIT",), ("position", "normal", "light")),
+    "carried_lit": ("gpu_face", ("CARRIED", "LIT"), ("position", "normal", "light")),
     "body": ("gpu_body", (), ("position", "normal")),
-    "lit": ("gpu_body", ("LIT",), ("position", "normal", "light")),
+    "body_lit": ("gpu_body", ("LIT",), ("position", "normal", "light")),
 }
 """Programs that write buffers: vertex shader, names that the preprocessor is to know, what is written."""
 UNITS = ("moved", "triangles", "parts", "pose", "rest", "spans", "entries", "shifts", "tracks", "joints",
-         "weights", "wring", "past", "capsules", "at", "around", "numbers", "modelled")  # fmt: skip
+         "weights", "wring", "past", "capsules", "at", "around", "numbers", "modelled", "visible",
+         "wide")  # fmt: skip
 """Places of textures, by the names that shaders have for them."""
 FIRST = 4
 """The first of them: those before it are used by what draws between two parts that are written."""

@@ -12,7 +12,9 @@ from fba.body.skinning import JointMotion, Skinner, SkinTables
 from fba.face.deformer import Deformer, FaceMotion
 from fba.face.deformer_surface import Surface
 from fba.face.deformer_tables import Shifts
+from player.face_light import FaceLight
 from player.places import Whole
+from player.visibility import Visibility
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
@@ -62,6 +64,7 @@ class MovedFace:
 
     tables: FaceTables
     motion: FaceMotion
+    light: FaceLightTables
 
 
 class LightTables:
@@ -85,7 +88,30 @@ class LightTables:
         }
 
 
-Tables = FaceTables | BodyTables | LightTables
+class FaceLightTables:
+    """Light on a face: see `player.face_light`.
+
+    visible (9 V, 4): of each vertex, harmonics of what it sees and of what comes through it, and the open
+    sky; wide: the same for those near the mouth, with it open. near (V,): their numbers among these, or -1.
+    sway (V,): how far they go with the head.
+    """
+
+    def __init__(self, light: FaceLight) -> None:
+        baked = light.baked
+        self.visible = _nines(baked.shut, np.arange(len(light.sway)))
+        near = np.flatnonzero(baked.near)
+        self.wide = _nines(baked.wide, near)
+        self.near = np.full(len(light.sway), -1, dtype=np.int32)
+        self.near[near] = np.arange(len(near))
+        self.sway = light.sway
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What goes into textures."""
+        return {"visible": self.visible, "wide": self.wide}
+
+
+Tables = FaceTables | BodyTables | LightTables | FaceLightTables
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +132,14 @@ class CarriedFace:
     motion: JointMotion
     size: float
     shift: Float32
+
+
+def _nines(visibility: Visibility, rows: npt.NDArray[np.intp]) -> Float32:
+    found = np.zeros((len(rows), 9, 4), dtype=np.float32)
+    found[:, 0:4] = visibility.light[rows].reshape(-1, 4, 4)
+    found[:, 4:8] = visibility.through[rows].reshape(-1, 4, 4)
+    found[:, 8, 0] = visibility.open[rows]
+    return found.reshape(-1, 4)
 
 
 def _tracks(shifts: Shifts, count: int) -> tuple[Int32, Int32, Float32]:

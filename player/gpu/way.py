@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from player.body_light import LitPart
 from player.detail import same
+from player.face_light import LitFacePart
 from player.gpu.choice import FAILED, Choice
 from player.gpu.deformer import GpuDeformer
 from player.places import Places, Whole
@@ -62,8 +63,11 @@ class Way:
         what else that needs."""
         if self.on_gpu and mesh.places.whole.moves and self._deformer is not None:
             try:
-                lit = _limbs(mesh) is not None and self._deformer.is_lit(mesh.places.whole)
-                self._written(self._deformer, mesh.places, parts, lit)
+                light = _light(mesh)
+                lit = light is not None or (
+                    _limbs(mesh) is not None and self._deformer.is_lit(mesh.places.whole)
+                )
+                self._written(self._deformer, mesh.places, parts, lit, light)
                 if not lit:
                     _send_light(mesh, parts)
                 return
@@ -103,9 +107,11 @@ class Way:
         self.on_gpu = False
         self.close()
 
-    def _written(self, deformer: GpuDeformer, places: Places, parts: Parts, lit: bool) -> None:
+    def _written(
+        self, deformer: GpuDeformer, places: Places, parts: Parts, lit: bool, light: LitFacePart | None
+    ) -> None:
         whole = places.whole
-        if parts.get("made") == (whole, lit):  # drawn a second time
+        if parts.get("made") == (whole, lit, light):  # drawn a second time
             return
         of = (id(deformer), places.start, id(places.chosen), type(whole.motion), whole.count, lit)
         if parts.get("rows_of") != of:
@@ -114,8 +120,8 @@ class Way:
         buffers = [parts[name] for name in ("positions", "normals", "light")]
         if lit:
             parts["lit"] = None
-        deformer.write(places, parts["rows"], buffers if lit else buffers[:2])
-        parts["made"] = (whole, lit)
+        deformer.write(places, parts["rows"], buffers if lit else buffers[:2], light)
+        parts["made"] = (whole, lit, light)
 
     def _trial(self, meshes: list[FaceMesh], draw: Callable[[list[FaceMesh]], None], on_gpu: bool) -> float:
         """Seconds that a picture takes; more than any where the graphics card cannot do it."""
@@ -161,8 +167,18 @@ def release(parts: Parts) -> None:
 
 def _limbs(mesh: FaceMesh) -> npt.NDArray[np.float32] | None:
     """What may be in the light's way to the body that a mesh is a part of: see `player.body_light`."""
-    reaching = mesh.reaching.of if isinstance(mesh.reaching, ChosenLight) else mesh.reaching
+    reaching = _reaching(mesh)
     return reaching.body.capsules if isinstance(reaching, LitPart) else None
+
+
+def _light(mesh: FaceMesh) -> LitFacePart | None:
+    """The light on a face, where a graphics card knows how to work it out: a tongue that is out is rare."""
+    reaching = _reaching(mesh)
+    return reaching if isinstance(reaching, LitFacePart) and reaching.outside is None else None
+
+
+def _reaching(mesh: FaceMesh) -> Any:
+    return mesh.reaching.of if isinstance(mesh.reaching, ChosenLight) else mesh.reaching
 
 
 def _send_light(mesh: FaceMesh, parts: Parts) -> None:

@@ -1,5 +1,6 @@
 #version 330 core
-// Some vertices of a face: their parts' turns, and normals from the triangles around. CARRIED: on a body.
+// Some vertices of a face: their parts' turns, and normals from the triangles around. CARRIED: on a body. LIT:
+// and the light that reaches them.
 //include gpu_tables.glsl
 #ifdef CARRIED
 //include gpu_carry.glsl
@@ -19,6 +20,12 @@ in ivec2 in_around;          // first and after the last of its triangles; none 
 in vec3 in_neutral;
 out vec3 position;
 out vec3 normal;
+#ifdef LIT
+//include gpu_face_light.glsl
+in int in_near;
+in float in_sway;
+out vec4 light;
+#endif
 
 vec3 place(int row) {
     return texelFetch(moved, cell(row), 0).xyz;
@@ -41,6 +48,9 @@ void main() {
         dot(texelFetch(parts, cell(part + 4), 0).xyz, sum), dot(texelFetch(parts, cell(part + 5), 0).xyz, sum));
     float length_ = length(normal);
     normal *= length_ > 0.0 ? 1.0 / length_ : 1.0;
+#ifdef LIT
+    light = light_on_face(in_row, in_near, in_sway);
+#endif
 #ifdef CARRIED
     Blend blend = blended(in_joints, in_weights);
     position = carried(size * position + offset, blend, in_joints, in_weights, in_wring) + root;

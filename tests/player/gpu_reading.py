@@ -8,7 +8,9 @@ from contextlib import contextmanager
 import numpy as np
 import numpy.typing as npt
 
+from player.body_light import LitPart
 from player.context import offscreen_context
+from player.face_light import LitFacePart
 from player.gpu.deformer import GpuDeformer
 from player.places import Places, Whole
 from player.shapes import FaceMesh
@@ -25,18 +27,23 @@ class Reader:
         self.deformer = GpuDeformer(context)
 
     def lit(self, meshes: list[FaceMesh]) -> list[Float32]:
-        """Light (V, 4) on parts of bodies."""
+        """Light (V, 4) on parts of faces and bodies."""
         gl, found = self._gl, []
         wholes = {id(mesh.places.whole): mesh.places.whole for mesh in meshes}
-        limbs = {id(mesh.places.whole): mesh.reaching.body.capsules for mesh in meshes}  # type: ignore[union-attr]
+        limbs = {
+            id(mesh.places.whole): mesh.reaching.body.capsules
+            for mesh in meshes
+            if isinstance(mesh.reaching, LitPart)
+        }
         self.deformer.prepare(list(wholes.values()), limbs)
         self._bound.use()
         for mesh in meshes:
             count = len(mesh.places)
-            assert self.deformer.is_lit(mesh.places.whole)
+            light = mesh.reaching if isinstance(mesh.reaching, LitFacePart) else None
+            assert light is not None or self.deformer.is_lit(mesh.places.whole)
             rows = self.deformer.rows(mesh.places, lit=True)
             buffers = [gl.buffer(reserve=size * count) for size in (12, 12, 16)]  # type: ignore[attr-defined]
-            self.deformer.write(mesh.places, rows, buffers)
+            self.deformer.write(mesh.places, rows, buffers, light)
             found.append(np.frombuffer(buffers[2].read(), np.float32).reshape(-1, 4))
             for part in (*rows, *buffers):
                 part.release()

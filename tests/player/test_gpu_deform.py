@@ -24,6 +24,7 @@ from fba.compiled import is_compiled
 from fba.face.model import FaceModel
 from player.body_light import LitPart
 from player.face import FaceFigure
+from player.face_light import LitFacePart
 from player.gpu.tables import BodyTables, CarriedBody
 from player.person import Person
 from player.places import Places, Whole
@@ -130,6 +131,21 @@ def test_light_on_a_body(reader: Reader, person: Person, seed: int) -> None:
         assert np.ptp(mesh.light[:, 0]) > 0.3  # limbs are in the way
         assert (apart < 1e-3).mean() > 0.995
         assert np.median(apart) < 1e-5
+
+
+def test_light_on_a_face(reader: Reader, person: Person) -> None:
+    """The mouth shut, and wide open; the head turned, alone and on a body; teeth have more of it."""
+    for jaw, turn in ((0, 0), (900, 0), (900, 40000), (400, -30000)):
+        faps = np.zeros(68, dtype=np.float32)
+        faps[[2, 48]] = jaw, turn
+        faps[4] = faps[9] = faps[10] = -jaw
+        joints = random_joints(person, faps, 2)
+        for meshes in (person.figure.meshes(faps, np.eye(4)), person.meshes(faps, joints)):
+            lit = [mesh for mesh in meshes if isinstance(mesh.reaching, LitFacePart)]
+            assert len(lit) > 4
+            for mesh, light in zip(lit, reader.lit(lit), strict=True):
+                assert np.ptp(mesh.light[:, 0]) > 0.05
+                np.testing.assert_allclose(light, mesh.light, atol=1e-4)
 
 
 def test_some_vertices_in_any_order(reader: Reader, person: Person) -> None:

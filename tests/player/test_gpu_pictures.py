@@ -188,9 +188,9 @@ def test_a_card_that_computes_wrongly_is_found_out(
         wanted = view.frame(0.0)
     original = GpuDeformer.write
 
-    def swapped(self: GpuDeformer, places: Places, rows: Any, buffers: list[Any]) -> None:
+    def swapped(self: GpuDeformer, places: Places, rows: Any, buffers: list[Any], light: Any) -> None:
         spare = [self._gl.buffer(reserve=buffer.size) for buffer in buffers]
-        original(self, places, rows, spare)
+        original(self, places, rows, spare, light)
         for buffer, other in zip(buffers, order, strict=False):
             buffer.write(spare[other].read())
         for buffer in spare:
@@ -231,6 +231,22 @@ def test_nothing_is_left_on_the_card() -> None:
         assert not deformer._drawn
         assert context.error == "GL_NO_ERROR"
     context.release()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_pictures_after_the_first_allocate_nothing(monkeypatch: pytest.MonkeyPatch, way: str) -> None:
+    moderngl = pytest.importorskip("moderngl")
+    scene = small_scene(body=True)
+    with Offscreen(scene, (48, 36), deform=way) as view:
+        for time in (0.0, 0.02, 0.04):
+            view.draw(time)
+        made: list[str] = []
+        for name in ("buffer", "texture", "framebuffer", "vertex_array", "program"):
+            monkeypatch.setattr(moderngl.Context, name, lambda *_, of=name, **__: made.append(of))
+        for time in (0.01, 0.03, 0.04, 0.0):
+            view.draw(time)
+        assert not made
+        assert view.deformed[0] == way
 
 
 def test_another_word_is_refused() -> None:
