@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from fba.cli.main import group
 from player.gpu import choice
 from player.gpu.choice import Choice, is_software, prefer, wished
 
@@ -14,9 +16,11 @@ CARD = {"GL_VENDOR": "Someone", "GL_RENDERER": "Fast 9000", "GL_VERSION": "4.6 d
 
 
 @pytest.fixture(autouse=True)
-def _nothing_kept_or_wished(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def _nothing_kept_or_wished(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
     monkeypatch.delenv("FBA_DEFORM", raising=False)
+    prefer("auto")
+    yield
     prefer("auto")
 
 
@@ -135,3 +139,16 @@ def test_a_card_that_fails_is_not_chosen_nor_asked_again() -> None:
     given_up.give_up("no room")
     assert not given_up.on_gpu(500, never)
     assert "no room" in given_up.reason
+
+
+@pytest.mark.parametrize("command", ["play", "render"])
+def test_the_commands_say_it_to_the_player(command: str, tmp_path: Path) -> None:
+    """What they are given to show is not there: that is said after the options were heard."""
+    missing = str(tmp_path / "none.fba")
+    for word, means in (("gpu", "gpu"), ("auto", "auto"), ("cpu", "cpu")):
+        prefer("auto")
+        result = CliRunner().invoke(group, [command, "--deform", word, missing])
+        assert result.exit_code == 2
+        assert wished("auto") == means
+    assert "fpga" in CliRunner().invoke(group, [command, "--deform", "fpga", missing]).output
+    assert "--deform" in CliRunner().invoke(group, [command, "--help"]).output
