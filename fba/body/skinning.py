@@ -49,7 +49,7 @@ class SkinTables(NamedTuple):
 
 
 class JointMotion(NamedTuple):
-    """Joints in one pose: see `fba.body.skinning_loops.motion_of_joints`."""
+    """Joints in one pose: see `fba.body.skinning_motion.motion_of_joints`."""
 
     duals: Float32
     """(J, 8), from the root."""
@@ -179,11 +179,13 @@ class Skinner:
 
     def motion(self, matrices: npt.ArrayLike) -> JointMotion:
         """What joint matrices (J, 4, 4) do to any vertices, with dual quaternions. Errors as of `skin`."""
+        from fba.body.skinning_motion import motion_of_joints
+
         frames, _ = self._frames(matrices)
         duals = np.empty((len(self._inverse), 8), dtype=np.float32)
         angles = np.empty((len(self._twists.joint), 2), dtype=np.float32)
         with np.errstate(all="ignore"):
-            self._loops.motion_of_joints(
+            motion_of_joints(
                 frames[0], self._inverse, self._parents, self._twists, self._girdle, duals, angles
             )
         return JointMotion(duals, angles, frames[0, 0, :3, 3].copy())

@@ -51,7 +51,7 @@ def dual_frames(
     """
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
-        _duals(matrices[frame], inverse, parents, scratch)
+        joint_duals(matrices[frame], inverse, parents, scratch)
         _wring(vertices, parents, scratch, twists, wrung)
         lift(scratch, girdle)
         upper = normals[frame] if normals.shape[0] else out[frame]
@@ -90,21 +90,7 @@ def linear_frames(
 
 
 @compiled
-def motion_of_joints(
-    matrices: Float64, inverse: Float64, parents: Int64, twists: Twisting, girdle: Girdle,
-    duals: Float32, angles: Float32,
-) -> None:  # fmt: skip
-    """What `dual_frames` makes of a frame's joints, (J, 4, 4), before it comes to the vertices: duals (J, 8)
-    with the girdles turned; angles (B, 2), by which the joints at both ends of a bone twist."""
-    _duals(matrices, inverse, parents, duals)
-    for bone in range(len(twists.joint)):
-        angles[bone, 0] = _twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
-        angles[bone, 1] = _twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
-    lift(duals, girdle)
-
-
-@compiled
-def _duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Float32) -> None:
+def joint_duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Float32) -> None:
     """Joint matrices (J, 4, 4) as unit dual quaternions (J, 8), w x y z: rotation, then half the shift
     (from the root) times it.
 
@@ -140,8 +126,8 @@ def _duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Float32) 
 def _wring(vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, wrung: Float32) -> None:
     """Vertices of limbs turned about their bones: see `fba.body.twisting`."""
     for bone in range(len(twists.joint)):
-        own = _twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
-        child = _twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
+        own = twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
+        child = twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
         axis, centre = twists.axis[bone], twists.centre[bone]
         ax, ay, az = axis[0], axis[1], axis[2]
         for k in range(twists.starts[bone], twists.starts[bone + 1]):
@@ -156,7 +142,7 @@ def _wring(vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, 
 
 
 @inlined
-def _twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
+def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
     """The angle by which a joint turns about an axis, seen from its parent.
 
     It fades where the limb points the other way, as there no twist can be told from that.

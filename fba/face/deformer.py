@@ -45,7 +45,7 @@ class DeformerTables(NamedTuple):
 
 
 class FaceMotion(NamedTuple):
-    """A face in one pose: see `fba.face.deformer_loops.motion_of_parts`."""
+    """A face in one pose: see `fba.face.deformer_chosen_loops.motion_of_parts`."""
 
     tracks: Float32
     """(M, 4)"""
@@ -136,8 +136,10 @@ class Deformer:
         values, _ = _frames(faps)
         tracks = np.empty((len(self._shifts.column), 4), dtype=np.float32)
         poses = np.empty((len(self.model.parts), 6, 4), dtype=np.float32)
+        from fba.face.deformer_chosen_loops import motion_of_parts
+
         with np.errstate(all="ignore"):
-            self._loops.motion_of_parts(values[0], self._shifts, self._transforms, tracks, poses)
+            motion_of_parts(values[0], self._shifts, self._transforms, tracks, poses)
         return FaceMotion(tracks, poses)
 
     def head_matrices(self, faps: npt.ArrayLike) -> Float64:

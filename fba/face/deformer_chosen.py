@@ -22,16 +22,17 @@ class ChosenVertices:
     def __init__(
         self, vertices: Float32, part_start: Int64, shifts: Shifts, transforms: Transforms, rows: Rows
     ) -> None:
-        from fba.face import deformer_loops
+        from fba.face import deformer_chosen_loops
+        from fba.face.deformer_loops import Scratch
 
-        self._loops = deformer_loops
+        self._loops = deformer_chosen_loops
         self._rows = np.array(rows, dtype=np.int64)
         self._rest = np.array(vertices[rows], dtype=np.float32, order="C")
         self._part_start = np.searchsorted(self._rows, part_start).astype(np.int64)
         self._shifts = chosen_shifts(shifts, rows, len(vertices))
         self._transforms = transforms
         parts = len(part_start) - 1
-        self._scratch = deformer_loops.Scratch(
+        self._scratch = Scratch(
             moved=np.empty_like(self._rest),
             touched=np.zeros(parts, dtype=np.int64),
             poses=np.empty((parts + 1, 3, 4)),
