@@ -12,6 +12,10 @@ TOP = 56.0
 """Where panels begin below the buttons."""
 
 
+OVER = 0.985
+"""How opaque a panel is that covers others."""
+
+
 class Places:
     """Where panels are: in columns, until the user drags one away by its title.
 
@@ -24,6 +28,7 @@ class Places:
         self._docks = Docks()
         self._needed: dict[str, float] = {}
         self._moved: set[str] = set()
+        self._focused = ""
 
     def draw(self, panels: list[Panel], session: Session, display: tuple[float, float], below: float) -> None:
         """Draw open panels; `below`: points at the bottom that are taken."""
@@ -67,6 +72,7 @@ class Places:
             place = ((display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2)
             imgui.set_next_window_pos(place, imgui.Cond_.always)
             imgui.set_next_window_size((wide, high), imgui.Cond_.always)
+            imgui.set_next_window_bg_alpha(OVER)
         imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], max(room, 60)))
         if not self._window(panel, session, 0, folded=False):
             session.open.discard(panel.name)
@@ -93,7 +99,9 @@ class Places:
     def _hold(self, panel: Panel, *, folded: bool) -> None:
         """What the mouse does with the title, and which panel is in use."""
         name = panel.name
-        if imgui.is_window_focused(imgui.FocusedFlags_.root_and_child_windows) and imgui.is_mouse_down(0):
+        focused = imgui.is_window_focused(imgui.FocusedFlags_.root_and_child_windows)
+        if focused and self._focused != name:  # clicked, or opened
+            self._focused = name
             self._docks.use(name)
         if not self._on_title():
             return
