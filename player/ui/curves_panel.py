@@ -25,7 +25,7 @@ class CurvesPanel(Panel):
 
     name, title, label = "curves", "Curves", "Curves"
     side = "left"
-    width, height, least = 430.0, 286.0, 176.0
+    width, height, least = 430.0, 282.0, 176.0
 
     def __init__(self) -> None:
         self._columns: Columns | None = None
