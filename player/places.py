@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,18 @@ Float32 = npt.NDArray[np.float32]
 Rows = npt.NDArray[np.intp]
 SomeRows = npt.NDArray[np.integer[Any]]
 Arrays = tuple[Float32, Float32]
+
+
+_sparing: WeakSet[Any] = WeakSet()
+
+
+def spare(who: Any, does: bool) -> None:
+    """Whether somebody makes vertices by other means. Where nobody does, all are made here sooner or later,
+    and with the first that is asked for."""
+    if does:
+        _sparing.add(who)
+    else:
+        _sparing.discard(who)
 
 
 class Probe:
@@ -83,7 +96,9 @@ class Whole:
     def at(self, rows: SomeRows) -> Float32:
         """(V, 3) positions that are right at the rows (N,); to be used at once."""
         some = self._parts[1]
-        return self.arrays[0] if some is None or self._made is not None else some(rows)
+        if some is None or self._made is not None or not len(_sparing):
+            return self.arrays[0]
+        return some(rows)
 
     @cached_property
     def motion(self) -> Any:

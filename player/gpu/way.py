@@ -14,7 +14,7 @@ from player.detail import same
 from player.face_light import LitFacePart
 from player.gpu.choice import FAILED, Choice
 from player.gpu.deformer import GpuDeformer
-from player.places import Places, Whole
+from player.places import Places, Whole, spare
 from player.shapes import ChosenLight, FaceMesh
 
 WRONG = 1e-4
@@ -80,6 +80,7 @@ class Way:
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""
+        spare(self, False)
         if self._deformer is not None:
             self._deformer.close()
             self._deformer = None
@@ -98,6 +99,7 @@ class Way:
                 self._give_up(_said(error))
             target.use()
             self._gl.viewport = viewport
+        spare(self, self.on_gpu)
         for whole in wholes:
             if not (self.on_gpu and whole.moves):
                 _ = whole.arrays
