@@ -222,47 +222,51 @@ def _capsules(ends: Float64, radii: Float64) -> Float32:
 
 @compiled
 def _past(places: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32) -> None:
-    """past (N, 2): how much of the key light and of the sky comes past the capsules to some vertices."""
+    """past (N, 2): how much of the key light and of the sky comes past the capsules to some vertices.
+
+    A capsule after another, without branches: the processor then takes several vertices at a time."""
     one, zero = np.float32(1.0), np.float32(0.0)
     kx, ky, kz = np.float32(KEY[0]), np.float32(KEY[1]), np.float32(KEY[2])
-    for i in range(len(rows)):
-        x, y, z = places[rows[i], 0], places[rows[i], 1], places[rows[i], 2]
-        nx, ny, nz = normals[rows[i], 0], normals[rows[i], 1], normals[rows[i], 2]
-        towards_key = nx * kx + ny * ky + nz * kz >= np.float32(-0.2)
-        lit, sky = one, one
-        for k in range(len(capsules)):
-            ax, ay, az = capsules[k, 0] - x, capsules[k, 1] - y, capsules[k, 2] - z
-            bx, by, bz = capsules[k, 3], capsules[k, 4], capsules[k, 5]
-            ab = ax * bx + ay * by + az * bz
-            # The sky: the nearest place of the axis, as a ball there.
-            s = min(max(-ab * capsules[k, 6], zero), one)
+    count = len(rows)
+    x, y, z = np.empty(count, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
+    nx, ny, nz = np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    lit, sky = np.ones(count, np.float32), np.ones(count, np.float32)
+    for i in range(count):
+        row = rows[i]
+        x[i], y[i], z[i] = places[row, 0], places[row, 1], places[row, 2]
+        nx[i], ny[i], nz[i] = normals[row, 0], normals[row, 1], normals[row, 2]
+    for k in range(len(capsules)):
+        cx, cy, cz = capsules[k, 0], capsules[k, 1], capsules[k, 2]
+        bx, by, bz = capsules[k, 3], capsules[k, 4], capsules[k, 5]
+        per_way, bk, per_rest = capsules[k, 6], capsules[k, 7], capsules[k, 8]
+        radius, square = capsules[k, 9], capsules[k, 10]
+        # The sky: the nearest place of the axis, as a ball there.
+        for i in range(count):
+            ax, ay, az = cx - x[i], cy - y[i], cz - z[i]
+            s = min(max(-(ax * bx + ay * by + az * bz) * per_way, zero), one)
             dx, dy, dz = ax + s * bx, ay + s * by, az + s * bz
-            towards = nx * dx + ny * dy + nz * dz
-            if towards > zero:
-                per = one / max(dx * dx + dy * dy + dz * dz, np.float32(1e-6))
-                share = min(capsules[k, 10] * per, one) * np.float32(1.4)
-                sky *= one - min(share * towards * np.sqrt(per), np.float32(0.9))
-            # The key light: where the way to it comes nearest to the axis.
-            if not towards_key:
-                continue
-            radius, bk = capsules[k, 9], capsules[k, 7]
-            ak = ax * kx + ay * ky + az * kz
-            s = min(max((ak * bk - ab) * capsules[k, 8], zero), one)
+            towards = nx[i] * dx + ny[i] * dy + nz[i] * dz
+            per = one / max(dx * dx + dy * dy + dz * dz, np.float32(1e-6))
+            share = min(square * per, one) * np.float32(1.4)
+            dark = min(share * towards * np.sqrt(per), np.float32(0.9))
+            sky[i] *= one - (dark if towards > zero else zero)
+        # The key light: where the way to it comes nearest to the axis.
+        for i in range(count):
+            ax, ay, az = cx - x[i], cy - y[i], cz - z[i]
+            ab, ak = ax * bx + ay * by + az * bz, ax * kx + ay * ky + az * kz
+            s = min(max((ak * bk - ab) * per_rest, zero), one)
             ahead = ak + s * bk
-            if ahead <= np.float32(0.4) * radius:
-                continue
             dx, dy, dz = ax + s * bx - ahead * kx, ay + s * by - ahead * ky, az + s * bz - ahead * kz
             soft = np.float32(0.12) * ahead + np.float32(0.012)
-            squared = dx * dx + dy * dy + dz * dz
-            if squared >= (radius + soft) * (radius + soft):
-                continue
-            hidden = min((radius + soft - np.sqrt(squared)) / (np.float32(2.0) * soft), one)
+            away = np.sqrt(dx * dx + dy * dy + dz * dz)
+            hidden = max(min((radius + soft - away) / (np.float32(2.0) * soft), one), zero)
             hidden = hidden * hidden * (np.float32(3.0) - np.float32(2.0) * hidden)
             # a limb does not hide its own skin
             near = min((ahead / radius - np.float32(0.4)) / np.float32(1.2), one)
-            lit *= one - hidden * near
-        past[i, 0] = lit
-        past[i, 1] = sky
+            before = nx[i] * kx + ny[i] * ky + nz[i] * kz >= np.float32(-0.2)
+            lit[i] *= one - (hidden * near if before and ahead > np.float32(0.4) * radius else zero)
+    for i in range(count):
+        past[i, 0], past[i, 1] = lit[i], sky[i]
 
 
 @compiled
