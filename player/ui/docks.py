@@ -46,17 +46,22 @@ class Docks:
     def __init__(self) -> None:
         self._sides: dict[str, str] = {}
         self._used: list[str] = []
+        self._kept: tuple[object, dict[str, Dock]] = ((), {})
 
     def use(self, name: str) -> None:
         """The user works with it: others are folded before it."""
         if name in self._sides and self._used[-1:] != [name]:
             self._used = [*(one for one in self._used if one != name), name]
+            self._kept = ((), {})
 
     def arrange(self, wishes: list[Wish], wide: float, top: float, high: float) -> dict[str, Dock]:
         """Places in a display `wide` points wide, of which `high` points from `top` on are free.
 
         Those for whose title there is no room are left out.
         """
+        key = (tuple(wishes), wide, top, high)
+        if self._kept[0] == key:
+            return self._kept[1]
         names = {wish.name for wish in wishes}
         self._sides = {name: side for name, side in self._sides.items() if name in names}
         self._used = [name for name in self._used if name in names]
@@ -81,6 +86,7 @@ class Docks:
         for side, column in columns.items():
             left = EDGE if side == "left" else wide - EDGE - widths[side]
             found |= self._column(column, left, widths[side], top, high)
+        self._kept = (key, found)
         return found
 
     def _column(

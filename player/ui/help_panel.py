@@ -9,8 +9,10 @@ from player.ui.keys import keys, mouse
 from player.ui.panel import Panel, heading
 from player.ui.session import Session
 
-WIDE = 320.0
+WIDE = 296.0
 """Points that a column needs."""
+KEY = 104.0
+"""Points of it for the keys."""
 
 
 class HelpPanel(Panel):
@@ -18,12 +20,12 @@ class HelpPanel(Panel):
 
     name, title, label = "help", "Keys and mouse", "Help"
     side = "middle"
-    width, height = 1040.0, 520.0
+    width, height = 1240.0, 520.0
 
     def draw(self, session: Session) -> None:
         """Draw it."""
         groups = _groups(session)
-        columns = min(int(imgui.get_content_region_avail().x // WIDE), 3)
+        columns = min(int(imgui.get_content_region_avail().x // WIDE), 4)
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
         if columns > 1 and imgui.begin_table("columns", columns):
             imgui.table_next_row()
@@ -39,10 +41,12 @@ class HelpPanel(Panel):
 
 
 def _columns(count: int) -> list[list[str]]:
-    """The names of the groups in so many columns, 2 or 3."""
+    """The names of the groups in so many columns, 2 to 4."""
     if count == 2:
         return [["Play", "Keep", "Window"], ["View", "Switches", "Mouse"]]
-    return [["Play"], ["View", "Switches", "Keep"], ["Window", "Mouse"]]
+    if count == 3:
+        return [["Play"], ["View", "Switches", "Keep"], ["Window", "Mouse"]]
+    return [["Play"], ["View", "Switches", "Keep"], ["Window"], ["Mouse"]]
 
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
@@ -60,7 +64,7 @@ def _group(name: str, rows: list[tuple[str, str]]) -> None:
         return
     heading(name)
     imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit)
-    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, 112.0)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY)
     imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
     for key, does in rows:
         _line(key, does)

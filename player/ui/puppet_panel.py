@@ -168,7 +168,8 @@ class PuppetPanel(Panel):
         name_wide = min(TITLE, max(whole - RELEASE - VALUE - SLIDER, SHORTEST))
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if touched else theme.FAINT, shortened(title, name_wide - 6))
-        tooltip(_told(row))
+        if imgui.is_item_hovered():
+            tooltip(_told(row))
         imgui.same_line(name_wide)
         right = x + whole - RELEASE
         wide = max(whole - name_wide - RELEASE - VALUE, 16.0)
