@@ -76,7 +76,7 @@ def _angle_about(m: Float, axis: int) -> float:
     return arc_tangent(m[b, a] - m[a, b], m[a, a] + m[b, b])
 
 
-@inlined
+@compiled
 def _closest_two(m: Float, f: int, a1: int, a2: int, start: Float, work: Float) -> None:
     """Improves frame f of start (3, N): turns about two axes that come closest to rotations m (3, 3, N)."""
     x = float(start[0, f])
@@ -104,7 +104,7 @@ def _closest_two(m: Float, f: int, a1: int, a2: int, start: Float, work: Float) 
     start[1, f] = y
 
 
-@inlined
+@compiled
 def _locked(m: Float, f: int, a1: int, a2: int, a3: int, outer: float, middle: float, work: Float) -> float:
     """The third turn where, at gimbal lock, the outer one is given."""
     for i in range(3):
@@ -117,7 +117,7 @@ def _locked(m: Float, f: int, a1: int, a2: int, a3: int, outer: float, middle: f
     return _angle_about(work, a3)
 
 
-@inlined
+@compiled
 def _angles(
     m: Float, frames: int, count: int, j: int, axis: Int, sign: Float, previous: Float, limits: Float,
     bounded: bool, work: Float, cosines: Float, angles: Float,
