@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
@@ -36,8 +37,10 @@ def play(
     file: PathLike | None = None,
     bap_steps: str = "iso",
     panels: tuple[str, ...] = (),
-) -> None:
+) -> tuple[Path, ...]:
     """Open a window, play an animation in it, and return when it is closed.
+
+    Returns the files that were dropped onto it: they can be read, and the user wants to see them next.
 
     title: of the window; the animation's name by default. size: of the window. camera: a `Camera`, the
     name of a preset, or None for the one that suits the content. speed: 0.1 to 4. start: seconds.
@@ -69,6 +72,7 @@ def play(
             if not paused:
                 window.transport.play()
             window.run()
+        return window.session.dropped
 
 
 def _sounded(session: Session, path: PathLike, offset: float) -> Audio | None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fba.cli import options, scene_options
-from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
+from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
     from player.showable import Showable
@@ -77,8 +78,30 @@ def command(
             raise click.UsageError("--audio goes with a file to play")
         if how.model is None and how.body is None:
             raise click.UsageError("give a file to play, or a --model or --body to move by hand")
-        _puppet(how, size)
-        return
+        dropped = _puppet(how, size)
+    else:
+        dropped = _play(
+            files, how, sound, compare=compare, start=start, paused=paused, size=size, loop=loop, speed=speed,
+            interpolate=interpolate,
+        )  # fmt: skip
+    while dropped:
+        beside = SoundOptions(None, sound.no_audio, 0.0)
+        dropped = _play(
+            dropped[:MOST], replace(how, arrange=None), beside, size=size, loop=loop, speed=speed,
+            interpolate=interpolate,
+        )  # fmt: skip
+
+
+def _play(
+    files: tuple[Path, ...],
+    how: SceneOptions,
+    sound: SoundOptions,
+    *,
+    compare: bool = False,
+    start: float | None = None,
+    **window: Any,
+) -> tuple[Path, ...]:
+    """Play files in a window; those that were dropped onto it."""
     import player
     from fba.cli import showing
 
@@ -97,21 +120,17 @@ def command(
         scene = showing.scene(opened, names, how, over=compare)
         _check_start(scene, start, growing=bool(streams))
         single = len(files) == 1 and not streams and str(files[0]) != "-" and not showing.is_pipe(files[0])
-        player.play(
+        return player.play(
             scene,
             title=" | ".join(names),
-            size=size,
             camera=how.camera,
-            loop=loop,
-            speed=speed,
             start=start,
-            paused=paused,
-            interpolate=interpolate,
             audio=voice,
             audio_offset=sound.audio_offset,
             file=files[0] if single else None,
             bap_steps=how.bap_steps,
             panels=("differences",) if compare else (),
+            **window,
         )
     finally:
         for stream in streams:
@@ -120,7 +139,7 @@ def command(
             stream.close()  # type: ignore[union-attr]
 
 
-def _puppet(how: SceneOptions, size: tuple[int, int]) -> None:
+def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
     """A window with a neutral figure and the sliders that move it."""
     import player
     from fba.cli import showing
@@ -128,7 +147,9 @@ def _puppet(how: SceneOptions, size: tuple[int, int]) -> None:
 
     title = " ".join(file.name for file in (how.model, how.body) if file is not None)
     scene = showing.scene([(neutral(body=how.body is not None), False)], [title], how)
-    player.play(scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",))
+    return player.play(
+        scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",)
+    )
 
 
 def _check_start(scene: Showable, start: float | None, *, growing: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from player.controls import Controls
@@ -63,6 +64,7 @@ class GlfwInput:
         glfw.set_cursor_enter_callback(window, self.on_enter)
         glfw.set_scroll_callback(window, self.on_scroll)
         glfw.set_window_focus_callback(window, self.on_focus)
+        glfw.set_drop_callback(window, self.on_drop)
         glfw.set_framebuffer_size_callback(window, lambda *_: heard())
         glfw.set_window_refresh_callback(window, lambda *_: heard())
 
@@ -78,6 +80,11 @@ class GlfwInput:
         name = self.name(key, code, modifiers)
         if name is not None:
             self._controls.key(name, held=action == glfw.REPEAT)
+        self._heard()
+
+    def on_drop(self, window: Any, paths: list[str]) -> None:
+        """Files were dropped onto the window: it closes, for them to be opened, if they can be."""
+        self._session.drop(tuple(Path(_text(path)) for path in paths))
         self._heard()
 
     def on_character(self, window: Any, character: int) -> None:

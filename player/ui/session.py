@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 import os
 import time as wall
+import warnings
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,7 +86,8 @@ class Session:
     sound: the file that belongs to what is played, whether a device makes it heard (audio) or not; it begins
     sound_offset seconds after the first frame, see `shift_sound`.
     rolling: names of what changes the picture by itself, or counts on being drawn. unsaved: what would be
-    lost with the window, see `leave`. popup: whether a list is open over the picture; False closes it.
+    lost with the window, see `leave`. dropped: files to be opened after it, see `drop`. popup: whether a list
+    is open over the picture; False closes it.
     """
 
     def __init__(
@@ -114,6 +117,7 @@ class Session:
         self.recording: float | None = None
         self.rolling: set[str] = set()
         self.unsaved: set[str] = set()
+        self.dropped: tuple[Path, ...] = ()
         self.whole_screen = False
         self.popup = False
         self.audio: Audio | None = None
@@ -169,6 +173,23 @@ class Session:
             self.say(f"Not saved: {what}. Once more to close without", "warning", LEAVING, about="leave")
             return
         self.closing = True
+
+    def drop(self, paths: tuple[Path, ...]) -> None:
+        """Files were dropped onto the window: close it for them, unless one cannot be read."""
+        from fba.errors import FbaError
+        from fba.formats import read
+
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # whoever opens them says it
+                for path in paths:
+                    read(path)
+        except (FbaError, OSError) as error:
+            self.say(f"Cannot be opened: {error}", "error", 8.0, about="drop")
+            return
+        self.leave()
+        if self.closing:
+            self.dropped = paths
 
     def touched(self) -> None:
         """The user moved the mouse or pressed something: what hides itself comes back."""

@@ -30,10 +30,14 @@ class Window:
         self.scene: Any = None
         self.options: dict[str, Any] = {}
         self.meanwhile: Callable[[Any], None] = lambda scene: None
+        self.dropped: list[tuple[Path, ...]] = []
+        self.titles: list[str] = []
 
-    def __call__(self, scene: Any, **options: Any) -> None:
+    def __call__(self, scene: Any, **options: Any) -> tuple[Path, ...]:
         self.scene, self.options = scene, options
+        self.titles.append(options["title"])
         self.meanwhile(scene)
+        return self.dropped.pop(0) if self.dropped else ()
 
 
 @pytest.fixture
@@ -113,6 +117,18 @@ def test_broken_sound(run: Run, window: Window, talk: Path, tmp_path: Path) -> N
     assert asked.code == 1
     assert "talk.wav: cannot be read as sound" in asked.err
     assert window.scene is None
+
+
+def test_what_is_dropped_is_played_next(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.fba"
+    other.write_bytes(talk.read_bytes())
+    write_wav(tmp_path / "other.wav")
+    window.dropped = [(other,), (talk, other)]
+    assert run("play", talk, "--start", "1.2", "--paused", "--speed", "2").code == 0
+    assert window.titles == ["talk.fba", "other.fba", "talk.fba | other.fba"]
+    assert (window.options["speed"], window.options["start"]) == (2.0, None)
+    assert window.options["audio"] == tmp_path / "other.wav"
+    assert isinstance(window.scene, CompareScene)
 
 
 def test_files_of_the_same_name_are_told_apart(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:

@@ -187,3 +187,18 @@ def test_arguments_are_checked(talking: Animation) -> None:
         play(talking, size=(0, 5))
     with pytest.raises(ValueError, match="preset"):
         play(talking, camera="behind")
+
+
+def test_files_dropped_onto_it_are_handed_on(window: Window, talking: Animation, tmp_path: Path) -> None:
+    import fba
+
+    broken, good = tmp_path / "broken.fba", tmp_path / "good.fba"
+    broken.write_bytes(b"no stream")
+    fba.write(good, talking)
+    window.input.on_drop(window._window, [str(broken)])
+    assert window.update()
+    assert [notice.kind for notice in window.session.notices()] == ["error"]
+    assert window.session.dropped == ()
+    window.input.on_drop(window._window, [str(good)])
+    assert not window.update()
+    assert window.session.dropped == (good,)
