@@ -91,6 +91,9 @@ class Buttons:
         if session.audio is not None:
             quiet = session.audio.muted
             text = f"sound at {session.audio.volume:.0%}; turn the wheel here for more or less"
+            if session.sound_offset:
+                way = "later" if session.sound_offset > 0 else "earlier"
+                text += f"\nbegins {abs(session.sound_offset):.2f} s {way}"
             signs.append(("mute", icons.muted if quiet else icons.sound, text, False))
         x = wide - MARGIN + gap
         for action, sign, text, lit in signs:

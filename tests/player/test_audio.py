@@ -194,6 +194,8 @@ def test_a_device_leads_the_transport(tmp_path: Path) -> None:
         assert audio.volume == 1.0
         audio.muted = True
         assert audio.muted
+        audio.offset = -0.25
+        assert (audio.offset, audio._mixer.origin) == (-0.25, player.start - 0.25)
         here = player.time
     assert here <= player.time < here + 10.0  # the wall clock goes on from there
     assert player.playing

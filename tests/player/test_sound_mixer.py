@@ -66,6 +66,16 @@ def test_pause_ends_softly_and_play_goes_on_there() -> None:
     np.testing.assert_array_equal(player.hear(100)[FADED:], np.arange(500 + FADED, 600))
 
 
+def test_the_sound_is_moved_while_it_is_heard() -> None:
+    player = Player()
+    player.transport.play()
+    player.hear(500)
+    player.mixer.origin = player.transport.start + 0.2  # begins later
+    np.testing.assert_array_equal(player.hear(100)[FADED:], np.arange(300 + FADED, 400))
+    player.mixer.origin = player.transport.start - 0.1
+    np.testing.assert_array_equal(player.hear(100)[FADED:], np.arange(700 + FADED, 800))
+
+
 def test_seeking_goes_over_softly() -> None:
     player = Player()
     player.transport.play()
