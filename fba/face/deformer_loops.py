@@ -28,7 +28,8 @@ ZERO, ONE = np.float32(0), np.float32(1)
 
 @compiled
 def copy(source: Floats, target: Floats) -> None:
-    """Faster than `target[:] = source`, which counts in rows and columns."""
+    """Faster than `target[:] = source`, which counts in rows and columns; and sooner compiled: that has words
+    for shapes that do not fit."""
     flat, place = source.reshape(-1), target.reshape(-1)
     for k in range(len(flat)):
         place[k] = flat[k]
@@ -82,7 +83,7 @@ def compose(values: Float64, transforms: Transforms, poses: Float64) -> None:
                 continue
             single(int(transforms.kind[k]), value, transforms.amount[k], transforms.centre[k], one)
             multiply(pose, one, product)
-            pose[:] = product
+            copy(product, pose)
 
 
 @compiled
@@ -268,8 +269,8 @@ def deform_frames(
             if with_head:
                 multiply(scratch.poses[head], scratch.poses[part], scratch.whole)
             else:
-                scratch.whole[:] = scratch.poses[part]
-            scratch.pose[:] = scratch.whole
+                copy(scratch.poses[part], scratch.whole)
+            copy(scratch.whole, scratch.pose)
             start, stop = int(part_start[part]), int(part_start[part + 1])
             place(scratch.pose, scratch.moved[start:stop], out[frame, start:stop])
             if len(normals) == 0:
@@ -302,7 +303,7 @@ def points_of_frames(
         compose(values[frame], transforms, poses)
         for point in range(len(rest)):
             own = out[frame, point : point + 1]
-            own[:] = moved[point]
+            copy(moved[point], own)
             if owner[point] >= 0:
                 place(poses[owner[point]], own, own)
             if with_head:
