@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 from player.times import clock_text
 from player.ui import theme
 from player.ui.imgui_renderer import ImguiRenderer
+from player.ui.panel import EITHER_BUTTON, STANDING
 from player.ui.ruler import Ruler, label
 from player.ui.session import Session
 from player.ui.trace import trace_picture
@@ -61,13 +62,7 @@ class Bar:
         imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
         imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (1, 1))
-        flags = imgui.WindowFlags_
-        imgui.begin(
-            "##bar",
-            None,
-            flags.no_decoration | flags.no_move | flags.no_saved_settings | flags.no_bring_to_front_on_focus
-            | flags.no_nav | flags.no_focus_on_appearing,
-        )  # fmt: skip
+        imgui.begin("##bar", None, STANDING)
         imgui.pop_style_var(4)
         margin = min(MARGIN, wide * 0.05)
         self._timeline(session, Ruler(*_span(session), margin, wide - margin), high - tall)
@@ -86,7 +81,7 @@ class Bar:
         imgui.invisible_button(
             "timeline",
             (ruler.right - ruler.left + 2 * GRIP, TOP - 4 + TRACK),
-            imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right,
+            EITHER_BUTTON,
         )
         hovered = imgui.is_item_hovered()
         self._drag(session, ruler)

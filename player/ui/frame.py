@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from player.times import clock_text
 from player.ui import theme
 from player.ui.docks import EDGE
-from player.ui.panel import Panel, tooltip
+from player.ui.panel import STANDING, Panel, tooltip
 from player.ui.session import Session
 
 ABOVE = 40.0
@@ -51,18 +51,12 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
     if together:
         wide = _width(["Panels"])
     left = display[0] - EDGE - wide
-    flags = imgui.WindowFlags_
     imgui.set_next_window_pos((left, EDGE))
     imgui.set_next_window_size((wide, 34))
     imgui.push_style_var(imgui.StyleVar_.window_padding, (5, 4))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, (4, 4))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, (11, (26 - imgui.get_font_size()) / 2))
-    imgui.begin(
-        "##buttons",
-        None,
-        flags.no_decoration | flags.no_move | flags.no_saved_settings | flags.no_bring_to_front_on_focus
-        | flags.no_nav | flags.no_focus_on_appearing,
-    )  # fmt: skip
+    imgui.begin("##buttons", None, STANDING)
     if together:
         if _flat_button("Panels", lit=bool(session.open)):
             imgui.open_popup("panels")

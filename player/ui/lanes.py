@@ -13,7 +13,7 @@ from player.times import clock_text
 from player.ui import theme
 from player.ui.columns import Course
 from player.ui.envelope import Envelope, envelope
-from player.ui.panel import shortened
+from player.ui.panel import EITHER_BUTTON, shortened
 from player.ui.ruler import Ruler, label
 from player.ui.session import Session
 from player.ui.stretch import Stretch
@@ -111,11 +111,8 @@ class Lanes:
         left, right, top = ruler.left, ruler.right, y + WORDS
         wide = right - left
         imgui.set_cursor_screen_pos((left, top))
-        buttons = imgui.ButtonFlags_
-        imgui.invisible_button(
-            f"lane{lane.course.kind}{lane.course.number}", (max(wide, 1), CURVE),
-            buttons.mouse_button_left | buttons.mouse_button_right,
-        )  # fmt: skip
+        name = f"lane{lane.course.kind}{lane.course.number}"
+        imgui.invisible_button(name, (max(wide, 1), CURVE), EITHER_BUTTON)
         hovered = imgui.is_item_hovered()
         _mouse(session, ruler, stretch, hovered=hovered, active=imgui.is_item_active())
         to.add_rect_filled((left, top), (right, top + CURVE), theme.packed((0, 0, 0, 0.22)), rounding=3.0)

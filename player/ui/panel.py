@@ -11,6 +11,14 @@ from player.ui import theme
 from player.ui.keys import key_of
 from player.ui.session import Session
 
+_FLAGS = imgui.WindowFlags_
+STANDING = int(
+    _FLAGS.no_decoration | _FLAGS.no_move | _FLAGS.no_saved_settings | _FLAGS.no_bring_to_front_on_focus
+    | _FLAGS.no_nav | _FLAGS.no_focus_on_appearing
+)  # fmt: skip
+"""Flags of a window that is no panel: the bar, the buttons. Put together once, not for each picture."""
+EITHER_BUTTON = int(imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right)
+
 
 class Panel:
     """A window over the picture. A subclass sets the names and draws; it may keep what it needs.

@@ -12,6 +12,10 @@ TOP = 56.0
 """Where panels begin below the buttons."""
 
 
+_FLAGS = imgui.WindowFlags_
+FREE = int(_FLAGS.no_saved_settings | _FLAGS.no_collapse)
+DOCKED = int(FREE | _FLAGS.no_resize | _FLAGS.no_bring_to_front_on_focus)
+FOLDED = int(_FLAGS.no_scrollbar | _FLAGS.no_scroll_with_mouse)
 OVER = 0.985
 """How opaque a panel is that covers others."""
 
@@ -60,9 +64,7 @@ class Places:
     def _draw_docked(self, panel: Panel, session: Session, dock: Dock) -> None:
         imgui.set_next_window_pos((dock.left, dock.top))
         imgui.set_next_window_size((dock.width, dock.height))
-        flags = imgui.WindowFlags_
-        kept = self._window(panel, session, flags.no_resize | flags.no_bring_to_front_on_focus, dock.folded)
-        if not kept:
+        if not self._window(panel, session, DOCKED | (FOLDED if dock.folded else 0), folded=dock.folded):
             session.open.discard(panel.name)
 
     def _draw_free(self, panel: Panel, session: Session, display: tuple[float, float], room: float) -> None:
@@ -74,15 +76,12 @@ class Places:
             imgui.set_next_window_size((wide, high), imgui.Cond_.always)
             imgui.set_next_window_bg_alpha(OVER)
         imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], max(room, 60)))
-        if not self._window(panel, session, 0, folded=False):
+        if not self._window(panel, session, FREE, folded=False):
             session.open.discard(panel.name)
 
-    def _window(self, panel: Panel, session: Session, flags: int, folded: bool) -> bool:
+    def _window(self, panel: Panel, session: Session, flags: int, *, folded: bool) -> bool:
         """Draw one; False where it is to be closed."""
-        flags |= imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_collapse
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (32, 1))
-        if folded:
-            flags |= imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
         expanded, kept = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
         imgui.pop_style_var()
         if expanded and not folded:
