@@ -6,6 +6,7 @@ else: here one size is chosen for a whole part.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -58,8 +59,11 @@ def halved(texel: float, pixel: float, size: int) -> int:
     """How often to halve a picture of `size` texels of this width (m), for texels of about a pixel."""
     if not texel > 0 or not pixel > 0:
         return 0
-    most = max(int(np.log2(max(size / SMALLEST, 1))), 0)
-    return int(np.clip(np.ceil(np.log2(SHARPEST * pixel / texel)), 0, most))
+    ratio = SHARPEST * pixel / texel
+    if not ratio > 1:
+        return 0
+    most = int(math.log2(max(size / SMALLEST, 1)))
+    return min(math.ceil(math.log2(ratio)), most) if ratio < math.inf else most
 
 
 def breadth(positions: Float32, texcoords: Float32, triangles: npt.NDArray[np.int32]) -> float:
