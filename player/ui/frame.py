@@ -20,17 +20,24 @@ NARROW = 560.0
 """Below so many points of width the name is left out; below 300 the buttons too."""
 
 
-def draw_name(session: Session, display: tuple[float, float], room: float) -> None:
-    """The file's name and rate in the upper left corner, within `room` points, and whether it records."""
+def draw_recording(session: Session) -> float:
+    """That a film is recorded, in the upper left corner; returns the points that it takes."""
+    if session.recording is None:
+        return 0.0
+    to = imgui.get_background_draw_list()
+    x, y = EDGE + 4, EDGE + 7
+    text = f"REC {clock_text(session.recording)[:-2]}"
+    to.add_circle_filled((x + 6, y + 9), 6.0, theme.packed(theme.ALERT))
+    _shaded(to, (x + 20, y), theme.packed(theme.TEXT), text)
+    return 40.0 + float(imgui.calc_text_size(text).x)
+
+
+def draw_name(session: Session, display: tuple[float, float], taken: float, room: float) -> None:
+    """The file's name and rate in the upper left corner, beside the points that are taken, within `room`."""
     if display[0] < NARROW or display[1] < 200:
         return
     to = imgui.get_background_draw_list()
-    x, y = EDGE + 4, EDGE + 7
-    if session.recording is not None:
-        text = f"REC {clock_text(session.recording)[:-2]}"
-        to.add_circle_filled((x + 6, y + 9), 6.0, theme.packed(theme.ALERT))
-        _shaded(to, (x + 20, y), theme.packed(theme.TEXT), text)
-        x += 40 + imgui.calc_text_size(text).x
+    x, y = EDGE + 4 + taken, EDGE + 7
     name = session.source.name or session.scene.title
     facts = getattr(getattr(session.scene, "animation", None), "message", "") or _facts(session)
     if imgui.calc_text_size(name + facts).x + x > room:

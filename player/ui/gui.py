@@ -9,7 +9,7 @@ from imgui_bundle import imgui, implot
 from player.controls import Controls
 from player.ui import theme
 from player.ui.bar import Bar
-from player.ui.frame import draw_buttons, draw_name, draw_notices
+from player.ui.frame import draw_buttons, draw_name, draw_notices, draw_recording
 from player.ui.imgui_renderer import ImguiRenderer
 from player.ui.panels import make_panels
 from player.ui.places import Places
@@ -126,11 +126,12 @@ class Gui:
         session = self.session
         self._hide(io)
         below = self.bar.height(display)
+        taken = draw_recording(session)
         if self.shown > 0:
             imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
             self.bar.draw(session, display)
             there = [panel for panel in self.panels if panel.available(session)]
-            draw_name(session, display, draw_buttons(session, there, display) - 20)
+            draw_name(session, display, taken, draw_buttons(session, there, display) - 20)
             imgui.pop_style_var()
         gone = self._open - session.open
         self._places.forget(gone)

@@ -181,6 +181,18 @@ def test_the_bar_hides_itself_while_playing_and_comes_back(studio: Studio, clock
     assert studio.gui.shown == 1.0
 
 
+def test_that_it_records_is_seen_when_the_bar_is_hidden(studio: Studio, clock: Clock) -> None:
+    session = studio.session
+    session.transport.loop = True
+    session.transport.play()
+    session.recording = 1.0
+    clock.now += 60
+    picture = studio.draw(30).astype(int)
+    assert studio.gui.shown == 0.0
+    corner = picture[20:42, 14:34]
+    assert (corner[..., 0] - corner[..., 2] > 80).sum() > 60  # the red dot
+
+
 def test_bare_shows_the_picture_alone(studio: Studio) -> None:
     session = studio.session
     session.open |= {"file", "view"}
