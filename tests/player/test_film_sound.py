@@ -143,8 +143,8 @@ def test_muted_it_is_silent(tmp_path: Path) -> None:
 
 def test_the_encoder_takes_what_is_there(tmp_path: Path) -> None:
     wav = write_click(tmp_path / "talk.wav", 0.1, rate=11000)  # AAC does not know that rate
-    transport = Filmed(tmp_path, None).session.transport
-    heard = FilmSound(wav, transport)
+    animation = Animation(Fraction(25), np.arange(75), face=face_track([{3: 1}] * 75))
+    heard = FilmSound(wav, Transport(Scene(animation).timeline))
     assert heard.rate == 48000
     heard.advance(0.1)
     assert sum(frame.samples for frame in heard.frames(48000)) == 4800
