@@ -202,3 +202,13 @@ def test_files_dropped_onto_it_are_handed_on(window: Window, talking: Animation,
     window.input.on_drop(window._window, [str(good)])
     assert not window.update()
     assert window.session.dropped == (good,)
+
+
+def test_the_windows_own_button_asks_where_something_is_not_saved(window: Window) -> None:
+    window.session.unsaved.add("the last take")
+    glfw.set_window_should_close(window._window, True)
+    assert window.update()
+    assert not glfw.window_should_close(window._window)
+    assert [notice.kind for notice in window.session.notices()] == ["warning"]
+    glfw.set_window_should_close(window._window, True)
+    assert not window.update()
