@@ -2,36 +2,45 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable
 
 TURN = 0.0005
 """Seconds after which a thread that works hands over to one that waits: a tenth of Python's own choice."""
 
-_lock = threading.Lock()
-_users = 0
-_before = 0.0
 
+class PromptThreads:
+    """While it is entered, once or several times, from any thread, Python's threads take turns more often.
 
-@contextlib.contextmanager
-def prompt_threads() -> Iterator[None]:
-    """While it lasts, in any thread, Python's threads take turns more often.
-
-    One that encodes asks for its turn four times a picture: at 5 ms each, it would be slower than the
-    drawing, with a processor idle.
+    A thread that encodes asks for its turn four times a picture: at 5 ms each it would be slower than the
+    drawing, with a processor idle. read, change: the seconds of a turn, which are the whole process's.
     """
-    global _users, _before  # noqa: PLW0603 - as process-wide as what it sets
-    with _lock:
-        if not _users:
-            _before = sys.getswitchinterval()
-            sys.setswitchinterval(min(TURN, _before))
-        _users += 1
-    try:
-        yield
-    finally:
-        with _lock:
-            _users -= 1
-            if not _users:
-                sys.setswitchinterval(_before)
+
+    def __init__(
+        self,
+        read: Callable[[], float] = sys.getswitchinterval,
+        change: Callable[[float], None] = sys.setswitchinterval,
+    ) -> None:
+        self._read, self._change = read, change
+        self._lock = threading.Lock()
+        self._users = 0
+        self._before = 0.0
+
+    def __enter__(self) -> PromptThreads:
+        with self._lock:
+            if not self._users:
+                self._before = self._read()
+                self._change(min(TURN, self._before))
+            self._users += 1
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._users -= 1
+            if not self._users:
+                self._change(self._before)
+
+
+PROMPT_THREADS = PromptThreads()
+"""The process's own."""

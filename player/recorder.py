@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import UnsupportedError
-from player.prompt_threads import prompt_threads
+from player.prompt_threads import PROMPT_THREADS
 from player.sound import FilmedSound
 from player.whole import PathLike
 
@@ -212,7 +212,7 @@ class Recorder:
     def _encode(self) -> None:
         """The thread. After an error it goes on taking pictures, so that nobody waits for it."""
         try:
-            with prompt_threads():
+            with PROMPT_THREADS:
                 while (item := self._full.get()) is not None:
                     if not self._stop:
                         self._sink.write(*item)

@@ -6,33 +6,47 @@ import sys
 
 import pytest
 
-from player.prompt_threads import prompt_threads
+from player.prompt_threads import PROMPT_THREADS, PromptThreads
 
 
-@pytest.fixture(autouse=True)
-def own_interval() -> object:
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(0.004)
-    yield
-    sys.setswitchinterval(before)
+class Interpreter:
+    """Seconds of a turn, as an interpreter has them."""
+
+    def __init__(self, turn: float) -> None:
+        self.turn = turn
+
+    def prompt(self) -> PromptThreads:
+        def change(turn: float) -> None:
+            self.turn = turn
+
+        return PromptThreads(lambda: self.turn, change)
 
 
 def test_turns_are_short_until_the_last_user_is_done() -> None:
-    outer, inner = prompt_threads(), prompt_threads()
-    with outer:
-        with inner:
-            assert sys.getswitchinterval() < 0.001
-        assert sys.getswitchinterval() < 0.001
-    assert sys.getswitchinterval() == pytest.approx(0.004, abs=2e-6)
+    python = Interpreter(0.005)
+    prompt = python.prompt()
+    with prompt:
+        with prompt:
+            assert python.turn < 0.001
+        assert python.turn < 0.001
+    assert python.turn == 0.005
+    with prompt:
+        assert python.turn < 0.001
 
 
 def test_an_error_gives_the_old_turns_back() -> None:
-    with pytest.raises(RuntimeError), prompt_threads():
+    python = Interpreter(0.005)
+    with pytest.raises(RuntimeError), python.prompt():
         raise RuntimeError
-    assert sys.getswitchinterval() == pytest.approx(0.004, abs=2e-6)
+    assert python.turn == 0.005
 
 
 def test_shorter_turns_stay() -> None:
-    sys.setswitchinterval(0.0001)
-    with prompt_threads():
-        assert sys.getswitchinterval() == pytest.approx(0.0001, abs=2e-6)
+    python = Interpreter(0.0001)
+    with python.prompt():
+        assert python.turn == 0.0001
+
+
+def test_it_is_python_s_own_turns() -> None:
+    with PROMPT_THREADS:
+        assert sys.getswitchinterval() < 0.001
