@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -46,8 +47,8 @@ class Details:
         coarser = mesh.shape.coarser
         if coarser is None or not len(mesh.places):
             return mesh
-        number = int(np.searchsorted(TOLERANCES, PIXELS * pixel * distance(mesh, eye), side="right"))
-        level = self._level(mesh.shape, number)
+        away = distance(mesh, eye)
+        level = self._level(mesh.shape, bisect_right(TOLERANCES, PIXELS * pixel * away))
         if level is None:
             return mesh
         if level.light is None or not _same_light(level.light[0], mesh.reaching):
@@ -55,7 +56,7 @@ class Details:
             chosen = ChosenLight(reaching, level.rows) if callable(reaching) else mesh.light_at(level.rows)
             level.light = (reaching, chosen)
         places = mesh.places.some(level.rows)
-        return FaceMesh(level.shape, places, level.light[1], mesh.matrix, mesh.turn, mesh.centre)
+        return FaceMesh(level.shape, places, level.light[1], mesh.matrix, mesh.turn, mesh.centre, away)
 
     def _level(self, shape: FaceShape, number: int) -> _Level | None:
         levels = self._levels.setdefault(shape, {})

@@ -41,9 +41,11 @@ class FaceRenderer:
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
         """From where the next meshes are seen: eye (3,), (4, 4) world to clip space, size of a pixel at a
         distance of 1."""
+        before = self._camera
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
-        for program in self._programs.values():
-            self._place(program)
+        if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
+            for program in self._programs.values():
+                self._place(program)
 
     def draw(self, meshes: list[FaceMesh]) -> None:
         """Draw parts; those that can be seen through last."""
@@ -108,7 +110,8 @@ class FaceRenderer:
     def _draw(self, mesh: FaceMesh) -> None:
         parts, shape = self._parts(mesh), mesh.shape
         self.way.write(mesh, parts)
-        wide = self._camera[2] * distance(mesh, self._camera[0])
+        away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
+        wide = self._camera[2] * away
         picture = parts["pictures"].suited(wide)
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
         words = tuple(
@@ -122,16 +125,8 @@ class FaceRenderer:
             if there
         )
         program, array = self._program(words), self._array(parts, words)
-        for name, value in (
-            ("world", matrix_bytes(mesh.matrix)),
-            ("turn", tuple(float(v) for v in mesh.turn)),
-            ("centre", tuple(float(v) for v in mesh.centre)),
-            ("scatter", shape.scatter),
-            ("fine", shape.fine),
-            ("two_sided", 1.0 if shape.two_sided else 0.0),
-            ("relief", 1),
-        ):
-            set_uniform(program, name, value)
+        _set_shape(program, shape)
+        _set_placing(program, mesh)
         if picture is not None:
             picture.use(0)
         if repeats is not None:
@@ -189,6 +184,29 @@ class FaceRenderer:
             texture.filter = (self._gl.LINEAR, self._gl.LINEAR)
             self._reliefs[halvings] = texture
         return self._reliefs[halvings]
+
+
+def _set_shape(program: Any, shape: FaceShape) -> None:
+    """What a program takes of a shape, unless it has just had it."""
+    if program.extra.get("shape") is shape:
+        return
+    program.extra["shape"] = shape
+    set_uniform(program, "scatter", shape.scatter)
+    set_uniform(program, "fine", shape.fine)
+    set_uniform(program, "two_sided", 1.0 if shape.two_sided else 0.0)
+    set_uniform(program, "relief", 1)
+
+
+def _set_placing(program: Any, mesh: FaceMesh) -> None:
+    """Where a mesh is and how it is turned, unless the program has just had the same for another part."""
+    placing = (mesh.matrix, mesh.turn, mesh.centre)
+    had = program.extra.get("placing")
+    if had is not None and all(one is other for one, other in zip(placing, had, strict=True)):
+        return
+    program.extra["placing"] = placing
+    set_uniform(program, "world", matrix_bytes(mesh.matrix))
+    set_uniform(program, "turn", tuple(mesh.turn.tolist()))
+    set_uniform(program, "centre", tuple(mesh.centre.tolist()))
 
 
 def _release(parts: dict[str, Any]) -> None:

@@ -5,8 +5,6 @@ Software OpenGL spends as long on looking for steps in a whole picture as on dra
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
@@ -73,17 +71,26 @@ class Outliner:
         if not len(mesh.positions):
             return
         edges = self._edges_of(mesh)
-        angle = math.sqrt(float(mesh.turn @ mesh.turn))
-        axis = np.asarray(mesh.turn, dtype=np.float64) / max(angle, 1e-12)
         clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
         if edges.sway is None or edges.sway[0] is not mesh.shape.sway:
             edges.sway = (mesh.shape.sway, np.ascontiguousarray(mesh.shape.sway, dtype=np.float32))
         if len(edges.seen) != len(mesh.positions):
             edges.seen = np.empty((len(mesh.positions), 3), dtype=np.float32)
         places = np.ascontiguousarray(mesh.positions, dtype=np.float32)
-        centre = np.asarray(mesh.centre, dtype=np.float64)
-        _project(places, edges.sway[1], axis, angle, centre, clip, self._size, edges.seen)
-        _outline(edges.seen, edges.triangles, edges.ends, edges.sides, self._size, edges.facing, self._marked)
+        _add(
+            places,
+            edges.sway[1],
+            np.asarray(mesh.turn, dtype=np.float64),
+            np.asarray(mesh.centre, dtype=np.float64),
+            clip,
+            self._size,
+            edges.seen,
+            edges.triangles,
+            edges.ends,
+            edges.sides,
+            edges.facing,
+            self._marked,
+        )
 
     def tiles(self) -> Float32:
         """(N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the picture."""
@@ -103,17 +110,38 @@ class Outliner:
 
 
 @compiled
+def _add(
+    positions: Float32,
+    sway: Float32,
+    turn: Float64,
+    centre: Float64,
+    clip: Float64,
+    size: tuple[int, int],
+    seen: Float32,
+    triangles: Int32,
+    ends: Int32,
+    sides: Int32,
+    facing: npt.NDArray[np.int8],
+    marked: npt.NDArray[np.uint8],
+) -> None:
+    """Both in one: what is called from Python costs most."""
+    _project(positions, sway, turn, centre, clip, size, seen)
+    _outline(seen, triangles, ends, sides, size, facing, marked)
+
+
+@compiled
 def _project(
     positions: Float32,
     sway: Float32,
-    axis: Float64,
-    angle: float,
+    turn: Float64,
     centre: Float64,
     clip: Float64,
     size: tuple[int, int],
     seen: Float32,
 ) -> None:
     """Pixels x, y of vertices (V, 3), and w, below 0 behind the camera; turned as face.vert does."""
+    angle = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+    axis = turn / max(angle, 1e-12)
     half_wide, half_high = 0.5 * size[0], 0.5 * size[1]
     whole_sine, whole_cosine = np.sin(angle), np.cos(angle)
     for i in range(len(positions)):

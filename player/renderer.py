@@ -75,6 +75,7 @@ class Renderer:
         self._details = Details()
         self._extras = ExtrasRenderer(context)
         self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
+        self._seen: tuple[object, ...] = ()
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
     def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps | None:
@@ -102,11 +103,7 @@ class Renderer:
         gl.viewport = (0, 0, *size)
         self._faces.way.prepare(view.faces, trial)
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
-        eye, written = tuple(place.tolist()), matrix_bytes(matrix)
-        for program in self._programs.values():
-            set_uniform(program, "eye", eye)
-            set_uniform(program, "camera", written)
-            set_uniform(program, "pixel", pixel)
+        self._see(tuple(place.tolist()), matrix_bytes(matrix), pixel)
         self._draw_studio(view, matrix, size, (float(camera.target[0]), float(camera.target[2])))
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
@@ -122,6 +119,15 @@ class Renderer:
         if self._faces.way.on_gpu and (view.extras is None or not view.extras.is_fine):
             return None  # a graphics card smooths all of it in less time than outlines take to be found
         return steps(drawn, matrix, size, self._outliner)
+
+    def _see(self, *seen: object) -> None:
+        """From where everything is seen: eye, (4, 4) world to clip space, size of a pixel at 1."""
+        if seen == self._seen:
+            return
+        self._seen = seen
+        for program in self._programs.values():
+            for name, value in zip(("eye", "camera", "pixel"), seen, strict=True):
+                set_uniform(program, name, value)
 
     @property
     def way(self) -> Way:

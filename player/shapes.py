@@ -100,7 +100,8 @@ class FaceMesh:
     0..1, what reaches each vertex past the rest of the face: of the key light, of the open sky, through
     the skin from behind, of the rim light; or what gives that for chosen vertices (N,), or for None, all.
     matrix: (4, 4) into the world. turn: (3,) axis of the head's rotation times its angle, about centre (3,),
-    in the frame of the positions.
+    in the frame of the positions. away: from the camera that it is drawn for, in its own unit; None where
+    that is not known. Arrays are not written to any more: renderers know what they have by its identity.
     """
 
     shape: FaceShape
@@ -109,6 +110,7 @@ class FaceMesh:
     matrix: Float64
     turn: Float64
     centre: Float64
+    away: float | None = None
 
     @property
     def positions(self) -> Float32:
