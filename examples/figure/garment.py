@@ -5,6 +5,7 @@ from __future__ import annotations
 import figure
 import numpy as np
 import numpy.typing as npt
+from cutting import Cloth
 from sculpt import smooth
 from subdivide import refine
 
@@ -19,8 +20,15 @@ AROUND = 84
 BAND = ((0.004, -0.003), (0.0, 0.0012), (-0.0012, 0.0036), (0.0008, 0.0068), (0.006, 0.0090),
         (0.0115, 0.0090), (0.0130, 0.0040))  # fmt: skip
 """The collar's profile: below the neckline, out of the skin; metres."""
-LOWEST = -0.36
-WIDEST = 0.225
+LOWEST = -0.38
+WIDEST = 0.245
+BUST = (0.205, 0.185, -0.165, 2.6)
+"""Where the cloth ends, as a sculptor's bust does: half its width, how far below the height that follows (all
+m) its lowest place lies, and the exponent of the curve between."""
+ON_EDGE, CORE, OVERLAP = 0.03, -0.11, 0.002
+"""What counts as that end; the depth at which both halves of the underside meet, and how far they go on."""
+ARCH = -0.24
+"""No higher do they meet: at the sides they hang from the arch over the shoulder (m)."""
 
 
 def neckline(places: Float64) -> Float64:
@@ -71,10 +79,44 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     for _ in range(5):
         smoothed = _averaged(fallen, torso.edges)
         fallen = np.where(hang > 0, fallen * (1 - 0.7 * hang) + smoothed * 0.7 * hang, fallen)
-    collar, band = _collar(whole_skin, len(fallen))
-    colours = np.tile([*COLOUR, 0.06], (len(fallen) + len(collar), 1))
-    colours[len(fallen) :, :3] *= 0.82
-    return np.concatenate([fallen, collar]), np.concatenate([triangles, band]), colours
+    cloth = Cloth(fallen, outward, np.zeros((len(fallen), 0)), np.zeros((len(fallen), 0)), triangles)
+    cloth = cloth.above(_within_bust(fallen))
+    collar, band = _collar(whole_skin, len(cloth.vertices))
+    below, closing = _closed(cloth, len(cloth.vertices) + len(collar))
+    vertices = np.concatenate([cloth.vertices, collar, below])
+    colours = np.tile([*COLOUR, 0.06], (len(vertices), 1))
+    colours[len(cloth.vertices) :, :3] *= 0.82
+    return vertices, np.concatenate([cloth.triangles, band, closing]), colours
+
+
+def _within_bust(places: Float64) -> Float64:
+    """(N,) above 0 within the line that the cloth of a bust ends at, for places (N, 3)."""
+    wide, deep, height, power = BUST
+    down = np.maximum(height - places[:, 1], 0.0) / deep
+    return 1 - ((np.abs(places[:, 0]) / wide) ** power + down**power) ** (1 / power)
+
+
+def _closed(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
+    """What closes the bust below: from its edge straight to the middle between front and back.
+
+    start: number of its first vertex. The edge's vertices are there once more, so that it stays sharp.
+    """
+    sides = cloth.border
+    sides = sides[(_within_bust(cloth.vertices)[sides] < ON_EDGE).all(axis=1)]
+    edge, sides = np.unique(sides, return_inverse=True)
+    sides = sides.reshape(-1, 2)
+    places = cloth.vertices[edge]
+    beyond = np.where(places[:, 2] > CORE, CORE - OVERLAP, CORE + OVERLAP)
+    core = np.stack([places[:, 0], np.minimum(places[:, 1], ARCH), beyond], axis=1)
+    a, b = start + sides[:, 0], start + sides[:, 1]
+    rows = len(edge)
+    triangles = np.concatenate(
+        [
+            np.stack([b, a, a + rows], axis=1),
+            np.stack([b, a + rows, b + rows], axis=1),
+        ]
+    )
+    return np.concatenate([places, core]), triangles
 
 
 def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
