@@ -126,7 +126,8 @@ def format_of(path: Path, format: str | None = None) -> Format:
         return by_suffix[0]  # its reader says what is wrong with it
     if found is None:
         raise FormatError(
-            f"is in no format known here: {_list()}; name it (format=, --format) if it is one of them",
+            f"is in no format known here: {_list()}; if it is one of them, "
+            "give the file that suffix, or format= in Python",
             path=path,
         )
     if by_suffix and found not in by_suffix:
