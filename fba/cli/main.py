@@ -6,6 +6,7 @@ import os
 import sys
 import warnings
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
@@ -85,8 +86,7 @@ def main(arguments: list[str] | None = None) -> None:
         error.show()
         sys.exit(BAD_USAGE)
     except (KeyboardInterrupt, click.Abort):
-        click.echo("fba: interrupted", err=True)
-        sys.exit(INTERRUPTED)
+        _say_interrupted()
     except BrokenPipeError:
         # Whoever read our output has seen enough. Python would complain once more while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -100,8 +100,7 @@ def main(arguments: list[str] | None = None) -> None:
         if debug:
             raise
         if interruptions.made(error):
-            click.echo("fba: interrupted", err=True)
-            sys.exit(INTERRUPTED)
+            _say_interrupted()
         click.echo(
             f"fba: internal error: {type(error).__name__}: {_one_line(error)}; this is a defect of fba: "
             "please report it with what --debug prints",
@@ -109,6 +108,11 @@ def main(arguments: list[str] | None = None) -> None:
         )
         sys.exit(BAD_DATA)
     sys.exit(result if isinstance(result, int) else 0)
+
+
+def _say_interrupted() -> NoReturn:
+    click.echo("fba: interrupted", err=True)
+    sys.exit(INTERRUPTED)
 
 
 def _one_line(error: BaseException) -> str:

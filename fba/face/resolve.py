@@ -209,7 +209,6 @@ class _Redefined:
         mask = track.mask[events] & stored
         rows = fill(np.where(mask, track.values[events], 0), mask)[0].astype(np.float32)
         self._rows = np.concatenate([table, rows])
-        self._events = events
         self._in_force: npt.NDArray[np.intp] | None = None
         if len(events):
             count = len(table)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -45,9 +45,6 @@ class Alignment:
     flat: bool
     expected: Float64
     residual: Float64
-
-    def with_points(self, points: Float64) -> Alignment:
-        return replace(self, points=points)
 
 
 def align(given: Float64, reference: Float64, *, unit: str | float | None = None) -> Alignment:

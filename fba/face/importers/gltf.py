@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -131,8 +131,3 @@ def _beside(path: Path) -> GivenPoints | None:
         if candidate.is_file():
             return given_points(candidate)
     return None
-
-
-def shape_names(pieces: Sequence[Piece]) -> tuple[str, ...]:
-    """Names of all shapes of some pieces, sorted."""
-    return tuple(sorted({shape for piece in pieces for shape in piece.morphs}))
