@@ -17,7 +17,7 @@ from fba.cli import options, writer_options
         "fba convert walk.bvh walk.bap --fps 30",
         "fba convert talk.fba talk.fap",
         "fba convert walk.bap walk.bvh --joints moving",
-        "fba convert both.fba person.glb --model head.glb",
+        "fba convert both.fba person.glb --bap-steps visage --model head.glb",
     )
 )
 @click.argument("source", metavar="IN", type=options.EXISTING)

@@ -22,10 +22,10 @@ _FOLDER_OR_FILE = click.Path(path_type=Path)
 @click.command(
     epilog=options.examples(
         "fba decode talk.fba --fap talk.fap",
-        "fba decode both.fba --fap face.fap --bap body.bap",
+        "fba decode both.fba --fap face.fap --bap body.bap --bap-steps visage",
         "fba decode talk.fba --fap talk.fap --epf talk.epf    # encode --epf makes the same bytes again",
-        "fba decode both.fba -o person.glb",
-        "fba decode walk.fba -o walk.bvh --joints moving",
+        "fba decode both.fba -o person.glb --bap-steps visage",
+        "fba decode walk.fba -o walk.bvh --bap-steps visage --joints moving",
         "fba decode archive/*.fba --fap decoded/",
         "fba decode archive/*.fba -o decoded/ --to glb",
     )

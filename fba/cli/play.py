@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     epilog=options.examples(
         "fba play talk.fba",
         "fba play talk.fba --audio voice.mp3",
+        "fba play walk.fba --bap-steps visage",
         "fba play walk.bvh --loop --speed 0.5",
         "fba play original.fap decoded.fba --compare",
         "nc host 7000 | fba play -",
