@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FormatError
+from player.sound_file import open_sound
 from player.whole import PathLike
 
 Float32 = npt.NDArray[np.float32]
@@ -58,18 +59,7 @@ class Soundtrack:
 
         self._av = import_av()
         self._path = Path(path)
-        try:
-            self._container = self._av.open(str(path), metadata_errors="replace")
-        except (self._av.error.FFmpegError, OSError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise FormatError(f"cannot be read as sound: {reason}", path=path) from error
-        if not self._container.streams.audio:
-            self._container.close()
-            raise FormatError("holds no sound", path=path)
-        stream = self._container.streams.audio[0]
-        if stream.codec_context is None:
-            self._container.close()
-            raise FormatError("holds sound in a coding that is not known here", path=path)
+        self._container, stream = open_sound(self._av, self._path)
         self.rate = stream.rate if stream.rate in AAC_RATES else 48000
         self.channels = 1 if stream.channels == 1 else 2
         self.layout = "mono" if self.channels == 1 else "stereo"

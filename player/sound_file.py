@@ -27,6 +27,28 @@ MOST_AT_ONCE = 1 << 24
 """Samples; one piece of a file that decodes to more is damaged."""
 
 
+def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
+    """The opened `av` container and its first audio stream; FormatError where there is none to decode."""
+    # Tags may be in any encoding. From version 19 on, PyAV takes them as they are and has no argument for it.
+    tags = {"metadata_errors": "replace"} if int(av.__version__.split(".")[0]) < 19 else {}
+    try:
+        empty = not path.stat().st_size
+        container = None if empty else av.open(str(path), **tags)
+    except (av.error.FFmpegError, OSError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FormatError(f"cannot be read as sound: {reason}", path=path) from error
+    if container is None:
+        raise FormatError("is empty (0 bytes), not a sound file", path=path)
+    if not container.streams.audio:
+        container.close()
+        raise FormatError("holds no sound", path=path)
+    stream = container.streams.audio[0]
+    if stream.codec_context is None:
+        container.close()
+        raise FormatError("holds sound in a coding that is not known here", path=path)
+    return container, stream
+
+
 class SoundFile:
     """The first sound of an audio or video file, as stereo samples at one rate.
 
@@ -56,7 +78,7 @@ class SoundFile:
         self.rate = self._rate(int(self._stream.rate or 0))
         length, base = self._stream.duration, self._stream.time_base
         whole = self._container.duration
-        if length is None or base is None:
+        if length is None or not base:
             self.duration = None if whole is None else max(float(whole / av.time_base), 0.0)
         else:
             self.duration = max(float(length * base), 0.0)
@@ -103,25 +125,9 @@ class SoundFile:
         self.close()
 
     def _open(self) -> None:
-        av = self._av
-        try:
-            if not self.path.stat().st_size:
-                raise FormatError("is empty (0 bytes), not a sound file", path=self.path)
-            if self._container is not None:
-                self._container.close()
-            self._container = av.open(str(self.path), metadata_errors="replace")
-        except (av.error.FFmpegError, OSError) as error:
-            if isinstance(error, FormatError):
-                raise
-            reason = getattr(error, "strerror", None) or error
-            raise FormatError(f"cannot be read as sound: {reason}", path=self.path) from error
-        if not self._container.streams.audio:
+        if self._container is not None:
             self._container.close()
-            raise FormatError("holds no sound", path=self.path)
-        self._stream = self._container.streams.audio[0]
-        if self._stream.codec_context is None:
-            self._container.close()
-            raise FormatError("holds sound in a coding that is not known here", path=self.path)
+        self._container, self._stream = open_sound(self._av, self.path)
 
     def _rate(self, rate: int) -> int:
         if rate < 1:
@@ -152,7 +158,7 @@ class SoundFile:
         begun, at = stream.start_time or 0, None
         for frame in self._frames():
             told = None
-            if frame.pts is not None:
+            if frame.pts is not None and frame.time_base:
                 told = round(float((frame.pts - begun) * frame.time_base) * self.rate)
             if at is None:
                 at = self._first = told or 0
