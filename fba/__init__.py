@@ -11,12 +11,10 @@ Everything public is imported on first use, so that `import fba` costs next to n
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-__version__ = "0.1.0"
-
+TYPE_CHECKING = False  # as typing has it, whose import takes longer than all of this
 if TYPE_CHECKING:
+    from typing import Any
+
     from fba import body, capture, face
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
     from fba.codec import Decoder, Encoder, EncoderOptions, StreamInfo, decode, encode
@@ -32,6 +30,8 @@ if TYPE_CHECKING:
         UnsupportedError,
     )
     from fba.formats import probe, read, write
+
+__version__ = "0.1.0"
 
 _PLACES = {
     "Animation": "fba.animation",
@@ -89,6 +89,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
     if name in _PLACES:
         value = getattr(import_module(_PLACES[name]), name)
     elif name in _MODULES:

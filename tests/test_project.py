@@ -204,6 +204,13 @@ def test_dev_refuses_an_unknown_command(checkout: Path) -> None:
     assert not (checkout / ".venv").exists()
 
 
+def test_dev_bench_of_a_stream_names_the_command_for_it(checkout: Path) -> None:
+    done = dev(checkout, "bench", "my/walk.fba")
+    assert done.returncode == 1
+    assert f"to measure the codec on a stream: {checkout / 'dev'} fba bench my/walk.fba" in done.stderr
+    assert not (checkout / ".venv").exists()
+
+
 def test_dev_without_python_says_how_to_get_one(checkout: Path, tmp_path: Path) -> None:
     done = dev(checkout, "test", PATH=str(tools(tmp_path / "bin", python3="exit 1")))
     assert done.returncode == 1

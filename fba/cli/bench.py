@@ -12,7 +12,10 @@ import click
 from fba.cli import options
 
 
-@click.command(epilog=options.examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"))
+@click.command(
+    cls=options.Command,
+    epilog=options.examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"),
+)
 @click.argument("file", metavar="FILE.fba", type=options.EXISTING)
 @click.option("--rounds", type=click.IntRange(1, 1000), default=9, show_default=True)
 @options.bap_steps_option

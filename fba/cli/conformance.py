@@ -10,10 +10,11 @@ from fba.cli import options
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba conformance                 # the vectors that come with fba",
         "fba conformance ../vectors      # a folder with an index.json",
-    )
+    ),
 )
 @click.argument("folder", required=False, type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("--verbose", "-v", is_flag=True, help="A line for every vector, not only for failures.")

@@ -12,13 +12,14 @@ from fba.cli import options, writer_options
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba convert old.fap new.fap          # the canonical form",
         "fba convert walk.bvh walk.bap --fps 30",
         "fba convert talk.fba talk.fap",
         "fba convert walk.bap walk.bvh --joints moving",
         "fba convert both.fba person.glb --bap-steps visage --model head.glb",
-    )
+    ),
 )
 @click.argument("source", metavar="IN", type=options.EXISTING)
 @click.argument("target", metavar="OUT", type=click.Path(dir_okay=False, path_type=Path))

@@ -20,6 +20,7 @@ _FOLDER_OR_FILE = click.Path(path_type=Path)
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba decode talk.fba --fap talk.fap",
         "fba decode both.fba --fap face.fap --bap body.bap --bap-steps visage",
@@ -28,7 +29,7 @@ _FOLDER_OR_FILE = click.Path(path_type=Path)
         "fba decode walk.fba -o walk.bvh --bap-steps visage --joints moving",
         "fba decode archive/*.fba --fap decoded/",
         "fba decode archive/*.fba -o decoded/ --to glb",
-    )
+    ),
 )
 @click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=options.EXISTING)
 @click.option(
@@ -116,9 +117,8 @@ def _targets(
             raise click.UsageError(f"{output} is a folder; say with --to what to write there, as in --to bvh")
         writing = writer_for(output, to)
         if writing.name == "fba":
-            raise click.UsageError(
-                f"{output}: streams are decoded here; fba convert and fba encode write them"
-            )
+            others = options.as_typed("fba convert and fba encode")
+            raise click.UsageError(f"{output}: streams are decoded here; {others} write them")
         settings = writer_options.settings(output, writing, given)
         targets.append(_Target("--output", output, writing.suffixes[0], writing, settings))
     else:

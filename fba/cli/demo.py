@@ -21,7 +21,7 @@ PATIENCE = 4.0
 COMPILING = "compiling for this machine, on the first run only: about a minute in all"
 
 
-@click.command(epilog=options.examples("fba demo", "fba demo --no-play --out demo/"))
+@click.command(cls=options.Command, epilog=options.examples("fba demo", "fba demo --no-play --out demo/"))
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -61,7 +61,8 @@ def command(out: Path | None, play: bool | None) -> None:
     )
     decoded = read(stream, bap_steps=BAP_STEPS)
     click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")
-    click.echo(f"to see it again: fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
+    again = options.as_typed(f"fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
+    click.echo(f"to see it again: {again}")
     if play is not False and _played(player, decoded, asked=play is True):
         return
     _render(player, decoded, folder)

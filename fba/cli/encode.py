@@ -19,13 +19,14 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba encode walk.bvh -o walk.fba --bap-steps visage",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
         "fba encode talk.fap -o talk.fba --epf talk.epf",
         "fba encode walk.bvh -o walk.fba --bap-steps visage --report --limits report",
-    )
+    ),
 )
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=options.EXISTING)
 @click.option(

@@ -16,12 +16,13 @@ DEFAULT_RATE = Fraction(30)
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba gait --stride 0.7 --character bored --bap-steps visage -o walk.fba",
         "fba gait --character hurried --seconds 10 --fps 25 -o walk.bap",
         "fba gait --list",
         "fba gait --find walk.bap",
-    )
+    ),
 )
 @click.option(
     "--stride",

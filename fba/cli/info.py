@@ -12,11 +12,12 @@ from fba.errors import FbaError
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba info talk.fba",
         "fba info --json *.fba | jq .[].bits_per_second",
         "fba info --trace talk.fba | less",
-    )
+    ),
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.EXISTING)
 @options.bap_steps_option

@@ -9,11 +9,14 @@ finalizer, an interruption waits, and comes again soon.
 from __future__ import annotations
 
 import _thread
+import contextlib
 import signal
 import sys
 import time
 from types import FrameType, TracebackType
 from typing import Any, Protocol
+
+from fba.cli.leaving import leave
 
 AGAIN_AFTER = 0.05
 """Seconds until it comes again."""
@@ -46,11 +49,9 @@ class Interruptions:
     def __enter__(self) -> Interruptions:
         self._hook = sys.unraisablehook
         sys.unraisablehook = self._unraisable
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            try:
+        if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave):
+            with contextlib.suppress(ValueError):  # not the main thread
                 self._handler = signal.signal(signal.SIGINT, self._interrupt)
-            except ValueError:  # not the main thread
-                self._handler = None
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -12,6 +12,9 @@ import click
 
 from fba import __version__
 from fba.cli.interruption import Interruptions
+from fba.cli.leaving import INTERRUPTED, TEXT
+from fba.cli.options import Group, examples
+from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import hasten
 from fba.errors import FbaError, FbaWarning
 
@@ -30,10 +33,10 @@ _COMMANDS = {
     "demo": "Encode sample motion capture, print what came out, and play it.",
 }
 
-BAD_DATA, BAD_USAGE, INTERRUPTED = 1, 2, 130
+BAD_DATA, BAD_USAGE = 1, 2
 
 
-class _Commands(click.Group):
+class _Commands(Group):
     """Lists subcommands without importing them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -43,10 +46,6 @@ class _Commands(click.Group):
         if cmd_name not in _COMMANDS:
             return None
         command: click.Command = import_module(f"fba.cli.{cmd_name}").command
-        if not any(param.name == "debug" for param in command.params):
-            command.params.append(
-                click.Option(["--debug"], is_flag=True, expose_value=False, help="Show tracebacks of errors.")
-            )
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -57,10 +56,9 @@ class _Commands(click.Group):
 @click.group(
     cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Examples:\n\n\b\n  fba encode walk.bvh -o walk.fba\n  fba info walk.fba\n  fba play walk.fba\n",
+    epilog=examples("fba encode walk.bvh -o walk.fba", "fba info walk.fba", "fba play walk.fba"),
 )
 @click.version_option(__version__, prog_name="fba")
-@click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks of errors.")
 def group() -> None:
     """MPEG-4 Face and Body Animation: encode, decode, convert, play and measure."""
 
@@ -70,8 +68,10 @@ def main(arguments: list[str] | None = None) -> None:
 
     arguments: None for those of the process, which then is taken as doing nothing else.
     """
+    program = NAME
     if arguments is None:
         hasten()
+        program = program_words()
         arguments = sys.argv[1:]
     debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
     warnings.simplefilter("always", FbaWarning)
@@ -79,7 +79,7 @@ def main(arguments: list[str] | None = None) -> None:
     interruptions = Interruptions()
     try:
         with interruptions:
-            result = group.main(arguments, prog_name="fba", standalone_mode=False)
+            result = group.main(arguments, prog_name=program, standalone_mode=False)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.ClickException as error:
@@ -94,7 +94,7 @@ def main(arguments: list[str] | None = None) -> None:
     except (FbaError, OSError, MemoryError) as error:
         if debug:
             raise
-        click.echo(f"fba: error: {_one_line(error)}", err=True)
+        click.echo(f"fba: error: {with_program(_one_line(error), program, _COMMANDS)}", err=True)
         sys.exit(BAD_DATA)
     except Exception as error:
         if debug:
@@ -111,7 +111,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _say_interrupted() -> NoReturn:
-    click.echo("fba: interrupted", err=True)
+    click.echo(TEXT, err=True)
     sys.exit(INTERRUPTED)
 
 

@@ -27,6 +27,7 @@ POINT_FILES = "FDP, CSV or JSON file"
 
 @click.group(
     "model",
+    cls=options.Group,
     epilog=options.examples(
         "fba model info --default",
         "fba model validate head.glb",
@@ -36,14 +37,6 @@ POINT_FILES = "FDP, CSV or JSON file"
 )
 def command() -> None:
     """Face models: look at one, check it, import one, fit one to a person."""
-
-
-def _debug(subcommand: click.Command) -> click.Command:
-    """`--debug` anywhere on the line, as with every other subcommand."""
-    subcommand.params.append(
-        click.Option(["--debug"], is_flag=True, expose_value=False, help="Show tracebacks of errors.")
-    )
-    return subcommand
 
 
 def _one_of(file: Path | None, default: bool) -> FaceModel:
@@ -62,7 +55,6 @@ def _read(file: Path | None) -> FaceModel:
     return import_model(file)
 
 
-@_debug
 @command.command(
     short_help="What a face model holds.",
     epilog=options.examples("fba model info --default", "fba model info --json head.glb"),
@@ -84,7 +76,6 @@ def info(file: Path | None, default: bool, as_json: bool) -> None:
         model_text.print_model(model)
 
 
-@_debug
 @command.command(
     short_help="Check a face model against the standard.",
     epilog=options.examples("fba model validate head.glb", "fba model validate --json --default"),
@@ -119,7 +110,6 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
         raise click.exceptions.Exit(1)
 
 
-@_debug
 @command.command(
     "import",
     short_help="Make a face model of a mesh.",
@@ -174,7 +164,6 @@ def import_(
     _write(model, output)
 
 
-@_debug
 @command.command(
     short_help="Fit a face to a person.",
     epilog=options.examples(

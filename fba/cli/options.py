@@ -14,14 +14,40 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from fba.animation import Animation
+from fba.cli.program import NAME, with_program
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
 EXISTING = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
 OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
+
+
+class Command(click.Command):
+    """A subcommand: takes --debug anywhere, and its help shows commands as the user types them here."""
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        about = "Show tracebacks of errors."
+        self.params.append(click.Option(["--debug"], is_flag=True, expose_value=False, help=about))
+
+    def get_help(self, ctx: click.Context) -> str:
+        return as_typed(super().get_help(ctx), ctx)
+
+
+class Group(Command, click.Group):
+    """Several subcommands under one name."""
+
+    command_class = Command
+
+
+def as_typed(text: str, context: click.Context | None = None) -> str:
+    """The text with its commands as the user types them here, e.g. `./dev fba info` for `fba info`."""
+    root = (context or click.get_current_context()).find_root()
+    assert isinstance(root.command, click.Group)
+    return with_program(text, root.info_name or NAME, root.command.list_commands(root))
 
 
 class RateType(click.ParamType[Fraction]):
@@ -67,11 +93,11 @@ class SizeType(click.ParamType[tuple[int, int]]):
         return int(width), int(height)
 
 
-def fps_option(text: str) -> Callable[[Command], Command]:
+def fps_option(text: str) -> Callable[[Decorated], Decorated]:
     return click.option("--fps", type=RateType(), metavar="RATE", help=text)
 
 
-def bap_steps_option(command: Command) -> Command:
+def bap_steps_option(command: Decorated) -> Decorated:
     return click.option(
         "--bap-steps",
         type=click.Choice(["iso", "visage"]),
@@ -81,7 +107,7 @@ def bap_steps_option(command: Command) -> Command:
     )(command)
 
 
-def model_option(command: Command) -> Command:
+def model_option(command: Decorated) -> Decorated:
     return click.option(
         "--model",
         type=click.Path(exists=True, path_type=Path),
@@ -90,7 +116,7 @@ def model_option(command: Command) -> Command:
     )(command)
 
 
-def body_option(command: Command) -> Command:
+def body_option(command: Decorated) -> Decorated:
     return click.option(
         "--body",
         type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -108,7 +134,7 @@ def read_model(path: Path | None) -> FaceModel | None:
     return import_model(path)
 
 
-def camera_option(command: Command) -> Command:
+def camera_option(command: Decorated) -> Decorated:
     return click.option(
         "--camera",
         type=click.Choice(["front", "three-quarter", "profile", "body"]),
@@ -116,7 +142,7 @@ def camera_option(command: Command) -> Command:
     )(command)
 
 
-def view_option(command: Command) -> Command:
+def view_option(command: Decorated) -> Decorated:
     return click.option(
         "--view",
         type=click.Choice(["figure", "points"]),
@@ -126,7 +152,7 @@ def view_option(command: Command) -> Command:
     )(command)
 
 
-def deform_option(command: Command) -> Command:
+def deform_option(command: Decorated) -> Decorated:
     """Heard by the player, wherever it draws; no argument of the command."""
     return click.option(
         "--deform",
@@ -161,7 +187,7 @@ class ShowType(click.ParamType[tuple[str, Any]]):
             self.fail(str(error), param, ctx)
 
 
-def show_option(command: Command) -> Command:
+def show_option(command: Decorated) -> Decorated:
     """`--show` as `shows`: names and values for `Scene.show`."""
     return click.option(
         "--show",
@@ -174,7 +200,7 @@ def show_option(command: Command) -> Command:
     )(command)
 
 
-def axes_option(command: Command) -> Command:
+def axes_option(command: Decorated) -> Decorated:
     return click.option(
         "--axes",
         type=click.Choice(["iso", "vreng"]),
@@ -184,11 +210,11 @@ def axes_option(command: Command) -> Command:
     )(command)
 
 
-def json_option(command: Command) -> Command:
+def json_option(command: Decorated) -> Decorated:
     return click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")(command)
 
 
-def salvage_option(command: Command) -> Command:
+def salvage_option(command: Decorated) -> Decorated:
     return click.option(
         "--salvage", is_flag=True, help="Keep what can be read of damaged input, and say what was lost."
     )(command)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba play talk.fba",
         "fba play talk.fba --audio voice.mp3",
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
         "fba play original.fap decoded.fba --compare",
         "nc host 7000 | fba play -",
         "fba play --model face.glb",
-    )
+    ),
 )
 @scene_options.files_argument
 @click.option(

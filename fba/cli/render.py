@@ -31,6 +31,7 @@ class SheetType(click.ParamType[str | int]):
 
 
 @click.command(
+    cls=options.Command,
     epilog=options.examples(
         "fba render talk.fba -o talk.mp4",
         "fba render talk.fba -o talk.mp4 --audio voice.wav",
@@ -41,7 +42,7 @@ class SheetType(click.ParamType[str | int]):
         "fba render original.fap decoded.fba -o both.mp4",
         "fba render --fap open_jaw=800 --viseme 4 --expression joy=50 -o face.png",
         "fba render --contact-sheet expressions -o expressions.png",
-    )
+    ),
 )
 @scene_options.files_argument
 @click.option(

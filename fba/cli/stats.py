@@ -12,7 +12,7 @@ from fba.cli import options
 from fba.codec.stream_info import StreamInfo
 
 
-@click.command(epilog=options.examples("fba stats talk.fba", "fba stats --json *.fba"))
+@click.command(cls=options.Command, epilog=options.examples("fba stats talk.fba", "fba stats --json *.fba"))
 @click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
 @options.bap_steps_option
 @options.json_option

@@ -27,7 +27,7 @@ FLAGS = {
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
-def writer_options(command: options.Command) -> options.Command:
+def writer_options(command: options.Decorated) -> options.Decorated:
     """Adds the options; the command takes them as keywords and hands them to `settings`."""
     for option in reversed(
         (

@@ -25,6 +25,29 @@ main(["long"])
 """
 
 
+IMPORTING = """
+import signal, sys
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == "{module}":
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+signal.signal(signal.SIGINT, signal.{handler})
+sys.argv = ["fba", "info", "--help"]
+from fba.__main__ import main
+main()
+"""
+
+ENDING = """
+import atexit, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["fba", "--version"]
+from fba.__main__ import main
+atexit.register(signal.raise_signal, signal.SIGINT)
+main()
+"""
+
+
 LOADING = """
 import signal, sys, time
 from fba.cli.main import group, main
@@ -45,6 +68,31 @@ try:
 finally:
     print(*steps)
 """
+
+
+def ran(code: str) -> tuple[int, str, str]:
+    command = [sys.executable, "-c", code]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return result.returncode, result.stdout, result.stderr
+
+
+@pytest.mark.parametrize(
+    "module", ["fba.cli.main", "click", "inspect", "fba.cli.startup", "fba.cli.options", "fba.cli.info"]
+)
+def test_ctrl_c_while_the_program_is_imported_leaves_no_traceback(module: str) -> None:
+    code, out, err = ran(IMPORTING.format(module=module, handler="default_int_handler"))
+    assert (code, out, err.strip()) == (130, "", "fba: interrupted")
+
+
+def test_a_program_that_shall_ignore_ctrl_c_ignores_it() -> None:
+    code, out, err = ran(IMPORTING.format(module="click", handler="SIG_IGN"))
+    assert (code, err) == (0, "")
+    assert out.startswith("Usage: ")
+
+
+def test_ctrl_c_while_the_program_ends_leaves_no_traceback() -> None:
+    code, _, err = ran(ENDING)
+    assert (code, err) == (130, "fba: interrupted\n")
 
 
 def test_what_must_not_be_left_halfway_is_finished_first() -> None:

@@ -1,0 +1,51 @@
+"""What the user types to start this program, for usage lines and for hints that show a command."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Iterable
+
+NAME = "fba"
+DEV = "FBA_DEV"
+"""Environment variable that `./dev` sets for the commands it starts: its own path, as the user typed it."""
+
+
+def program_words() -> str:
+    """The words that start this process's program again from where the user stands.
+
+    "fba" where that is on the PATH, else as it was started: ".venv/bin/fba", "python3 -m fba", "./dev fba".
+    Quoted for a shell.
+    """
+    dev = os.environ.get(DEV)
+    if dev:
+        return f"{shlex.quote(dev)} {NAME}"
+    if os.path.basename(sys.argv[0]) == "__main__.py":
+        return f"{_typed(sys.orig_argv[0])} -m {NAME}"
+    return _typed(sys.argv[0])
+
+
+def with_program(text: str, program: str, commands: Iterable[str]) -> str:
+    """The text with every command that it shows, as in `fba info FILE`, starting with the words of `program`.
+
+    commands: the names of the subcommands; "fba" before another word stays.
+    """
+    if program == NAME:
+        return text
+    mention = rf"(?<![\w./-]){NAME} (?=(?:{'|'.join(commands)})\b)"
+    return re.sub(rf"{re.escape(program)} |{mention}", lambda _: f"{program} ", text)
+
+
+def _typed(path: str) -> str:
+    """The name alone where the PATH leads to this very file, else the path."""
+    folder, name = os.path.split(path)
+    if os.name == "nt":
+        name = name.removesuffix(".exe")
+    # What was typed is not known: an installed script is given its whole path. Links are not followed: the
+    # Python of a virtual environment is a link to another.
+    found = shutil.which(name)
+    on_path = found is not None and os.path.abspath(os.path.dirname(found)) == os.path.abspath(folder)
+    return name if on_path or not folder else shlex.quote(path)

@@ -1,0 +1,98 @@
+"""Hints and usage lines begin with what the user typed to start the program."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fba.cli.main import _COMMANDS
+from fba.cli.program import program_words, with_program
+
+HINT = "use it with `fba encode IN.fap -o OUT.fba --epf FILE`"
+EPF = "FFR 0\n"
+SCRIPT = Path(sys.executable).with_name("fba")
+
+
+@pytest.fixture
+def epf(tmp_path: Path) -> Path:
+    path = tmp_path / "plan.epf"
+    path.write_text(EPF)
+    return path
+
+
+def ran(*command: object, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+    surroundings = {name: value for name, value in os.environ.items() if name != "FBA_DEV"} | environment
+    words = [str(word) for word in command]
+    return subprocess.run(words, capture_output=True, text=True, check=False, cwd=cwd, env=surroundings)
+
+
+@pytest.mark.parametrize(
+    ("typed", "program"),
+    [("./dev", "./dev"), ("../my files/dev", "'../my files/dev'"), ("/opt/fba/dev", "/opt/fba/dev")],
+)
+def test_started_by_dev(epf: Path, typed: str, program: str) -> None:
+    error = ran(sys.executable, "-m", "fba", "info", epf, FBA_DEV=typed)
+    assert error.returncode == 1
+    assert f"use it with `{program} fba encode IN.fap" in error.stderr
+    assert "fba: error: " in error.stderr
+    usage = ran(sys.executable, "-m", "fba", "info", "--jsno", FBA_DEV=typed)
+    assert usage.stderr.startswith(
+        f"Usage: {program} fba info [OPTIONS] FILE...\nTry '{program} fba info --help'"
+    )
+    shown = ran(sys.executable, "-m", "fba", "play", "--help", FBA_DEV=typed).stdout
+    assert f"\n    {program} fba play talk.fba\n" in shown
+    assert f"\n    nc host 7000 | {program} fba play -\n" in shown
+    assert f"`{program} fba render`" in " ".join(shown.split())
+
+
+def test_started_as_a_module(epf: Path) -> None:
+    error = ran(sys.executable, "-m", "fba", "info", epf)
+    assert f"use it with `{sys.executable} -m fba encode IN.fap" in error.stderr
+    folder = os.path.dirname(sys.executable)
+    on_path = ran("python", "-m", "fba", "info", epf, PATH=f"{folder}{os.pathsep}{os.environ['PATH']}")
+    assert "use it with `python -m fba encode IN.fap" in on_path.stderr
+
+
+@pytest.mark.skipif(not SCRIPT.exists(), reason="fba is not installed")
+def test_started_as_a_script(epf: Path) -> None:
+    elsewhere = ran(SCRIPT, "info", epf, PATH="/usr/bin:/bin")
+    assert f"use it with `{SCRIPT} encode IN.fap" in elsewhere.stderr
+    relative = ran(Path("bin") / "fba", "info", epf, cwd=SCRIPT.parent.parent, PATH="/usr/bin:/bin")
+    assert "use it with `bin/fba encode IN.fap" in relative.stderr
+    installed = ran("fba", "info", epf, PATH=f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}")
+    assert HINT in installed.stderr
+
+
+def test_another_of_the_same_name_on_the_path_is_not_meant(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for folder in ("one", "other place"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "fba").write_text("#!/bin/sh\n")
+        (tmp_path / folder / "fba").chmod(0o755)
+    monkeypatch.delenv("FBA_DEV", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path / "one"))
+    monkeypatch.setattr(sys, "argv", [str(tmp_path / "one" / "fba")])
+    assert program_words() == "fba"
+    monkeypatch.setattr(sys, "argv", [str(tmp_path / "other place" / "fba")])
+    assert program_words() == f"'{tmp_path}/other place/fba'"
+
+
+def test_only_commands_are_replaced() -> None:
+    text = "fba info x; a defect of fba; see docs/fba info; fba infos; `fba play -`; ./dev fba play"
+    changed = (
+        "./dev fba info x; a defect of fba; see docs/fba info; fba infos; `./dev fba play -`; ./dev fba play"
+    )
+    assert with_program(text, "./dev fba", _COMMANDS) == changed
+    assert with_program(text, "fba", _COMMANDS) == text
+
+
+@pytest.mark.slow
+def test_the_hint_of_the_demo(tmp_path: Path) -> None:
+    out = tmp_path / "my demo"
+    done = ran(sys.executable, "-m", "fba", "demo", "--no-play", "--out", out, FBA_DEV="./dev")
+    assert f"to see it again: ./dev fba play --bap-steps visage '{out}/hello.fba'\n" in done.stdout
