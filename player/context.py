@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from fba.errors import DisplayError
+from player.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
 
 GL_VERSION = 330
-NO_LIBRARY = (
-    "OpenGL cannot be loaded: {reason}. Install the system libraries libegl1 and libgl1 "
-    "(Debian, Ubuntu: apt-get install libegl1 libgl1)"
-)
 
 
 def import_moderngl() -> Any:
@@ -20,7 +17,7 @@ def import_moderngl() -> Any:
     except ImportError as error:
         raise DisplayError(
             f"pictures need the Python package moderngl, which cannot be imported: {error}. "
-            "Install it with: pip install moderngl"
+            + cure(error, "moderngl")
         ) from error
     return moderngl
 
@@ -37,9 +34,12 @@ def offscreen_context() -> Any:
             return moderngl.create_context(standalone=True, require=GL_VERSION, **options)
         except Exception as error:
             reasons.append(f"{options.get('backend', 'default')}: {_short(error)}")
+    missing = missing_libraries()
+    if missing:
+        raise DisplayError(f"pictures need OpenGL, but {missing_text(missing)}")
     text = "; ".join(reasons)
     if "not found" in text or "cannot open shared object" in text or "not loaded" in text:
-        raise DisplayError(NO_LIBRARY.format(reason=text))
+        raise DisplayError(f"OpenGL cannot be loaded: {text}. {how_to_install(OPENGL)}")
     raise DisplayError(
         f"no OpenGL 3.3 context could be made ({text}). Install libegl1 and libgl1 with a driver "
         "(Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri), or update the graphics driver; "

@@ -1,7 +1,8 @@
 """A pose as a scene of pyrender, for programs that are built on it, and as a second opinion on our pictures.
 
-pyrender is an extra (`pip install "fba[pyrender]"`). Its last release was made for NumPy 1: what it misses of
-that is lent to it while a scene is built, and taken back, so that nothing else sees it.
+pyrender is an extra: `pip install ".[pyrender]"` in the checkout, or `pip install pyrender`. Its last release
+was made for NumPy 1: what it misses of that is lent to it while a scene is built, and taken back, so that
+nothing else sees it.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from player.offscreen import following
 from player.primitives import sphere_mesh
 from player.scene import Scene
 from player.shapes import Eye, FaceMesh, Mesh
+from player.system_libraries import missing_libraries, missing_text
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
@@ -86,8 +88,11 @@ def _imported() -> Any:
     try:
         import pyrender
     except Exception as error:  # PyOpenGL raises errors of its own where OpenGL is missing
+        missing = missing_libraries()
+        if missing:
+            raise DisplayError(f"pyrender needs OpenGL, but {missing_text(missing)}") from error
         raise DisplayError(
-            f'pyrender cannot be imported: {error}. Install it with: pip install "fba[pyrender]"; without a '
+            f"pyrender cannot be imported: {error}. Install it with: pip install pyrender; without a "
             "display, set PYOPENGL_PLATFORM=egl first"
         ) from error
     return pyrender

@@ -15,6 +15,7 @@ from player.controls import Controls
 from player.overlay import Overlay
 from player.renderer import Renderer
 from player.screen import FullScreen
+from player.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
 from player.target import Target
 from player.transport import Transport
 from player.ui.glfw_input import GlfwInput
@@ -168,7 +169,7 @@ class Window:
         except ImportError as error:
             raise DisplayError(
                 f"the window needs the Python package glfw, which cannot be used: {error}. "
-                f"Install it with: pip install glfw. {HOW_WITHOUT}"
+                f"{cure(error, 'glfw')}. {HOW_WITHOUT}"
             ) from error
         glfw.set_error_callback(lambda code, text: self._problems.append(_text(text)))
         if not glfw.init():
@@ -190,6 +191,9 @@ class Window:
             glfw.window_hint(hint, value)
         self._window = glfw.create_window(*size, self._title, None, None)
         if not self._window:
+            missing = missing_libraries()
+            if missing:
+                raise DisplayError(f"the window needs OpenGL, but {missing_text(missing)}")
             raise DisplayError(
                 f"no window with OpenGL 3.3 can be opened: {self._reason('the display refused')}. "
                 "Install a driver (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri). "
@@ -201,8 +205,8 @@ class Window:
             self._gl = moderngl.create_context(require=330)
         except Exception as error:
             raise DisplayError(
-                f"OpenGL 3.3 cannot be used in the window: {error}. Install the system libraries libegl1 and "
-                "libgl1 (Debian, Ubuntu: apt-get install libegl1 libgl1), or update the graphics driver"
+                f"OpenGL 3.3 cannot be used in the window: {error}. {how_to_install(OPENGL)}, or update the "
+                "graphics driver"
             ) from error
         self._renderer = Renderer(self._gl)
 
@@ -216,9 +220,9 @@ class Window:
 
                 self._gui = Gui(self._gl, session)
             except (ImportError, RuntimeError) as error:
+                remedy = cure(error, "imgui-bundle")
                 warnings.warn(
-                    f"the window has no panels, as imgui cannot be used: {error}. Install it with: "
-                    "pip install imgui-bundle",
+                    f"the window has no panels, as imgui cannot be used: {error}. {remedy}",
                     FbaWarning,
                     stacklevel=4,
                 )

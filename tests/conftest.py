@@ -3,9 +3,30 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from pathlib import Path
 
+import graphics
 import pytest
+
+
+@pytest.fixture
+def opengl() -> None:
+    """OpenGL works without a display here."""
+    reason = graphics.missing_opengl()
+    if reason is not None:
+        graphics.skip(reason)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Says how many tests were skipped for lack of OpenGL or a display, once for each reason."""
+    reasons = [
+        report.longrepr[2].partition(graphics.MARK)[2]
+        for report in terminalreporter.stats.get("skipped", [])
+        if isinstance(report.longrepr, tuple) and graphics.MARK in report.longrepr[2]
+    ]
+    for reason, count in Counter(reasons).most_common():
+        terminalreporter.write_line(f"skipped {count}: {reason}")
 
 
 @pytest.fixture(scope="session")

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
-from packaging.requirements import Requirement
+from packaging.requirements import InvalidRequirement, Requirement
+from packaging.utils import canonicalize_name
 
 import fba
 
@@ -118,6 +122,7 @@ def test_wheel_holds_every_file_of_the_packages_and_no_other(tmp_path: Path) -> 
     done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     (wheel,) = tmp_path.glob("*.whl")
+    assert wheel.name.startswith("mpeg4_fba-")  # `fba` is someone else's on the index
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert {name for name in expected if (ROOT / name).exists()} <= held
@@ -148,6 +153,91 @@ def test_only_what_has_wheels_is_required(platform: dict[str, str], python: str,
     environment = platform | {"python_version": python, "python_full_version": f"{python}.0"}
     left_out = {r.name for r in requirements if r.marker and not r.marker.evaluate(environment)}
     assert left_out == missing
+
+
+INSTALLS = re.compile(r"\bpip3?(?: --python \S+)? install((?:[ \t]+[^\s`|&;)]+)+)")
+CURES = re.compile(r"\bcure\(\w+, [\"']([^\"']+)[\"']\)")
+
+
+def dependencies() -> set[str]:
+    """The names of all packages that pyproject.toml lists, and pip itself."""
+    project = pyproject()["project"]
+    listed = [*project["dependencies"], *itertools.chain(*project["optional-dependencies"].values())]
+    return {canonicalize_name(Requirement(text).name) for text in listed} | {"pip"}
+
+
+def installed(command: str) -> Iterator[str]:
+    """What a `pip install` installs, without options; the text may go on as a sentence behind it."""
+    for word in command.split():
+        bare = word.strip("\"'")
+        if bare.startswith(">"):  # output goes to a file
+            return
+        if bare.startswith(("-", "$@", "{")):
+            continue
+        yield bare if bare == "." else bare.rstrip(".,:\"'")
+        ends_string = word.endswith(("'", '"')) and not word.startswith(("'", '"'))
+        if ends_string or (bare != "." and bare.endswith((".", ",", ":"))):
+            return
+
+
+def is_ours(target: str) -> bool:
+    """Whether that is this checkout, with extras that exist, or a file."""
+    if target.endswith(".whl"):
+        return "/" in target or target.startswith(canonicalize_name(pyproject()["project"]["name"]))
+    found = re.fullmatch(r"\.(?:\[([\w,$]+)\])?", target)
+    extras = pyproject()["project"]["optional-dependencies"]
+    return bool(found) and all(
+        extra in extras for extra in (found[1] or "").split(",") if extra and not extra.startswith("$")
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "targets", "good"),
+    [
+        ("pip install .", ["."], True),
+        ('pip install ".[pyrender]"', [".[pyrender]"], True),
+        ('pip install ".[pyrnder]"', [".[pyrnder]"], False),
+        ('pip install "fba[pyrender]"', ["fba[pyrender]"], False),
+        ("Install it with: pip install fba. Or not", ["fba"], False),
+        ("pip install mpeg4-fba", ["mpeg4-fba"], False),  # until it is published
+        ("pip install imgui_bundle, or else", ["imgui_bundle"], True),
+        ("pip install -q --only-binary=:all: av glfw", ["av", "glfw"], True),
+        ("pip install pyav", ["pyav"], False),
+        ('pip --python "$p" install --quiet "$work"/dist/*.whl ||', ['$work"/dist/*.whl'], True),
+    ],
+)
+def test_what_counts_as_an_installation(text: str, targets: list[str], good: bool) -> None:
+    (command,) = INSTALLS.findall(text)
+    assert list(installed(command)) == targets
+    assert all(is_ours(target) or is_listed(target) for target in targets) == good
+
+
+def is_listed(target: str) -> bool:
+    """Whether that is one of our dependencies by its own name."""
+    try:
+        return canonicalize_name(Requirement(target).name) in dependencies()
+    except InvalidRequirement:
+        return False
+
+
+def test_nobody_is_told_to_install_a_package_of_a_stranger() -> None:
+    """The index has a project `fba` that has nothing to do with this one."""
+    told, wrong = 0, []
+    for name in tracked():
+        path = ROOT / name
+        if path == Path(__file__) or path.is_symlink() or not path.is_file():
+            continue
+        if path.suffix not in (".py", ".md", ".toml", "") and name not in ("dev", ".ci/run"):
+            continue
+        text = path.read_text(encoding="utf-8")
+        for command in INSTALLS.findall(text):
+            told += 1
+            wrong += [f"{name}: {t}" for t in installed(command) if not (is_ours(t) or is_listed(t))]
+        for package in CURES.findall(text):
+            told += 1
+            wrong += [f"{name}: {package}"] * (not is_listed(package))
+    assert told > 10
+    assert wrong == []
 
 
 # --- the script `dev` ---------------------------------------------------------------------------------
@@ -236,6 +326,26 @@ def test_dev_names_the_package_where_python_cannot_make_environments(checkout: P
     assert done.returncode == 1
     assert "sudo apt-get install python3.13-venv" in done.stderr
     assert not (checkout / ".venv").exists()
+
+
+@pytest.mark.parametrize("command", ["setup", "demo"])
+def test_dev_says_once_which_libraries_are_missing(checkout: Path, tmp_path: Path, command: str) -> None:
+    # A Python 3.13 that installs nothing and cannot load libEGL; its demo says so, as that of fba does.
+    python = """case $* in
+        *_base_executable*) echo "13 $0" ;;
+        *ctypes*) echo libEGL.so.1 ;;
+        *"-m venv"*) for last; do :; done; mkdir -p "$last/bin"; cp "$0" "$last/bin/python"
+            printf '#!/bin/sh\\necho libEGL.so.1 is missing >&2\\n' >"$last/bin/fba"
+            chmod +x "$last/bin/fba" ;;
+    esac"""
+    path = tools(tmp_path / "bin", python3=python)
+    for name in ("chmod", "cp", "date", "env"):
+        (path / name).symlink_to(shutil.which(name) or name)
+    first = dev(checkout, command, PATH=str(path), FBA_NO_APT="1")
+    assert first.returncode == 0, first.stderr
+    assert first.stderr.count("libEGL.so.1") == 1
+    again = dev(checkout, command, PATH=str(path), FBA_NO_APT="1")
+    assert again.stderr.count("libEGL.so.1") == (command == "demo")
 
 
 def test_dev_leaves_a_folder_alone_that_is_no_environment(checkout: Path, tmp_path: Path) -> None:

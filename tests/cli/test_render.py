@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
-import os
 import signal
 import subprocess
 import sys
@@ -21,23 +19,9 @@ from PIL import Image
 import fba
 from fba import Animation
 from fba.cli.still import still
-from fba.errors import DisplayError
 
 Run = Callable[..., tuple[int, str, str]]
 SMALL = ("--size", "96x72")
-
-
-@pytest.fixture
-def opengl() -> None:
-    """OpenGL works without a display here."""
-    from player.context import offscreen_context
-
-    try:
-        offscreen_context().release()
-    except DisplayError as error:
-        if os.environ.get("CI") and ctypes.util.find_library("EGL"):
-            raise
-        pytest.skip(f"no OpenGL without a display: {error}")
 
 
 def pixels(path: Path) -> np.ndarray:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,23 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fba.errors import DisplayError
-
 Run = Callable[..., tuple[int, str, str]]
 FACE = ("--fap", "open_jaw=200", "--size", "64x48", "--camera", "front")
-
-
-@pytest.fixture
-def opengl() -> None:
-    """OpenGL works without a display here."""
-    from player.context import offscreen_context
-
-    try:
-        offscreen_context().release()
-    except DisplayError as error:
-        if os.environ.get("CI") and ctypes.util.find_library("EGL"):
-            raise
-        pytest.skip(f"no OpenGL without a display: {error}")
 
 
 @pytest.mark.parametrize(

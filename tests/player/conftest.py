@@ -1,38 +1,18 @@
-"""OpenGL for tests: skips with a reason where there is none, except in CI where EGL is installed."""
+"""Animations and a virtual display for tests."""
 
 from __future__ import annotations
 
-import ctypes.util
 import os
 import shutil
 import subprocess
 from collections.abc import Iterator
 
+import graphics
 import numpy as np
 import pytest
 from player_tracks import body_track, face_track
 
 from fba.animation import Animation
-from fba.errors import DisplayError
-from player.context import offscreen_context
-
-
-@pytest.fixture(scope="session")
-def _egl() -> None:
-    try:
-        context = offscreen_context()
-        with context:
-            pass  # leaves no context current, which a window's would collide with
-        context.release()
-    except DisplayError as error:
-        if os.environ.get("CI") and ctypes.util.find_library("EGL"):
-            raise
-        pytest.skip(f"no OpenGL without a display: {error}")
-
-
-@pytest.fixture
-def opengl(_egl: None) -> None:
-    """OpenGL works without a display here."""
 
 
 @pytest.fixture(scope="session")
@@ -54,7 +34,7 @@ def walking() -> Animation:
 def display() -> Iterator[str]:
     """The name of a virtual display of its own: skips where Xvfb is missing."""
     if shutil.which("Xvfb") is None:
-        pytest.skip("Xvfb is not installed (Debian, Ubuntu: apt-get install xvfb)")
+        graphics.skip("Xvfb is not installed (Debian, Ubuntu: apt-get install xvfb)")
     read, write = os.pipe()
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(write), "-screen", "0", "1000x800x24", "-nolisten", "tcp", "-noreset"],
@@ -67,7 +47,7 @@ def display() -> Iterator[str]:
     try:
         number = pipe.readline().strip()
         if not number:
-            pytest.skip("Xvfb did not start")
+            graphics.skip("Xvfb did not start")
         yield f":{number}"
     finally:
         pipe.close()

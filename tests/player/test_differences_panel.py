@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
+import graphics
 import numpy as np
 import pytest
 from player_tracks import body_track, face_track
@@ -16,10 +17,10 @@ from player.scene import Scene
 from player.transport import Transport
 from player.ui.session import Session
 
-pytest.importorskip("imgui_bundle")
+graphics.imported("imgui_bundle")
 
-from player.ui.differences_panel import DifferencesPanel, thinned
-from player.ui.picture import Studio
+from player.ui.differences_panel import DifferencesPanel, thinned  # noqa: E402 - needs imgui
+from player.ui.picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
 

@@ -9,11 +9,13 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+import graphics
 import numpy as np
 import pytest
 from player_tracks import body_track, face_track
 from small_face import small_face
 
+import player.context
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
 from player import Offscreen, Scene
@@ -46,7 +48,7 @@ def resident() -> int:
 @pytest.fixture
 def living(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     """How many things of OpenGL were made since and not given back."""
-    moderngl = pytest.importorskip("moderngl")
+    moderngl = graphics.imported("moderngl")
     made: list[Any] = []
 
     def kept(make: Callable[..., Any]) -> Callable[..., Any]:
@@ -250,12 +252,13 @@ class TestSeveral:
 def test_without_opengl_it_says_what_to_do(
     failure: str, words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    moderngl = pytest.importorskip("moderngl")
+    moderngl = graphics.imported("moderngl")
 
     def refuse(**options: Any) -> None:
         raise RuntimeError(failure)
 
     monkeypatch.setattr(moderngl, "create_context", refuse)
+    monkeypatch.setattr(player.context, "missing_libraries", list)  # whatever this machine has
     with pytest.raises(DisplayError) as told:
         Offscreen(small_scene(), TINY)
     for word in words:

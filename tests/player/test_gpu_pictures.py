@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+import graphics
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -235,7 +236,7 @@ def test_nothing_is_left_on_the_card() -> None:
 
 @pytest.mark.parametrize("way", WAYS)
 def test_pictures_after_the_first_allocate_nothing(monkeypatch: pytest.MonkeyPatch, way: str) -> None:
-    moderngl = pytest.importorskip("moderngl")
+    moderngl = graphics.imported("moderngl")
     scene = small_scene(body=True)
     with Offscreen(scene, (48, 36), deform=way) as view:
         for time in (0.0, 0.02, 0.04):

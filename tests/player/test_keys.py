@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
+import graphics
 
 from player.switches import SWITCHES
 from player.ui.keys import by_name, key_of, keys, mouse
@@ -42,7 +42,7 @@ def test_keys_are_shown_as_people_write_them() -> None:
 
 
 def test_every_panel_has_a_key_and_every_key_its_panel() -> None:
-    pytest.importorskip("imgui_bundle")
+    graphics.imported("imgui_bundle")
     from player.ui.panels import make_panels
 
     panels = [panel.name for panel in make_panels()]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import graphics
 import numpy as np
 import pytest
 from set_clock import Clock
@@ -16,7 +17,7 @@ from player.transport import Transport
 from player.ui.session import Session
 from player.ui.source import Source
 
-imgui = pytest.importorskip("imgui_bundle").imgui
+imgui = graphics.imported("imgui_bundle").imgui
 
 from player.ui.picture import Studio  # noqa: E402 - needs imgui
 

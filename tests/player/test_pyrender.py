@@ -62,7 +62,7 @@ print(json.dumps(found))
 @pytest.mark.usefixtures("opengl")
 def test_silhouettes_agree() -> None:
     if find_spec("pyrender") is None:
-        pytest.skip('pyrender is not installed: pip install "fba[pyrender]"')
+        pytest.skip('pyrender is not installed: pip install ".[pyrender]"')
     folders = [str(Path(__file__).parent), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYOPENGL_PLATFORM": "egl", "PYTHONPATH": os.pathsep.join(folders)}
     done = subprocess.run(
@@ -89,7 +89,7 @@ def test_silhouettes_agree() -> None:
 def test_pyrender_missing_is_named(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyrender", None)
     before = set(vars(np))
-    with pytest.raises(DisplayError, match=r"fba\[pyrender\].*PYOPENGL_PLATFORM=egl"):
+    with pytest.raises(DisplayError, match=r"pip install pyrender;.*PYOPENGL_PLATFORM=egl"):
         to_pyrender(None, talking, 0.0)
     assert set(vars(np)) == before
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import graphics
 import numpy as np
 import pytest
 from player_tracks import face_track
@@ -86,7 +87,7 @@ def test_motion_is_added_up_over_parameters() -> None:
     ("slid", "speed"), [(0.98, 1.0), (1.02, 1.0), (2.613, 2.61), (9.0, 4.0), (0.01, 0.1), (0.255, 0.25)]
 )
 def test_the_slider_of_speed_holds_on_to_its_steps(slid: float, speed: float) -> None:
-    pytest.importorskip("imgui_bundle")
+    graphics.imported("imgui_bundle")
     from player.ui.transport_buttons import snapped
 
     assert snapped(slid) == speed

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import graphics
 import numpy as np
 import pytest
 from open_windows import opened, settle, shown, until
@@ -16,7 +17,7 @@ from player.playing import play
 from player.scene import Scene
 from player.window import Window
 
-glfw = pytest.importorskip("glfw")
+glfw = graphics.imported("glfw")
 
 
 @pytest.fixture
@@ -155,17 +156,31 @@ def test_a_lost_context_ends_with_a_word(window: Window, monkeypatch: pytest.Mon
             window.update()
 
 
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        ("No module named 'imgui_bundle'", "pip install imgui-bundle"),
+        ("libX11.so.6: cannot open shared object file", "apt-get install libx11-6"),
+    ],
+    ids=["package", "library"],
+)
 def test_without_imgui_it_plays_and_says_so(
-    on_display: str, talking: Animation, monkeypatch: pytest.MonkeyPatch
+    on_display: str,
+    talking: Animation,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    failure: str,
+    said: str,
 ) -> None:
+    (tmp_path / "imgui_bundle.py").write_text(f"raise ImportError({failure!r})", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
     for name in [name for name in sys.modules if name.startswith(("imgui_bundle", "player.ui.gui"))]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "imgui_bundle", None)
     try:
-        with pytest.warns(FbaWarning, match="pip install imgui-bundle"):
+        with pytest.warns(FbaWarning, match=said):
             one = Window(Scene(talking), size=(320, 240))
     except DisplayError as error:
-        pytest.skip(f"no OpenGL on the virtual display: {error}")
+        graphics.skip(f"no window on the virtual display: {error}")
     with one:
         settle(one)
         assert (shown(one)[190:].min(axis=2) > 200).sum() > 20

@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import graphics
 import numpy as np
 import pytest
 from open_windows import opened, settle, shown, until
@@ -14,11 +15,11 @@ from open_windows import opened, settle, shown, until
 from fba.animation import Animation
 from player.window import Window
 
-glfw = pytest.importorskip("glfw")
-pytest.importorskip("imgui_bundle")
+glfw = graphics.imported("glfw")
+graphics.imported("imgui_bundle")
 
 if shutil.which("xdotool") is None:
-    pytest.skip("xdotool is not installed (Debian, Ubuntu: apt-get install xdotool)", allow_module_level=True)
+    graphics.skip("xdotool is not installed (Debian, Ubuntu: apt-get install xdotool)")
 
 
 class Hand:

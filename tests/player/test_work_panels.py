@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import graphics
 import numpy as np
 import pytest
 from set_clock import Clock
@@ -18,7 +19,7 @@ from player.transport import Transport
 from player.ui.session import Session
 from player.ui.source import Source
 
-imgui = pytest.importorskip("imgui_bundle").imgui
+imgui = graphics.imported("imgui_bundle").imgui
 
 from player.ui.picture import Studio  # noqa: E402 - needs imgui
 

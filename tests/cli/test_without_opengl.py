@@ -1,0 +1,94 @@
+"""Where nothing can be drawn: what does not draw works, and what draws says in one line what is missing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fba
+from fba import Animation
+
+# A Python without anything that draws, as none of it can be loaded without the system libraries.
+BARE = """
+import sys
+for name in ("moderngl", "glcontext", "glfw", "imgui_bundle", "OpenGL"):
+    sys.modules[name] = None
+from fba.cli.main import main
+main()
+"""
+
+
+def bare(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", BARE, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture
+def stream(tmp_path: Path, face: Animation) -> Path:
+    fba.write(tmp_path / "face.fba", face)
+    return tmp_path / "face.fba"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "line",
+    [
+        "info face.fba",
+        "stats face.fba",
+        "decode face.fba --fap face.fap",
+        "convert face.fba face.fap",
+        "model info --default",
+        "play --help",
+        "render --help",
+    ],
+)
+def test_what_does_not_draw_works(line: str, stream: Path) -> None:
+    done = bare(stream.parent, *line.split())
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout or line.startswith(("decode", "convert"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "line",
+    [
+        "play face.fba",
+        "play --model NONE",
+        "render face.fba -o face.png",
+        "render --contact-sheet faps -o a.png",
+    ],
+)
+def test_what_draws_says_what_is_missing(line: str, stream: Path) -> None:
+    head = fba.__path__[0] + "/face/builtin/head.glb"
+    done = bare(stream.parent, *line.replace("NONE", head).split())
+    assert done.returncode == 1
+    (said,) = done.stderr.splitlines()
+    assert said.startswith("fba: error: ")
+    assert "pip install glfw" in said or "pip install moderngl" in said
+    assert sorted(path.name for path in stream.parent.iterdir()) == ["face.fba"]
+
+
+def test_the_player_can_be_imported_and_its_figures_move(tmp_path: Path) -> None:
+    code = (
+        BARE.replace("from fba.cli.main import main\nmain()", "")
+        + """
+import fba, player
+from importlib.resources import files
+scene = player.Scene(fba.read(files("fba") / "samples" / "hello.fap"))
+print(len(scene.at(1.0).faces), player.play.__name__, player.render.__name__)
+try:
+    player.Offscreen(scene)
+except fba.DisplayError as error:
+    print("DisplayError")
+"""
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[-3:] == ["play", "render", "DisplayError"]
+    assert int(done.stdout.split()[0]) > 0
