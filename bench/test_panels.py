@@ -17,7 +17,7 @@ from player.scene import Scene
 from player.ui.session import Session
 from player.ui.source import Source
 
-pytest.importorskip("imgui_bundle")
+pytest.importorskip("imgui_bundle", exc_type=ImportError)
 
 from player.ui.picture import Studio
 

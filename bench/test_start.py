@@ -71,7 +71,7 @@ def test_first_picture(benchmark: Any, name: str, report: Callable[[str], None],
 def test_first_picture_in_a_window(
     benchmark: Any, name: str, report: Callable[[str], None], display: str
 ) -> None:
-    pytest.importorskip("imgui_bundle")
+    pytest.importorskip("imgui_bundle", exc_type=ImportError)
     command = ["-c", WINDOW, "play", str(files("fba") / "samples" / name)]
     took, spent = measured(benchmark, command, {"DISPLAY": display})
     report(f"window with {name}: {took:.2f} s, of the processors {spent:.2f} s")

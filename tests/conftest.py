@@ -10,7 +10,7 @@ import graphics
 import pytest
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def opengl() -> None:
     """OpenGL works without a display here."""
     reason = graphics.missing_opengl()

@@ -38,7 +38,7 @@ Float64 = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
-def reader(_egl: None) -> Iterator[Reader]:
+def reader(opengl: None) -> Iterator[Reader]:
     with reading() as found:
         yield found
 

@@ -44,7 +44,7 @@ def same(one: UInt8, other: UInt8) -> bool:
 
 
 @pytest.fixture(scope="module")
-def drawers(_egl: None) -> Iterator[dict[str, Drawer]]:
+def drawers(opengl: None) -> Iterator[dict[str, Drawer]]:
     """What draws the reference cases in each way."""
     with pytest.MonkeyPatch.context() as patch:
         found = {}

@@ -50,7 +50,7 @@ def test_sizes_must_agree() -> None:
 
 
 @pytest.fixture(scope="module")
-def draw(_egl: None) -> Iterator[Drawer]:
+def draw(opengl: None) -> Iterator[Drawer]:
     with Drawer() as drawer:
         yield drawer
 

@@ -18,7 +18,7 @@ MOST_BYTES = 1_000_000
 
 
 @pytest.fixture(scope="module")
-def draw(_egl: None) -> Iterator[Drawer]:
+def draw(opengl: None) -> Iterator[Drawer]:
     with Drawer() as drawer:
         yield drawer
 
