@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import os
+import re
 import secrets
 import stat
 from collections.abc import Iterator
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from fba.errors import FbaError, FormatError
 
 Path = str | os.PathLike[str]
+
+_OPEN_FILE = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,9})")
+_STANDARD = {"/dev/stdin": 0, "/dev/stdout": 1, "/dev/stderr": 2}
 
 _unfinished: set[str] = set()
 """Temporary files that may exist now, noted before they are made: Ctrl-C may come between any two steps."""
@@ -23,28 +28,16 @@ def atomic(path: Path) -> Iterator[BinaryIO]:
     """A binary file to write to; the target appears, or changes, only when the block ends well.
 
     Whatever leaves the block early (an exception, Ctrl-C) removes the temporary file and leaves an
-    old target as it was. An existing target keeps its permissions, a link is written through, and a
-    device or a pipe with a reader (`/dev/null`, `>(program)`) is written to directly. Raises
-    FormatError where the target cannot be written.
+    old target as it was. An existing target keeps its permissions, a link is written through. A device, a
+    pipe with a reader and an open file by its number (`/dev/null`, `>(program)`, `/dev/stdout`) are written
+    to directly. Raises FormatError where the target cannot be written.
     """
     name = os.fspath(path)
-    try:
-        target = os.path.realpath(name)
-        mode = os.stat(target).st_mode
-    except FileNotFoundError:
-        mode = None  # the folder may be missing too: creating the temporary file will tell
-    except (OSError, ValueError) as error:
-        raise FormatError(f"cannot be written: {_reason(error)}", path=name) from error
-    if mode is not None and stat.S_ISDIR(mode):
-        raise FormatError("is a folder; give the name of a file to write", path=name)
-    if mode is not None and not stat.S_ISREG(mode):
-        with _directly(name, target) as file:
+    target, mode, direct = check_target(name)
+    if direct:
+        with _directly(name) as file:
             yield file
         return
-    if mode is not None and not os.access(target, os.W_OK):
-        raise FormatError(
-            "is write-protected; make it writable (chmod u+w) or choose another name", path=name
-        )
     with temporary_beside(target, ".tmp", name) as (temporary, handle):
         try:
             with os.fdopen(handle, "wb") as file:
@@ -56,6 +49,70 @@ def atomic(path: Path) -> Iterator[BinaryIO]:
             raise  # some are also OSErrors, and say more than "could not be written"
         except OSError as error:
             raise FormatError(f"could not be written: {_reason(error)}", path=name) from error
+
+
+class Target(NamedTuple):
+    """Where a file is written.
+
+    path: its name with links followed. mode: st_mode, None where there is no file yet. direct: what must be
+    written to as it is, because no file can take its place: a device, a pipe, an open file.
+    """
+
+    path: str
+    mode: int | None
+    direct: bool
+
+
+def check_target(path: Path) -> Target:
+    """Where a file of that name is written.
+
+    Raises FormatError where it cannot be written: a folder, a file or a folder that is write-protected, no
+    such folder.
+    """
+    name = os.fspath(path)
+    number = _descriptor(name)
+    try:
+        if number is not None:
+            return Target(name, os.fstat(number).st_mode, True)
+        target = os.path.realpath(name)
+        mode = os.stat(name).st_mode
+    except FileNotFoundError:
+        mode = None
+    except (OSError, ValueError) as error:
+        raise FormatError(f"cannot be written: {_reason(error)}", path=name) from error
+    if mode is None:
+        _check_folder(os.path.dirname(target), name)
+    elif stat.S_ISDIR(mode):
+        raise FormatError("is a folder; give the name of a file to write", path=name)
+    elif stat.S_ISREG(mode):
+        if not os.access(target, os.W_OK):
+            raise FormatError(
+                "is write-protected; make it writable (chmod u+w) or choose another name", path=name
+            )
+        _check_folder(os.path.dirname(target), name)
+    return Target(target, mode, mode is not None and not stat.S_ISREG(mode))
+
+
+def _check_folder(folder: str, name: str) -> None:
+    """FormatError where no file can be made in a folder. name: of the file, as the user wrote it."""
+    try:
+        os.stat(os.path.join(folder, ""))
+    except FileNotFoundError as error:
+        raise FormatError(
+            f"cannot be written: {_reason(error)}; make the folder {folder} first", path=name
+        ) from error
+    except OSError as error:
+        raise FormatError(f"cannot be written: {_reason(error)}", path=name) from error
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise FormatError(
+            f"cannot be written: Permission denied: no files can be made in the folder {folder}", path=name
+        )
+
+
+def _descriptor(name: str) -> int | None:
+    """The number of an open file that has this name, as `/dev/stdout` is 1; else None."""
+    found = _OPEN_FILE.fullmatch(name)
+    return int(found[1]) if found else _STANDARD.get(name)
 
 
 @contextlib.contextmanager
@@ -92,18 +149,23 @@ def _remove_unfinished() -> None:
 
 
 @contextlib.contextmanager
-def _directly(name: str, target: str) -> Iterator[BinaryIO]:
-    """A device or a pipe, which must not be replaced by a file."""
+def _directly(name: str) -> Iterator[BinaryIO]:
+    """What must not be replaced by a file: a device, a pipe, an open file."""
+    number = _descriptor(name)
     try:
-        # without O_NONBLOCK, opening a pipe that nobody reads would wait for ever
-        handle = os.open(target, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
-        os.set_blocking(handle, True)
+        if number is not None:
+            handle = os.dup(number)
+        else:
+            # without O_NONBLOCK, opening a pipe that nobody reads would wait for ever
+            handle = os.open(name, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+            os.set_blocking(handle, True)
         with os.fdopen(handle, "wb") as file:
             yield file
     except FbaError:
         raise
     except OSError as error:
-        raise FormatError(f"could not be written: {_reason(error)}", path=name) from error
+        reason = "nobody reads from this pipe" if error.errno == errno.ENXIO else _reason(error)
+        raise FormatError(f"could not be written: {reason}", path=name) from error
 
 
 def _reason(error: Exception) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from fba.atomic import temporary_beside
+from fba.atomic import check_target, temporary_beside
 from fba.errors import FbaError, FormatError
 
 PathLike = str | os.PathLike[str]
@@ -20,22 +21,17 @@ def written(path: PathLike) -> Iterator[Path]:
     What `fba.atomic` does for those that write to an open file. Raises FormatError where the target cannot
     be written.
     """
-    target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise FormatError("is a folder; give the name of a file to write", path=path)
-    if target.exists() and not target.is_file():
+    name, mode, direct = check_target(path)
+    if direct:
         raise FormatError("is a device or a pipe; give the name of a file to write", path=path)
-    if target.exists() and not os.access(target, os.W_OK):
-        raise FormatError(
-            "is write-protected; make it writable (chmod u+w) or choose another name", path=path
-        )
-    with temporary_beside(str(target), target.suffix, path) as (name, handle):
+    target = Path(name)
+    with temporary_beside(str(target), target.suffix, path) as (temporary_name, handle):
         os.close(handle)
-        temporary = Path(name)
+        temporary = Path(temporary_name)
         yield temporary
         try:
-            if target.exists():
-                temporary.chmod(target.stat().st_mode & 0o7777)
+            if mode is not None:
+                temporary.chmod(stat.S_IMODE(mode))
             temporary.replace(target)
         except OSError as error:
             raise cannot(path, error) from error

@@ -9,6 +9,16 @@ from typing import Any
 import click
 
 from fba.cli import options, writer_options
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    OutputType,
+    no_clobber_option,
+    shown,
+    to_option,
+    writer_of,
+)
 
 
 @click.command(
@@ -16,15 +26,17 @@ from fba.cli import options, writer_options
     epilog=options.examples(
         "fba convert old.fap new.fap          # the canonical form",
         "fba convert walk.bvh walk.bap --fps 30",
-        "fba convert talk.fba talk.fap",
+        "fba convert talk.fba decoded.fap",
         "fba convert walk.bap walk.bvh --joints moving",
         "fba convert both.fba person.glb --bap-steps visage --model head.glb",
+        "fba convert walk.bvh - --to bap | less",
     ),
 )
 @click.argument("source", metavar="IN", type=options.EXISTING)
-@click.argument("target", metavar="OUT", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("target", metavar="OUT", type=OutputType())
 @options.fps_option("Resample to this frame rate; default: the input's own.")
-@click.option("--to", metavar="FORMAT", help="Format to write, where the suffix of OUT does not say it.")
+@to_option
+@no_clobber_option
 @writer_options.writer_options
 @options.bap_steps_option
 @options.salvage_option
@@ -33,20 +45,28 @@ def command(
     target: Path,
     fps: Fraction | None,
     to: str | None,
+    no_clobber: bool,
     bap_steps: str,
     salvage: bool,
     **given: Any,
 ) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
 
-    A stream is written with the encoder's defaults: `fba encode` has its options.
+    - is standard input or output. A stream is written with the encoder's defaults: `fba encode` has its
+    options.
     """
-    from fba.formats import write, writer_for
+    from fba.formats import write
 
-    writing = writer_for(target, to)  # refuses what cannot be written before anything is read
+    writing = writer_of(target, to)  # refuses what cannot be written before anything is read
+    outputs = Outputs(
+        [Output("OUT", target, writing.name in TEXT_FORMATS)],
+        [source, given["model"], given["body"]],
+        no_clobber=no_clobber,
+    )
     extra = writer_options.settings(target, writing, given)
     if writing.name == "fba":
         extra["bap_steps"] = bap_steps
     animation = options.read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage)
-    write(target, animation, format=writing.name, **extra)
-    click.echo(f"{target}: {len(animation)} frames, {writing.description}")
+    with outputs.file(target) as file:
+        write(file, animation, format=writing.name, **extra)
+    outputs.say(f"{shown(target)}: {len(animation)} frames, {writing.description}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,23 +10,35 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options, writer_options
+from fba.cli.outputs import (
+    STANDARD,
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    OutputType,
+    no_clobber_option,
+    shown,
+    to_option,
+    writer_of,
+)
 from fba.errors import BitstreamError
 
 if TYPE_CHECKING:
     from fba.codec import PlaneSettings
     from fba.formats.registry import Format
 
-_FOLDER_OR_FILE = click.Path(path_type=Path)
+_FOLDER_OR_FILE = OutputType(folders=True)
 
 
 @click.command(
     cls=options.Command,
     epilog=options.examples(
-        "fba decode talk.fba --fap talk.fap",
+        "fba decode talk.fba --fap decoded.fap",
         "fba decode both.fba --fap face.fap --bap body.bap --bap-steps visage",
-        "fba decode talk.fba --fap talk.fap --epf talk.epf    # encode --epf makes the same bytes again",
+        "fba decode talk.fba --fap decoded.fap --epf talk.epf    # encode --epf makes the same bytes again",
         "fba decode both.fba -o person.glb --bap-steps visage",
         "fba decode walk.fba -o walk.bvh --bap-steps visage --joints moving",
+        "fba decode talk.fba --fap - | less",
         "fba decode archive/*.fba --fap decoded/",
         "fba decode archive/*.fba -o decoded/ --to glb",
     ),
@@ -46,7 +58,8 @@ _FOLDER_OR_FILE = click.Path(path_type=Path)
     metavar="OUT.bvh|OUT.glb",
     help="A file for other programs, its suffix says which; likewise.",
 )
-@click.option("--to", metavar="FORMAT", help="Format of --output, where its suffix does not say it.")
+@to_option
+@no_clobber_option
 @writer_options.writer_options
 @options.bap_steps_option
 @options.salvage_option
@@ -58,69 +71,88 @@ def command(
     epf: Path | None,
     output: Path | None,
     to: str | None,
+    no_clobber: bool,
     bap_steps: str,
     salvage: bool,
     as_json: bool,
     **given: Any,
 ) -> None:
     """Decode FBA streams: to ASCII FAP and BAP files, to EPF files that say how they were coded, and to BVH
-    and glTF for other programs."""
+    and glTF for other programs.
+
+    One of the files can be -, standard output.
+    """
     targets = _targets({"--fap": fap, "--bap": bap, "--epf": epf}, output, to, given)
     several = len(inputs) > 1
     for target in targets:
-        if several and not target.place.is_dir():
+        if several and not target.folder:
             raise click.UsageError(
                 f"several inputs need a folder for {target.flag}, and {target.place} is none"
             )
+    outputs = Outputs(
+        [target.output(path) for target in targets for path in inputs],
+        [*inputs, given["model"], given["body"]],
+        no_clobber=no_clobber,
+    )
+    written_as = targets[-1].writing
+    settings: dict[str, Any] = {}
+    if output is not None and written_as is not None:
+        settings = writer_options.settings(output, written_as, given)
     reports = []
     with options.progress("decoding", len(inputs)) as step:
         for path in inputs:
-            reports.append(_decode(path, targets, bap_steps=bap_steps, salvage=salvage))
+            reports.append(_decode(path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage))
             step(1)
     if as_json:
-        options.print_json(reports if several else reports[0])
+        outputs.print_json(reports if several else reports[0])
         return
     for report in reports:
-        click.echo(f"{report['input']}: {report['frames']} frames to {', '.join(report['written'])}")
+        written = ", ".join(shown(Path(name)) for name in report["written"])
+        outputs.say(f"{report['input']}: {report['frames']} frames to {written}")
 
 
 @dataclass(frozen=True)
 class _Target:
-    """flag: as given. place: a file, or a folder. suffix: of files in a folder. writing: None for EPF.
-    settings: for its writer."""
+    """flag: as given. place: a file, or a folder. suffix: of files in a folder. writing: None for EPF."""
 
     flag: str
     place: Path
     suffix: str
     writing: Format | None
-    settings: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> bool:
+        """Whether each stream becomes a file in the place."""
+        return self.place != STANDARD and self.place.is_dir()
 
     def file(self, source: Path) -> Path:
         """Where the content of a stream goes."""
-        return self.place / f"{source.stem}{self.suffix}" if self.place.is_dir() else self.place
+        return self.place / f"{_name(source)}{self.suffix}" if self.folder else self.place
+
+    def output(self, source: Path) -> Output:
+        """The same, to be checked."""
+        text = self.writing is None or self.writing.name in TEXT_FORMATS
+        return Output(self.flag, self.file(source), text, source if self.folder else None)
 
 
 def _targets(
     by_flag: dict[str, Path | None], output: Path | None, to: str | None, given: dict[str, Any]
 ) -> list[_Target]:
     """All files to write; click.UsageError where there are none, or options that fit none."""
-    from fba.formats import writer_for
-
     targets = []
     for flag, place in by_flag.items():
         if place is not None:
             name = flag.removeprefix("--")
-            writing = None if name == "epf" else writer_for(place, name)
+            writing = None if name == "epf" else writer_of(place, name)
             targets.append(_Target(flag, place, f".{name}", writing))
     if output is not None:
-        if output.is_dir() and to is None:
+        if output != STANDARD and output.is_dir() and to is None:
             raise click.UsageError(f"{output} is a folder; say with --to what to write there, as in --to bvh")
-        writing = writer_for(output, to)
+        writing = writer_of(output, to)
         if writing.name == "fba":
             others = options.as_typed("fba convert and fba encode")
             raise click.UsageError(f"{output}: streams are decoded here; {others} write them")
-        settings = writer_options.settings(output, writing, given)
-        targets.append(_Target("--output", output, writing.suffixes[0], writing, settings))
+        targets.append(_Target("--output", output, writing.suffixes[0], writing))
     else:
         lonely = [writer_options.FLAGS.get(name, "--to") for name in given if given[name] is not None]
         if to is not None or lonely:
@@ -130,13 +162,27 @@ def _targets(
     return targets
 
 
-def _decode(path: Path, targets: list[_Target], *, bap_steps: str, salvage: bool) -> dict[str, Any]:
+def _name(source: Path) -> str:
+    """What the content of a stream is called."""
+    return "stdin" if source == STANDARD else source.stem
+
+
+def _decode(
+    path: Path,
+    targets: list[_Target],
+    outputs: Outputs,
+    settings: dict[str, Any],
+    *,
+    bap_steps: str,
+    salvage: bool,
+) -> dict[str, Any]:
+    """settings: for the writer of `--output`."""
     from fba.formats import write
     from fba.formats.epf import write_epf
 
     with options.input_file(path) as file:
         data = file.read_bytes()
-    animation, settings = _read(data, path.stem, any(t.writing is None for t in targets), bap_steps, salvage)
+    animation, planes = _read(data, _name(path), any(t.writing is None for t in targets), bap_steps, salvage)
     parts = {"face": "FAPs", "body": "BAPs"}
     for target in targets:
         held = parts if target.writing is None else target.writing.carries
@@ -146,12 +192,14 @@ def _decode(path: Path, targets: list[_Target], *, bap_steps: str, salvage: bool
     written = []
     for target in targets:
         place = target.file(path)
-        if target.writing is None:
-            write_epf(place, settings)
-        else:
-            # --fap and --bap name what they want of the stream; only --output may lose something unawares
-            wanted = animation if target.flag == "--output" else _only(animation, target.writing.carries)
-            write(place, wanted, format=target.writing.name, **target.settings)
+        with outputs.file(place) as file:
+            if target.writing is None:
+                write_epf(file, planes)
+            else:
+                # --fap and --bap name what they want of the stream; only --output may lose something unawares
+                free = target.flag == "--output"
+                wanted = animation if free else _only(animation, target.writing.carries)
+                write(file, wanted, format=target.writing.name, **(settings if free else {}))
         written.append(str(place))
     return {"input": str(path), "frames": len(animation), "rate": str(animation.rate), "written": written}
 

@@ -12,6 +12,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options
+from fba.cli.outputs import Output, Outputs, no_clobber_option
 from fba.errors import DisplayError
 
 BAP_STEPS = "visage"
@@ -27,8 +28,9 @@ COMPILING = "compiling for this machine, on the first run only: about a minute i
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for what is made; default: a new one among the temporary files.",
 )
+@no_clobber_option
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
-def command(out: Path | None, play: bool | None) -> None:
+def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     """Encode a sample performance, say how small it became, and play it.
 
     Without a display, make a video and a picture of it instead.
@@ -39,6 +41,9 @@ def command(out: Path | None, play: bool | None) -> None:
 
     folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
     folder.mkdir(parents=True, exist_ok=True)
+    stream, video, picture = (folder / f"hello{suffix}" for suffix in (".fba", ".mp4", ".png"))
+    made = [Output("--out", path) for path in (stream, video, picture)]
+    outputs = Outputs(made, no_clobber=no_clobber)
     compiling = Timer(PATIENCE, click.echo, [COMPILING], {"err": True})
     compiling.daemon = True
     compiling.start()
@@ -51,9 +56,8 @@ def command(out: Path | None, play: bool | None) -> None:
         f"sample: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and face at "
         f"{options.rate_text(face.rate)} frames/s, {captured} bytes of text (BVH and FAP)"
     )
-    stream = folder / "hello.fba"
     data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
-    options.write_bytes(stream, data)
+    outputs.write(stream, data)
     info = probe_stream(data, bap_steps=BAP_STEPS)
     click.echo(
         f"encoded: {stream}: {len(data)} bytes, {info.bits_per_second / 1000:.2f} kbit/s, "
@@ -65,7 +69,7 @@ def command(out: Path | None, play: bool | None) -> None:
     click.echo(f"to see it again: {again}")
     if play is not False and _played(player, decoded, asked=play is True):
         return
-    _render(player, decoded, folder)
+    _render(player, decoded, video, picture)
 
 
 def _played(player: object, animation: Animation, *, asked: bool) -> bool:
@@ -80,8 +84,7 @@ def _played(player: object, animation: Animation, *, asked: bool) -> bool:
     return True
 
 
-def _render(player: object, animation: Animation, folder: Path) -> None:
-    video, picture = folder / "hello.mp4", folder / "hello.png"
+def _render(player: object, animation: Animation, video: Path, picture: Path) -> None:
     with options.progress("rendering", None) as step:
         player.render(animation, video, size=(640, 360), progress=step.of)  # type: ignore[attr-defined]
     player.render(animation, picture, time=float(animation.times[0]) + 2.0)  # type: ignore[attr-defined]

@@ -12,6 +12,7 @@ import click
 
 from fba.animation import Animation
 from fba.cli import capture_report, options
+from fba.cli.outputs import Output, Outputs, OutputType, no_clobber_option, shown
 from fba.errors import FbaWarning, FormatError
 
 CAPTURE = ("spine", "ground", "plant", "origin")
@@ -24,14 +25,15 @@ CAPTURE = ("spine", "ground", "plant", "origin")
         "fba encode walk.bvh -o walk.fba --bap-steps visage",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
-        "fba encode talk.fap -o talk.fba --epf talk.epf",
+        "fba encode talk.fap -o again.fba --epf talk.epf",
         "fba encode walk.bvh -o walk.fba --bap-steps visage --report --limits report",
     ),
 )
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=options.EXISTING)
 @click.option(
-    "-o", "--output", metavar="OUT.fba", required=True, type=options.OUTPUT, help="- for standard output."
+    "-o", "--output", metavar="OUT.fba", required=True, type=OutputType(), help="- for standard output."
 )
+@no_clobber_option
 @options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
 @click.option("--name", help="Name of the sequence, for input without a header.")
 @click.option(
@@ -117,6 +119,7 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 def command(
     inputs: tuple[Path, ...],
     output: Path,
+    no_clobber: bool,
     fps: Fraction | None,
     name: str | None,
     epf: Path | None,
@@ -133,6 +136,7 @@ def command(
     """
     if epf is not None:
         _refuse_beside_epf()
+    outputs = Outputs([Output("--output", output)], [*inputs, epf], no_clobber=no_clobber)
     capture = {option: settings.pop(option) for option in CAPTURE}
     with options.progress("reading", len(inputs)) as step:
         animation = _joined(
@@ -150,12 +154,12 @@ def command(
         if captures and animation.body is not None:
             _warn_of_steps(settings)
     coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, settings["bap_steps"])
-    options.write_bytes(output, coded.data)
+    outputs.write(output, coded.data)
     if as_json:
-        options.print_json({"output": str(output), **_figures(coded, animation), **said})
+        outputs.print_json({"output": str(output), **_figures(coded, animation), **said})
         return
     for line in (_summary(output, coded, animation), *capture_report.lines(said)):
-        click.echo(line, err=str(output) == "-")
+        outputs.say(line)
 
 
 class _Coded(NamedTuple):
@@ -178,7 +182,8 @@ def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
     from fba.codec import encode_planes
     from fba.formats.epf import read_epf
 
-    planes = read_epf(epf)
+    with options.input_file(epf) as file:
+        planes = read_epf(file)
     data = encode_planes(animation, planes, bap_steps=bap_steps)
     return _Coded(data, len(planes), sum(plane.intra for plane in planes), 0)
 
@@ -223,7 +228,7 @@ def _figures(coded: _Coded, animation: Animation) -> dict[str, Any]:
 
 def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
     text = (
-        f"{output}: {coded.planes} frames, {options.seconds(animation.duration)} at "
+        f"{shown(output)}: {coded.planes} frames, {options.seconds(animation.duration)} at "
         f"{options.rate_text(animation.rate)} frames/s, {len(coded.data)} bytes, "
         f"{_bits_per_second(coded, animation) / 1000:.2f} kbit/s, "
         f"{coded.intra_planes} I plane{'s' if coded.intra_planes != 1 else ''}"

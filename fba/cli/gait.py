@@ -5,12 +5,26 @@ from __future__ import annotations
 import warnings
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fba.cli import options
+from fba.cli.outputs import (
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    OutputType,
+    no_clobber_option,
+    shown,
+    to_option,
+    writer_of,
+)
 from fba.errors import FbaWarning
+
+if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba.formats.registry import Format
 
 DEFAULT_RATE = Fraction(30)
 
@@ -39,9 +53,11 @@ DEFAULT_RATE = Fraction(30)
     "-o",
     "--output",
     metavar="OUT",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="File to write; its suffix says in which format.",
+    type=OutputType(),
+    help="File to write; its suffix says in which format. - for standard output.",
 )
+@to_option
+@no_clobber_option
 @options.bap_steps_option
 @click.option("--list", "listed", is_flag=True, help="Print the characters that there are.")
 @click.option(
@@ -59,6 +75,8 @@ def command(
     fps: Fraction | None,
     in_place: bool,
     output: Path | None,
+    to: str | None,
+    no_clobber: bool,
     bap_steps: str,
     listed: bool,
     find: Path | None,
@@ -71,6 +89,8 @@ def command(
     """
     if sum((output is not None, listed, find is not None)) != 1:
         raise click.UsageError("give one of -o OUT, --list and --find FILE")
+    if to is not None and output is None:
+        raise click.UsageError("--to goes with -o")
     if listed:
         _list(as_json)
     elif find is not None:
@@ -78,18 +98,22 @@ def command(
     elif output is not None:
         if as_json:
             raise click.UsageError("--json goes with --list and --find")
-        made = {"stride": stride, "cycles": cycles, "seconds": seconds, "in_place": in_place}
-        _write(output, character, fps or DEFAULT_RATE, bap_steps, made)
+        from fba.body import gait
+
+        made: dict[str, Any] = {"stride": stride, "cycles": cycles, "seconds": seconds, "in_place": in_place}
+        writing = writer_of(output, to)  # refuses what cannot be written before anything is made
+        out = Output("--output", output, writing.name in TEXT_FORMATS)
+        outputs = Outputs([out], no_clobber=no_clobber)
+        with options.usage_errors("walk: "):
+            animation = gait.walk(character=character, rate=fps or DEFAULT_RATE, **made)
+        _write(animation, writing, output, outputs, bap_steps)
+        outputs.say(_summary(animation, output, character, in_place=in_place))
 
 
-def _write(output: Path, character: str, rate: Fraction, bap_steps: str, made: dict[str, Any]) -> None:
-    from fba.body import gait
-    from fba.formats import write, writer_for
+def _write(animation: Animation, writing: Format, output: Path, outputs: Outputs, bap_steps: str) -> None:
+    from fba.formats import write
 
-    writing = writer_for(output)  # refuses what cannot be written before anything is made
-    with options.usage_errors("walk: "):
-        animation = gait.walk(character=character, rate=rate, **made)
-    extra = {}
+    extra: dict[str, Any] = {}
     if writing.name == "fba":
         extra = {"bap_steps": bap_steps, "clamp": True}
         if bap_steps == "iso":
@@ -99,13 +123,19 @@ def _write(output: Path, character: str, rate: Fraction, bap_steps: str, made: d
                 FbaWarning,
                 stacklevel=1,
             )
-    write(output, animation, format=writing.name, **extra)
+    with outputs.file(output) as file:
+        write(file, animation, format=writing.name, **extra)
+
+
+def _summary(animation: Animation, output: Path, character: str, *, in_place: bool) -> str:
+    from fba.body import gait
+
     way = gait.advance(animation) / 1000.0
-    line = f"{output}: {character}, {len(animation)} frames, {options.seconds(animation.duration)}"
-    if not made["in_place"] and len(animation) > 1:
+    line = f"{shown(output)}: {character}, {len(animation)} frames, {options.seconds(animation.duration)}"
+    if not in_place and len(animation) > 1:
         speed = way / float((len(animation) - 1) / animation.rate)
         line += f", {way:.2f} m at {speed:.2f} m/s"
-    click.echo(line)
+    return line
 
 
 def _list(as_json: bool) -> None:

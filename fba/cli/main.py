@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -36,8 +38,32 @@ _COMMANDS = {
 BAD_DATA, BAD_USAGE = 1, 2
 
 
+class _ReaderGoneError(Exception):
+    """Whoever read our output has seen enough. Not BrokenPipeError, for which click exits with 1."""
+
+
+@contextmanager
+def _reader_gone() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError as error:
+        raise _ReaderGoneError from error
+    except FbaError as error:
+        if isinstance(error.__cause__, BrokenPipeError):
+            raise _ReaderGoneError from error
+        raise
+
+
 class _Commands(Group):
     """Lists subcommands without importing them."""
+
+    def make_context(self, *arguments: Any, **extra: Any) -> click.Context:
+        with _reader_gone():
+            return super().make_context(*arguments, **extra)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with _reader_gone():
+            return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
@@ -66,6 +92,8 @@ def group() -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 bad data, 2 bad usage, 130 interrupted.
 
+    A reader of its output that goes away early, as `head` does, is not an error: 0, without a word.
+
     arguments: None for those of the process, which then is taken as doing nothing else.
     """
     program = NAME
@@ -87,8 +115,8 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(BAD_USAGE)
     except (KeyboardInterrupt, click.Abort):
         _say_interrupted()
-    except BrokenPipeError:
-        # Whoever read our output has seen enough. Python would complain once more while it shuts down.
+    except _ReaderGoneError:
+        # Python would complain once more while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except (FbaError, OSError, MemoryError) as error:
@@ -118,8 +146,8 @@ def _say_interrupted() -> NoReturn:
 def _one_line(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "not enough memory for this; work on parts of it (--start, --end)"
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, OSError) and error.strerror and not isinstance(error, FbaError):
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     return " ".join(str(error).split()) or type(error).__name__
 
 

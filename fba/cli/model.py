@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_option, shown
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
 
 SOURCE = click.Path(exists=True, path_type=Path)
-GLB = click.Path(dir_okay=False, path_type=Path)
+GLB = OutputType()
 KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
 POINT_FILES = "FDP, CSV or JSON file"
 
@@ -120,7 +121,8 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     ),
 )
 @click.argument("source", metavar="IN", type=SOURCE)
-@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB)
+@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
+@no_clobber_option
 @click.option(
     "--points",
     metavar="FILE",
@@ -143,6 +145,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
 def import_(
     source: Path,
     output: Path,
+    no_clobber: bool,
     points: Path | None,
     kind: str | None,
     unit: float | None,
@@ -158,10 +161,11 @@ def import_(
     """
     from fba.face.importers import import_model
 
+    outputs = _outputs(output, [source, points], no_clobber=no_clobber)
     model = import_model(
         source, kind=kind, points=points, unit=unit, up=up, kinds=_kinds(kinds) or None, name=name
     )
-    _write(model, output)
+    _write(model, output, outputs)
 
 
 @command.command(
@@ -172,7 +176,8 @@ def import_(
     ),
 )
 @click.argument("points", metavar="POINTS", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB)
+@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
+@no_clobber_option
 @click.option(
     "--model", "base", metavar="FILE", type=SOURCE, help="The face to fit. Default: the built-in head."
 )
@@ -190,7 +195,13 @@ def import_(
 )
 @click.option("--name", help="Name of the fitted model. Default: that of the file.")
 def fit(
-    points: Path, output: Path, base: Path | None, unit: str | None, tables: Any, name: str | None
+    points: Path,
+    output: Path,
+    no_clobber: bool,
+    base: Path | None,
+    unit: str | None,
+    tables: Any,
+    name: str | None,
 ) -> None:
     """Fit a face to a person of whom feature points are known, and write it as glTF.
 
@@ -199,9 +210,11 @@ def fit(
     """
     from fba.face.calibration import fit as fitted
 
+    outputs = _outputs(output, [points, base], no_clobber=no_clobber)
     model = _read(base)
     wanted = _points(points, model)
-    _write(fitted(model, wanted, unit=_unit(unit), tables=tables, name=name or points.stem), output)
+    face = fitted(model, wanted, unit=_unit(unit), tables=tables, name=name or points.stem)
+    _write(face, output, outputs)
 
 
 def _points(path: Path, model: FaceModel) -> npt.NDArray[np.float64]:
@@ -258,10 +271,20 @@ def _kinds(texts: tuple[str, ...]) -> Mapping[str, str]:
     return found
 
 
-def _write(model: FaceModel, output: Path) -> None:
+def _outputs(output: Path, inputs: list[Path | None], *, no_clobber: bool) -> Outputs:
+    """Raises click.UsageError also for a suffix that would hide that it is a .glb."""
+    outputs = Outputs([Output("--output", output)], inputs, no_clobber=no_clobber)
+    if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
+        name = output.with_suffix(".glb").name
+        raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
+    return outputs
+
+
+def _write(model: FaceModel, output: Path, outputs: Outputs) -> None:
     from fba.cli import model_text
 
-    model.save(output)
-    click.echo(f"{output}: {model_text.summary(model)}")
+    with outputs.file(output) as file:
+        model.save(file)
+    outputs.say(f"{shown(output)}: {model_text.summary(model)}")
     for line in model_text.lost(model):
-        click.echo(f"  {line}")
+        outputs.say(f"  {line}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -21,8 +22,23 @@ if TYPE_CHECKING:
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
-EXISTING = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
-OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
+NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
+
+
+class InputType(click.Path):
+    """An existing file, "-" for standard input."""
+
+    def __init__(self) -> None:
+        super().__init__(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if str(value) in NAMES_OF_STANDARD_INPUT:
+            return Path("-")
+        found = Path(os.fsdecode(super().convert(value, param, ctx)))
+        return found if str(found) != "-" else found.absolute()  # it was "./-", a file of that name
+
+
+EXISTING = InputType()
 
 
 class Command(click.Command):
@@ -271,18 +287,6 @@ def read_input(
     if fps is not None and animation.rate != fps:
         animation = animation.resample(fps)
     return animation
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a whole file, or standard output for "-"; an interrupted command leaves an old file whole."""
-    from fba.atomic import atomic
-
-    if str(path) == "-":
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
-        return
-    with atomic(path) as file:
-        file.write(data)
 
 
 @contextmanager

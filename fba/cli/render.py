@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from fba.cli import options, scene_options
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_option, shown
 from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
+    from player.sequence import Numbered
     from player.showable import Showable
 
+KINDS = ("png", "jpg", "mp4", "gif")
 SHEETS = ("faps", "visemes", "expressions", "all")
 
 
@@ -42,6 +48,7 @@ class SheetType(click.ParamType[str | int]):
         "fba render original.fap decoded.fba -o both.mp4",
         "fba render --fap open_jaw=800 --viseme 4 --expression joy=50 -o face.png",
         "fba render --contact-sheet expressions -o expressions.png",
+        "fba render talk.fba -o - --to gif > talk.gif",
     ),
 )
 @scene_options.files_argument
@@ -50,8 +57,13 @@ class SheetType(click.ParamType[str | int]):
     "--output",
     required=True,
     metavar="OUT.png|.jpg|.mp4|.gif|FOLDER/%05d.png",
-    help="A picture, a film, or numbered pictures (also: a folder with a slash at its end).",
+    help="A picture, a film, or numbered pictures (also: a folder with a slash at its end). - for standard "
+    "output.",
 )
+@click.option(
+    "--to", type=click.Choice(KINDS), help="What to write, where OUT is - or has no suffix that says it."
+)
+@no_clobber_option
 @click.option(
     "--fap",
     "faps",
@@ -97,6 +109,8 @@ class SheetType(click.ParamType[str | int]):
 def command(
     files: tuple[Path, ...],
     output: str,
+    to: str | None,
+    no_clobber: bool,
     faps: tuple[str, ...],
     visemes: tuple[str, ...],
     expressions: tuple[str, ...],
@@ -115,8 +129,6 @@ def command(
 
     Needs OpenGL through EGL, but no display.
     """
-    from player.sequence import is_film
-
     given = [name for name, value in (("--fap", faps), ("--viseme", visemes), ("--expression", expressions),
                                       ("--contact-sheet", isinstance(sheet, str))) if value]  # fmt: skip
     if files and given:
@@ -131,14 +143,22 @@ def command(
         if not files and value is not None:
             raise click.UsageError(f"{name} goes with a file; {given[0]} makes a single picture")
     check_files(files, how, sound, "picture")
-    film, mp4 = is_film(output), output.lower().endswith(".mp4")
+    target = _Target.of(output, to)
+    film, mp4 = target.film, target.suffix == ".mp4"
+    if no_clobber and replace:
+        raise click.UsageError("--no-clobber and --replace contradict each other")
     if not mp4 and (sound.audio is not None or sound.audio_offset):
         name = "--audio" if sound.audio is not None else "--audio-offset"
         raise click.UsageError(f"{name} goes into an .mp4 alone")
     if isinstance(sheet, str):
         if given != ["--contact-sheet"] or how.camera is not None or how.view != "figure" or how.shows:
             raise click.UsageError("--contact-sheet has poses and cameras of its own; leave the others out")
-        _kinds_sheet(sheet, Path(output), how.model, size)
+        if film:
+            raise click.UsageError(f"--contact-sheet {sheet} makes one picture, .png or .jpg")
+        outputs = target.outputs([how.model], no_clobber=no_clobber, replace=replace)
+        with target.file(outputs) as name:
+            made = _kinds_sheet(sheet, Path(name), how.model, size)
+        outputs.say(f"{shown(target.path)}: {made}")
         return
     if sheet is not None and (film or transparent or frame is not None or time is not None):
         raise click.UsageError(
@@ -150,35 +170,90 @@ def command(
     from fba.cli.still import still
     from player.recording import render
 
+    audio = showing.voice(files, sound, "the film has no sound") if mp4 else None
+    outputs = target.outputs([*files, how.model, how.body, audio], no_clobber=no_clobber, replace=replace)
     animations = [
         options.read_input(file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage)
         for file in files
     ] or [still(faps, visemes, expressions)]
     names = showing.names_of(files) or [""]
     scene = showing.scene([(animation, False) for animation in animations], names, how)
-    if sheet is not None:
-        _frames_sheet(scene, sheet, Path(output), tile=size, camera=how.camera, start=start, end=end)
-        return
-    audio = showing.voice(files, sound, "the film has no sound") if mp4 else None
-    with options.progress("rendering", None) as step, options.usage_errors():
-        written = render(
-            scene,
-            output,
-            size=size,
-            fps=how.fps if film else None,
-            camera=how.camera,
-            frame=frame,
-            time=time,
-            start=start,
-            end=end,
-            audio=audio,
-            audio_offset=sound.audio_offset,
-            transparent=transparent,
-            replace=replace,
-            progress=step.of,
-        )
     heard = f", with the sound of {audio}" if audio is not None else ""
-    click.echo(f"{written}: {_size(size, output)}{heard}")
+    with target.file(outputs) as name:
+        if sheet is not None:
+            made = _frames_sheet(scene, sheet, Path(name), tile=size, camera=how.camera, start=start, end=end)
+        else:
+            made = _size(size, name)
+            with options.progress("rendering", None) as step, options.usage_errors():
+                render(
+                    scene,
+                    name,
+                    size=size,
+                    fps=how.fps if film else None,
+                    camera=how.camera,
+                    frame=frame,
+                    time=time,
+                    start=start,
+                    end=end,
+                    audio=audio,
+                    audio_offset=sound.audio_offset,
+                    transparent=transparent,
+                    replace=replace,
+                    progress=step.of,
+                )
+    outputs.say(f"{shown(target.path)}: {made}{heard}")
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where a picture, a film or numbered pictures go.
+
+    given: on the command line. path: the file, or the folder of numbered pictures. suffix: in lower case, of
+    what is written; "" for numbered pictures, whose names say it themselves.
+    """
+
+    given: str
+    path: Path
+    suffix: str
+    pictures: Numbered | None = None
+
+    @staticmethod
+    def of(output: str, to: str | None) -> _Target:
+        """What `--output` and `--to` say together."""
+        from player.sequence import Numbered, is_sequence
+
+        if is_sequence(output):
+            if to is not None:
+                raise click.UsageError(f"--to {to} is for one file; {output} means numbered pictures")
+            pictures = Numbered(output)
+            return _Target(output, pictures.folder, "", pictures)
+        path = OutputType().convert(output, None, None)
+        if path == STANDARD and to is None:
+            raise click.UsageError(f"say with --to what to write to standard output: {', '.join(KINDS)}")
+        return _Target(output, path, f".{to}" if to is not None else path.suffix.lower())
+
+    @property
+    def film(self) -> bool:
+        """Whether it is many pictures."""
+        from player.sequence import is_film
+
+        return self.pictures is not None or is_film(f"film{self.suffix}")
+
+    def outputs(self, inputs: Iterable[Path | None], *, no_clobber: bool, replace: bool) -> Outputs:
+        """The files that are written; of numbered pictures, those that are replaced."""
+        if self.pictures is None:
+            return Outputs([Output("--output", self.path)], inputs, no_clobber=no_clobber)
+        numbers = self.pictures.there() if replace else []
+        return Outputs([Output("--output", self.pictures.path(number)) for number in numbers], inputs)
+
+    @contextmanager
+    def file(self, outputs: Outputs) -> Iterator[str]:
+        """The name to write to, for a `with` statement."""
+        if self.pictures is not None:
+            yield self.given
+            return
+        with outputs.file(self.path, self.suffix) as file:
+            yield str(file)
 
 
 def _size(size: tuple[int, int] | None, output: str) -> str:
@@ -188,21 +263,25 @@ def _size(size: tuple[int, int] | None, output: str) -> str:
     return f"{width}x{height}"
 
 
-def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> None:
+def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> str:
+    """Draw and write it; its size."""
     from player.contact_sheet import contact_sheet
-    from player.picture_files import write_picture
+    from player.picture_files import check_picture, write_picture
 
+    check_picture(output, transparent=False)
     with options.usage_errors():
         pixels = contact_sheet(what, options.read_model(model), tile=size)
     write_picture(output, pixels)
-    click.echo(f"{output}: {pixels.shape[1]}x{pixels.shape[0]}")
+    return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
-def _frames_sheet(scene: Showable, count: int, output: Path, **how: Any) -> None:
+def _frames_sheet(scene: Showable, count: int, output: Path, **how: Any) -> str:
+    """Likewise."""
     from player.film_sheet import film_sheet
-    from player.picture_files import write_picture
+    from player.picture_files import check_picture, write_picture
 
+    check_picture(output, transparent=False)
     with options.progress("rendering", None) as step, options.usage_errors():
         pixels = film_sheet(scene, count, progress=step.of, **how)
     write_picture(output, pixels)
-    click.echo(f"{output}: {pixels.shape[1]}x{pixels.shape[0]}")
+    return f"{pixels.shape[1]}x{pixels.shape[0]}"

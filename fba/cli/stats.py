@@ -62,7 +62,10 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
             f"{row['predicted_bits_95']:.0f}",
             f"{100 * row['intra_share']:.0f} %",
         )
-    Console(width=None if Console().is_terminal else 160).print(table)
+    console = Console(width=None if Console().is_terminal else 160)
+    with console.capture() as text:  # rich, as it prints, would exit with 1 where a pipe is closed
+        console.print(table)
+    click.echo(text.get(), nl=False)
 
 
 def statistics(info: StreamInfo) -> dict[str, Any]:

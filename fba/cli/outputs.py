@@ -1,0 +1,355 @@
+"""Where commands write: files that are checked before the work begins, or standard output.
+
+Every command that writes files says which by an `Outputs`. It refuses to overwrite what the command reads,
+sends what goes to "-" to standard output, and keeps everything else off it.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import stat
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+
+import click
+
+from fba.errors import FbaError, FormatError
+
+if TYPE_CHECKING:
+    from fba.formats.registry import Format
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+STANDARD = Path("-")
+"""Standard output, or standard input."""
+NAMES_OF_STANDARD_OUTPUT = ("-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
+TEXT_FORMATS = ("fap", "bap", "epf", "bvh")
+"""Formats that a terminal can show."""
+REFERRING = (".gltf", ".obj", ".mtl", ".fdp", ".xml")
+"""Suffixes of text files that name other files, which are read with them."""
+MOST_TEXT = 1 << 26
+"""Bytes of such a file that are searched for names."""
+CHUNK = 1 << 20
+
+
+class OutputType(click.ParamType[Path]):
+    """A file to write, "-" for standard output. folders: an existing folder will do as well."""
+
+    name = "file"
+
+    def __init__(self, *, folders: bool = False) -> None:
+        self._folders = folders
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        text = os.fspath(value)
+        if not text:
+            self.fail("the name of a file is missing", param, ctx)
+        if text in NAMES_OF_STANDARD_OUTPUT:
+            return STANDARD
+        if os.path.isdir(text):
+            if not self._folders:
+                self.fail(f"{text} is a folder; give the name of a file to write", param, ctx)
+        elif text.endswith(("/", os.sep)):
+            self.fail(f"there is no folder {text}; make it first, or leave the slash out", param, ctx)
+        # Path("./-") would be "-"
+        return Path(text) if Path(text) != STANDARD else Path(os.path.abspath(text))
+
+
+def no_clobber_option(command: Command) -> Command:
+    return click.option(
+        "--no-clobber", is_flag=True, help="Stop with an error where a file to write exists already."
+    )(command)
+
+
+@dataclass(frozen=True)
+class Output:
+    """A file to write.
+
+    option: how the command line says so, for messages. path: its name, `STANDARD` for standard output.
+    text: whether a terminal can show it. source: the input that it is made from, where there are several.
+    """
+
+    option: str
+    path: Path
+    text: bool = False
+    source: Path | None = None
+
+    def __str__(self) -> str:
+        return f"{self.option} {self.path}"
+
+    @property
+    def standard(self) -> bool:
+        return self.path == STANDARD
+
+
+class Outputs:
+    """The files that a command writes.
+
+    inputs: the files that it reads, `STANDARD` for standard input; None is passed over. no_clobber: existing
+    files are not overwritten.
+
+    Raises click.UsageError where an output is an input, also by another name or through a link, or a file
+    that an input refers to; where two outputs are one file; where binary data would go to a terminal.
+    Raises FormatError where a file cannot be written, or exists and no_clobber says that it stays.
+    """
+
+    def __init__(
+        self, outputs: Iterable[Output], inputs: Iterable[Path | None] = (), *, no_clobber: bool = False
+    ) -> None:
+        found = list(outputs)
+        read = [path for path in inputs if path is not None]
+        self.standard = any(output.standard for output in found)
+        if read.count(STANDARD) > 1:
+            raise click.UsageError("standard input (-) can be read only once")
+        for output in found:
+            _check_inputs(output, read)
+        _check_each_other(found)
+        for output in found:
+            if output.standard:
+                _check_terminal(output)
+            else:
+                _check_place(output.path, no_clobber=no_clobber)
+
+    def say(self, line: str) -> None:
+        """Print a line of a report: on standard output, unless data goes there."""
+        click.echo(line, err=self.standard)
+
+    def print_json(self, value: object) -> None:
+        """Print a report for programs, likewise."""
+        self.say(json.dumps(value, indent=2))
+
+    def write(self, path: Path, data: bytes) -> None:
+        """Write a whole file, for an output."""
+        from fba.atomic import atomic
+
+        with self.file(path) as name, atomic(name) as file:
+            file.write(data)
+
+    @contextmanager
+    def file(self, path: Path, suffix: str = "") -> Iterator[Path]:
+        """The name of a file to write for an output, for a `with` statement.
+
+        It is the output itself where that is a file. For standard output, a device or a pipe, and for a name
+        without the suffix that the writer wants, it is a temporary file, which is copied there at the end.
+        """
+        if not _is_direct(path) and suffix in ("", path.suffix.lower()):
+            yield path
+            return
+        with tempfile.TemporaryDirectory(prefix="fba-") as folder:
+            temporary = Path(folder) / f"animation{suffix}"
+            with _messages_about(path, temporary):
+                yield temporary
+            with temporary.open("rb") as file, _opened(path) as target:
+                while chunk := file.read(CHUNK):
+                    target.write(chunk)
+
+
+def to_option(command: Command) -> Command:
+    return click.option(
+        "--to", metavar="FORMAT", help="Format to write, where OUT is - or has no suffix that says it."
+    )(command)
+
+
+def writer_of(path: Path, to: str | None) -> Format:
+    """The format to write; to: that of `--to`.
+
+    Raises click.UsageError for standard output without `to`, and what `fba.formats.writer_for` raises.
+    """
+    from fba.formats import writer_for
+
+    if path == STANDARD and to is None:
+        raise click.UsageError("say with --to in which format to write to standard output, as in --to fap")
+    return writer_for(path, to)
+
+
+def shown(path: Path) -> str:
+    """What a report calls an output."""
+    return "standard output" if path == STANDARD else str(path)
+
+
+def _check_inputs(output: Output, inputs: list[Path]) -> None:
+    for path in inputs:
+        if _same(output.path, path, 0):
+            name = "standard input" if path == STANDARD else f"the input {path}"
+            both = "" if path == output.path else ", the same file by another name"
+            raise click.UsageError(f"{output} would overwrite {name}{both}; choose another name")
+    if output.standard or not output.path.is_file():
+        return
+    for path in inputs:
+        if path != STANDARD and path.is_dir() and _within(output.path, path):
+            raise click.UsageError(
+                f"{output} would overwrite a file of the folder {path}, which is read; choose another name"
+            )
+        if path != STANDARD and _refers(path, output.path):
+            raise click.UsageError(
+                f"{output} would overwrite a file that belongs to the input {path}, which names it; "
+                "choose another name"
+            )
+
+
+def _check_each_other(outputs: list[Output]) -> None:
+    for number, output in enumerate(outputs):
+        for other in outputs[:number]:
+            if output.standard and other.standard:
+                raise click.UsageError(
+                    f"{other.option} and {output.option} both go to standard output, which takes one of them"
+                )
+            if not _same(output.path, other.path, 1):
+                continue
+            if output.source is not None and output.option == other.option:
+                raise click.UsageError(
+                    f"{other.source} and {output.source} would both become {output.path}; "
+                    "write them to two folders, one after the other"
+                )
+            raise click.UsageError(f"{other} and {output} are the same file; give each a name of its own")
+
+
+def _check_terminal(output: Output) -> None:
+    if sys.stdout is None:
+        raise FormatError("standard output is closed; give the name of a file")
+    if not output.text and sys.stdout.isatty():
+        raise click.UsageError(
+            f"{output}: a terminal cannot show this format; give {output.option} FILE, or send it "
+            "to another program (|)"
+        )
+
+
+def _check_place(path: Path, *, no_clobber: bool) -> None:
+    from fba.atomic import check_target
+
+    target = check_target(path)
+    if no_clobber and target.mode is not None and not target.direct:
+        raise FormatError(
+            "exists already; choose another name, or leave --no-clobber out to overwrite it", path=path
+        )
+
+
+def _state(path: Path, number: int) -> os.stat_result | None:
+    """What the system knows of a file; number: of the open file that "-" stands for."""
+    try:
+        return os.fstat(number) if path == STANDARD else os.stat(path)
+    except (OSError, ValueError):
+        return None
+
+
+def _same(output: Path, other: Path, standard: int) -> bool:
+    """Whether writing one would change the other: one file under two names, or one name twice.
+
+    standard: 0 where the other is read, 1 where it is written, too.
+    """
+    first, second = _state(output, 1), _state(other, standard)
+    if first is not None and second is not None:
+        # devices such as /dev/null, terminals and the two ends of a socket may be both
+        named = STANDARD not in (output, other)
+        return os.path.samestat(first, second) and (
+            stat.S_ISREG(first.st_mode) or (named and stat.S_ISFIFO(first.st_mode))
+        )
+    if first is not None or second is not None or STANDARD in (output, other):
+        return False
+    names = [os.path.normcase(os.path.realpath(path)) for path in (output, other)]
+    if names[0] == names[1]:
+        return True
+    return names[0].casefold() == names[1].casefold() and _ignores_case(os.path.dirname(names[0]))
+
+
+def _ignores_case(folder: str) -> bool:
+    """Whether names that differ in their case mean one file there, as the folder's own name shows."""
+    while os.path.basename(folder):
+        parent, name = os.path.split(folder)
+        if name.swapcase() != name:
+            try:
+                return os.path.samefile(folder, os.path.join(parent, name.swapcase()))
+            except OSError:
+                return False
+        folder = parent
+    return False
+
+
+def _within(path: Path, folder: Path) -> bool:
+    return Path(os.path.realpath(folder)) in Path(os.path.realpath(path)).parents
+
+
+def _refers(source: Path, output: Path) -> bool:
+    """Whether a text file, or a file that it names, has the name of an existing output in its folder."""
+    folder = Path(os.path.realpath(source)).parent
+    if source.suffix.lower() not in REFERRING or not _within(output, folder):
+        return False
+    text = _text(source)
+    if _named(output.name, text):
+        return True
+    materials = (path for path in folder.glob("*.[mM][tT][lL]") if _named(path.name, text))
+    return any(_named(output.name, _text(path)) for path in materials)
+
+
+def _named(name: str, text: bytes) -> bool:
+    from urllib.parse import quote
+
+    return os.fsencode(name) in text or quote(name).encode() in text
+
+
+def _text(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(MOST_TEXT)
+    except OSError:
+        return b""  # its reader says why
+
+
+def _is_direct(path: Path) -> bool:
+    """Whether data must go to what is there already, which no new file can replace."""
+    from fba.atomic import check_target
+
+    return path == STANDARD or check_target(path).direct
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    from fba.atomic import atomic
+
+    if path == STANDARD:
+        yield sys.stdout.buffer
+        sys.stdout.buffer.flush()
+    elif (pipe := _named_pipe(path)) is not None:
+        with pipe:
+            yield pipe
+    else:
+        with atomic(path) as file:
+            yield file
+
+
+def _named_pipe(path: Path) -> BinaryIO | None:
+    """A named pipe, opened as soon as it has a reader; None for everything else."""
+    if not path.is_fifo() or str(path).startswith(("/dev/fd/", "/proc/")):
+        return None
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno != errno.ENXIO:
+            raise
+        click.echo(f"fba: waiting for a reader to open {path}", err=True)
+        return path.open("wb")
+    os.set_blocking(handle, True)
+    return os.fdopen(handle, "wb")
+
+
+@contextmanager
+def _messages_about(path: Path, temporary: Path) -> Iterator[None]:
+    """Errors and warnings about a temporary file name what the user knows."""
+    with warnings.catch_warnings(record=True) as caught:
+        try:
+            yield
+        except FbaError as error:
+            error.args = (str(error).replace(str(temporary), shown(path)),)
+            raise
+        finally:
+            found = [(str(one.message).replace(str(temporary), shown(path)), one.category) for one in caught]
+    for text, category in found:
+        warnings.warn(text, category, stacklevel=3)
