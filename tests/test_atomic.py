@@ -13,6 +13,7 @@ import pytest
 
 from fba.atomic import atomic
 from fba.errors import DisplayError, FormatError
+from player.whole import written
 
 
 def put(path: Path | str, data: bytes = b"new") -> None:
@@ -97,7 +98,7 @@ def test_links_are_written_through(tmp_path: Path) -> None:
 def test_places_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="is a folder"):
         put(tmp_path)
-    with pytest.raises(FormatError, match="No such file or directory"):
+    with pytest.raises(FormatError, match=r"No such file or directory; make the folder .*missing first"):
         put(tmp_path / "missing" / "a")
     with pytest.raises(FormatError, match="cannot be written"):
         put(f"{tmp_path}/a\0b")
@@ -144,3 +145,18 @@ def test_devices_and_pipes_are_written_to_not_replaced(tmp_path: Path) -> None:
     thread.join(10)
     assert received == [b"x" * 200_000]
     assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of open files, as Unix has them")
+def test_an_open_file_is_written_to_where_it_stands(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(b"one ")
+    with path.open("ab") as file:
+        put(f"/dev/fd/{file.fileno()}", b"two ")
+        put(f"/dev/fd/{file.fileno()}", b"three")
+        with pytest.raises(FormatError, match="is a device or a pipe"), written(f"/dev/fd/{file.fileno()}"):
+            pass
+    assert path.read_bytes() == b"one two three"
+    assert os.listdir(tmp_path) == ["a"]
+    with pytest.raises(FormatError, match="Bad file descriptor"):
+        put("/dev/fd/987654")

@@ -205,6 +205,8 @@ def _check_each_other(outputs: list[Output]) -> None:
             if not _same(output.path, other.path, 1):
                 continue
             if output.source is not None and output.option == other.option:
+                if output.source == other.source:
+                    raise click.UsageError(f"{output.source} is given twice")
                 raise click.UsageError(
                     f"{other.source} and {output.source} would both become {output.path}; "
                     "write them to two folders, one after the other"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
-import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +12,6 @@ import pytest
 
 from fba import Animation, BodyTrack, FaceTrack
 from fba.cli.main import main
-from fba.errors import DisplayError
 
 
 class Run(NamedTuple):
@@ -33,19 +30,6 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Run]:
         return Run(int(stop.value.code or 0), output.out, output.err)
 
     return call
-
-
-@pytest.fixture
-def opengl() -> None:
-    """OpenGL works without a display here."""
-    from player.context import offscreen_context
-
-    try:
-        offscreen_context().release()
-    except DisplayError as error:
-        if os.environ.get("CI") and ctypes.util.find_library("EGL"):
-            raise
-        pytest.skip(f"no OpenGL without a display: {error}")
 
 
 @pytest.fixture
