@@ -86,6 +86,9 @@ def test_deform(benchmark: Any, deformer: Deformer, report: Callable[[str], None
     resting = np.where(np.arange(68) == 30, 100.0, 0.0)
     one = timed(lambda: deformer(resting, out, normals))
     points = timed(lambda: deformer.feature_points(faps))
+    benchmark.extra_info.update(
+        milliseconds=whole * 1e3, bare_milliseconds=bare * 1e3, ratio=whole / copy, vertices=len(out)
+    )
     report(
         f"deform {model.name}, {len(out)} vertices, {len(model.triangles)} triangles, 66 FAPs: "
         f"{whole * 1e3:.2f} ms a frame with normals (goal 0.5), {bare * 1e3:.2f} without; "

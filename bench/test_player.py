@@ -73,6 +73,7 @@ def test_pictures(benchmark: Any, shown: tuple[str, Any], report: Callable[[str]
     wall, all_, main = (median(row) * 1e3 for row in (walls, everywhere, here))
     # What two free processors would take: the main thread's work, then the rest on both.
     free = main + (all_ - main) / 2
+    benchmark.extra_info.update(pictures=1e3 / wall, processor=all_)
     report(
         f"{name}: {1e3 / wall:.0f} pictures/s ({wall:.1f} ms); processors {all_:.1f} ms, of these the main "
         f"thread {main:.1f} ms; two free ones would make {1e3 / free:.0f}/s"

@@ -1,6 +1,8 @@
-"""How soon there is something to see: a picture in a file, or a window with its first picture and all panels.
+"""How soon there is something to see: a picture in a file, or a window with its first picture and all panels;
+and how long importing fba and `fba --help` take.
 
-Programs of their own, with what is kept on disk already there.
+Each is a process of its own. Warm: compiled code and what is kept of models are on disk already. Cold: both
+folders are empty, as on the first run; Python's own compiled modules are there.
 """
 
 from __future__ import annotations
@@ -68,6 +70,39 @@ def test_first_picture(benchmark: Any, name: str, report: Callable[[str], None],
 
 
 @pytest.mark.parametrize("name", SAMPLES)
+def test_first_picture_ever(benchmark: Any, name: str, report: Callable[[str], None], tmp_path: Path) -> None:
+    """Cold, once: nothing compiled, nothing kept of any model."""
+    pytest.importorskip("PIL")
+    command = ["-m", "fba", "render", str(files("fba") / "samples" / name), "-o", str(tmp_path / "one.png")]
+    empty = {"NUMBA_CACHE_DIR": str(tmp_path / "compiled"), "FBA_CACHE": str(tmp_path / "kept")}
+    took, spent = measured(benchmark, command, empty, warm=0, rounds=1)
+    assert any((tmp_path / "kept").rglob("*.npz"))  # it did start with empty folders
+    report(
+        f"first picture of {name}, nothing compiled or kept: {took:.1f} s, of the processors {spent:.1f} s"
+    )
+
+
+def test_import(benchmark: Any, report: Callable[[str], None]) -> None:
+    """The import alone, without the start of Python."""
+    code = "import time; start = time.perf_counter(); import fba; print(time.perf_counter() - start)"
+    times: list[float] = []
+
+    def one() -> None:
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+        times.append(float(run.stdout))
+
+    benchmark.pedantic(one, rounds=11, warmup_rounds=WARM)
+    took = median(times[WARM:])
+    benchmark.extra_info.update(milliseconds=took * 1e3)
+    report(f"import fba: {took * 1e3:.1f} ms")
+
+
+def test_help(benchmark: Any, report: Callable[[str], None]) -> None:
+    took, spent = measured(benchmark, ["-m", "fba", "--help"], {}, rounds=11)
+    report(f"fba --help: {took:.2f} s, of the processors {spent:.2f} s")
+
+
+@pytest.mark.parametrize("name", SAMPLES)
 def test_first_picture_in_a_window(
     benchmark: Any, name: str, report: Callable[[str], None], display: str
 ) -> None:
@@ -78,13 +113,15 @@ def test_first_picture_in_a_window(
     assert spent < 30
 
 
-def measured(benchmark: Any, arguments: list[str], more: dict[str, str]) -> tuple[float, float]:
+def measured(
+    benchmark: Any, arguments: list[str], more: dict[str, str], *, warm: int = WARM, rounds: int = 5
+) -> tuple[float, float]:
     """Seconds until Python has ended, and seconds of all processors: medians. Skips where it fails."""
     environment = {**os.environ, **more}
     for name in ("PYTHONDONTWRITEBYTECODE", "WAYLAND_DISPLAY"):
         environment.pop(name, None)
     command = [sys.executable, *arguments]
-    for _ in range(WARM):
+    for _ in range(warm):
         if subprocess.run(command, capture_output=True, check=False, env=environment).returncode:
             pytest.skip("no picture can be made here")
     spent = []
@@ -95,5 +132,7 @@ def measured(benchmark: Any, arguments: list[str], more: dict[str, str]) -> tupl
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
-    benchmark.pedantic(one, rounds=5)
-    return median(benchmark.stats.stats.data), median(spent)
+    benchmark.pedantic(one, rounds=rounds)
+    took = median(benchmark.stats.stats.data)
+    benchmark.extra_info.update(seconds=took, processors=median(spent))
+    return took, median(spent)

@@ -2,7 +2,8 @@
 
     python examples/encode_a_capture.py [CAPTURE.bvh [STREAM.fba]]
 
-Without arguments: the sample that comes with fba, into a folder for temporary files.
+Without arguments: the sample that comes with fba (BVH made by a script, not captured), into a folder for
+temporary files.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""`fba demo`: the main job, from motion capture to a picture, on the samples that come with fba."""
+"""`fba demo`: the main job, from BVH and FAP files to a picture, on the samples that come with fba.
+
+A script made the samples (examples/make_samples.py); nobody was captured for them.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +34,10 @@ COMPILING = "compiling for this machine, on the first run only: about a minute i
 @no_clobber_option
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
 def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
-    """Encode a sample performance, say how small it became, and play it.
+    """Encode the sample animation, say how small it became, and play it.
 
-    Without a display, make a video and a picture of it instead.
+    A script made the sample; it is not motion capture. Without a display, make a video and a picture of it
+    instead.
     """
     import player
     from fba.codec import EncoderOptions, encode, probe_stream
@@ -49,19 +53,19 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     compiling.start()
     with as_file(files("fba") / "samples") as samples:
         body, face = read(samples / "hello.bvh"), read(samples / "hello.fap")
-        captured = sum((samples / name).stat().st_size for name in ("hello.bvh", "hello.fap"))
+        source_bytes = sum((samples / name).stat().st_size for name in ("hello.bvh", "hello.fap"))
     animation = merge(face, body.resample(face.rate))
     compiling.cancel()
     click.echo(
         f"sample: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and face at "
-        f"{options.rate_text(face.rate)} frames/s, {captured} bytes of text (BVH and FAP)"
+        f"{options.rate_text(face.rate)} frames/s, {source_bytes} bytes of text (BVH and FAP)"
     )
     data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
     outputs.write(stream, data)
     info = probe_stream(data, bap_steps=BAP_STEPS)
     click.echo(
         f"encoded: {stream}: {len(data)} bytes, {info.bits_per_second / 1000:.2f} kbit/s, "
-        f"{captured / len(data):.0f} times smaller"
+        f"{source_bytes / len(data):.0f} times smaller"
     )
     decoded = read(stream, bap_steps=BAP_STEPS)
     click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")

@@ -32,7 +32,7 @@ _COMMANDS = {
     "bench": "Measure the speed of this codec on a stream.",
     "gait": "Make someone walk: stride, character; or find the steps in a walk.",
     "model": "Look at face models, check, import, fit them to a person.",
-    "demo": "Encode sample motion capture, print what came out, and play it.",
+    "demo": "Encode the sample animation, print its size, and play it.",
 }
 
 BAD_DATA, BAD_USAGE = 1, 2

@@ -1,0 +1,122 @@
+"""The README's table of results, the table that `./dev bench --summary` prints, and the benchmarks agree."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("pytest_benchmark")
+
+from click.testing import CliRunner
+
+from bench import summary
+from bench.summary import HEADER, ROWS, Row
+from fba.cli.main import group
+
+ROOT = Path(__file__).parents[1]
+
+
+def readme_table() -> list[list[str]]:
+    """The cells of the README's table of results, its header first."""
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    begin = lines.index(f"| {' | '.join(HEADER)} |")
+    length = next(number for number, line in enumerate(lines[begin:]) if not line.startswith("|"))
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[begin : begin + length]]
+
+
+def pattern(figure: str) -> str:
+    """A regular expression for what a format string gives, any numbers in it."""
+    parts = re.split(r"\{[^}]*\}", figure)
+    return r"\d[\d,]*(\.\d+)?".join(re.escape(part) for part in parts)
+
+
+def test_the_readme_shows_every_row_as_it_is_printed() -> None:
+    shown = readme_table()[2:]
+    assert [(cells[0], cells[1], cells[3]) for cells in shown] == [
+        (row.result, row.conditions, row.source) for row in ROWS
+    ]
+    for cells, row in zip(shown, ROWS, strict=True):
+        assert re.fullmatch(f"{pattern(row.figure)}|not measured: .+", cells[2]), f"{row.result}: {cells[2]}"
+
+
+def test_every_row_names_a_benchmark_that_exists() -> None:
+    command = [sys.executable, "-m", "pytest", "bench", "--collect-only", "-q", "-o", "addopts="]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    collected = {line.removeprefix("bench/") for line in done.stdout.splitlines() if "::" in line}
+    assert collected, done.stdout + done.stderr
+    # A module that needs a package which is missing here is not collected; its function is looked up.
+    for name in (row.benchmark for row in ROWS):
+        file, _, test = name.partition("::")
+        if any(other.startswith(f"{file}::") for other in collected):
+            assert name in collected
+        else:
+            assert f"def {test.partition('[')[0]}(" in (ROOT / "bench" / file).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", sorted({row.command for row in ROWS if row.command}))
+def test_every_command_named_exists(command: str) -> None:
+    program, *words = command.split()
+    assert program == "fba"
+    options = [word for word in words if word.startswith("-")]
+    names = [word for word in words if word.isalpha() and word.islower()]
+    told = CliRunner().invoke(group, [*[name for name in names if name != "faps"], "--help"])
+    assert told.exit_code == 0, told.output
+    for option in options:
+        assert option in told.output
+
+
+def test_a_row_without_a_figure_says_why() -> None:
+    row = Row("speed", "warm", "{rate:,.0f} a second", "test_a.py::test_b[c]", "fba bench FILE")
+    assert summary.figure(row, {row.benchmark: {"rate": 12345.6}}, {}) == "12,346 a second"
+    assert summary.figure(row, {}, {row.benchmark: "no display"}) == "not measured: no display"
+    assert summary.figure(row, {}, {}) == "not measured: the benchmark did not run"
+    assert row.line("1 a second") == (
+        "| speed | warm | 1 a second | `fba bench FILE`, [`test_b[c]`](bench/test_a.py) |"
+    )
+
+
+def test_the_summary_is_measured_and_printed(
+    tmp_path: Path,
+) -> None:
+    """On benchmarks of its own: one that measures, one that is skipped, one that fails."""
+    (tmp_path / "bench").mkdir()
+    (tmp_path / "bench" / "test_small.py").write_text(
+        "import pytest\n"
+        "def test_quick(benchmark):\n"
+        "    benchmark.pedantic(lambda: None, rounds=2)\n"
+        "    benchmark.extra_info['count'] = 7\n"
+        "def test_absent(benchmark):\n"
+        "    pytest.skip('no such thing here')\n"
+        "def test_wrong(benchmark):\n"
+        "    benchmark.pedantic(lambda: None)\n"
+        "    benchmark.extra_info['count'] = 8\n"
+        "    assert False\n",
+        encoding="utf-8",
+    )
+    script = f"""
+import sys
+from pathlib import Path
+sys.path.insert(0, {str(ROOT)!r})
+from bench import summary
+summary.ROOT = Path.cwd()
+summary.ROWS = tuple(
+    summary.Row(name, "here", "{{count}} of them", f"test_small.py::test_{{name}}")
+    for name in ("quick", "absent", "wrong")
+)
+sys.exit(summary.main())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1, done.stderr
+    assert done.stdout.splitlines() == [
+        "| result | conditions | measured | by |",
+        "|---|---|---|---|",
+        "| quick | here | 7 of them | [`test_quick`](bench/test_small.py) |",
+        "| absent | here | not measured: no such thing here | [`test_absent`](bench/test_small.py) |",
+        "| wrong | here | not measured: the benchmark failed | [`test_wrong`](bench/test_small.py) |",
+    ]
