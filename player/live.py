@@ -27,6 +27,8 @@ from player.transport import BUFFER
 CHUNK = 1 << 16
 PATIENCE = 0.5
 """Seconds after the first frame in which a slow stream may still show what it brings."""
+JUDGED = 4
+"""Seconds of a body after which it is judged, once, whether its BAP steps are the right ones."""
 
 
 class Readable(Protocol):
@@ -44,7 +46,9 @@ class LiveAnimation:
     nothing more is read, to close the source.
 
     Damage is stepped over to the next I plane behind a start code. `message` says in few words what is wrong,
-    `details` exactly; "" where nothing is. Whether there is a face, or a body, is settled as `wait` returns.
+    `details` exactly; "" where nothing is. `doubt` says, once `JUDGED` seconds of a body have arrived, where
+    it looks wrong with these BAP steps and right with others. Whether there is a face, or a body, is settled
+    as `wait` returns.
     """
 
     def __init__(
@@ -59,6 +63,7 @@ class LiveAnimation:
         self.name = name
         self.message = ""
         self.details = ""
+        self.doubt = ""
         self.growing = True
         self.received = 0
         """Bytes that have arrived."""
@@ -70,6 +75,7 @@ class LiveAnimation:
         self._closing = False
         self._failure: BaseException | None = None
         self._losses = 0
+        self._bap_steps, self._judged = bap_steps, False
         self._thread = threading.Thread(target=self._read, args=(head,), name="fba live", daemon=True)
         self._thread.start()
 
@@ -172,9 +178,11 @@ class LiveAnimation:
             while chunk and not self._closing:
                 self.received += len(chunk)
                 self._take(self._decoder.push_blocks(chunk))
+                self._judge()
                 chunk = self._source.read1(CHUNK)
             if not self._closing:
                 self._take(self._decoder.finish_blocks())
+                self._judge(at_end=True)
         except (FbaError, FbaWarning, OSError, ValueError) as error:
             self._failure = error
             self.message, self.details = "the stream broke off", f"the stream broke off: {error}"
@@ -201,6 +209,15 @@ class LiveAnimation:
                 self.message = f"{self._frames.left_out} came too late to be shown"
                 self.details = f"{self.message}: the stream brings it, but had none when playing started"
             self._news.notify_all()
+
+    def _judge(self, *, at_end: bool = False) -> None:
+        now = self._frames.now
+        if self._judged or now.body is None or (self.duration < JUDGED and not at_end):
+            return
+        from fba.body.plausibility import find_doubt
+
+        self._judged = True
+        self.doubt = str(find_doubt(now.body, now.index, now.rate, self._bap_steps) or "")
 
     def _end(self) -> None:
         with self._news:

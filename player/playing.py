@@ -14,7 +14,7 @@ from player.scene import Scene
 from player.ui.session import Session
 from player.ui.source import Source
 from player.whole import PathLike
-from player.window import Window
+from player.window import WARNED, Window
 
 if TYPE_CHECKING:
     from player.audio import Audio
@@ -36,6 +36,7 @@ def play(
     audio_offset: float = 0.0,
     file: PathLike | None = None,
     bap_steps: str = "iso",
+    warnings: tuple[str, ...] = (),
     panels: tuple[str, ...] = (),
 ) -> tuple[Path, ...]:
     """Open a window, play an animation in it, and return when it is closed.
@@ -47,7 +48,8 @@ def play(
     interpolate: whether motion is smooth between frames. audio: a sound file to be heard with it; the
     sound's clock then leads; it begins audio_offset seconds after the first frame, earlier where negative.
     file: where the animation was read from (with bap_steps), for what the window
-    tells about it. panels: names of those open at the beginning ("file", "view", "camera", "help").
+    tells about it. warnings: what was said while it was read; the window shows it for some seconds, and the
+    file's panel lists it. panels: names of those open at the beginning ("file", "view", "camera", "help").
     F1 shows the keys. Motion follows the clock: a slow machine shows fewer pictures, not slower ones.
 
     Raises DisplayError where there is no display or no OpenGL 3.3, or where it stops working, saying what
@@ -57,11 +59,13 @@ def play(
     if not math.isfinite(audio_offset):
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
     scene: Any = animation if hasattr(animation, "timeline") else Scene(animation)
-    source = Source(scene, file, bap_steps=bap_steps)
+    source = Source(scene, file, bap_steps=bap_steps, warnings=warnings)
     with Window(scene, title=title, size=size, camera=camera, loop=loop, source=source) as window:
         window.transport.set_speed(speed)
         window.transport.interpolate = interpolate
         window.session.open |= set(panels)
+        for text in warnings:
+            window.session.say(text, "warning", WARNED)
         with contextlib.ExitStack() as stack:
             if audio is not None:
                 sound = _sounded(window.session, audio, audio_offset)

@@ -41,6 +41,8 @@ IDLE = 0.05
 """Seconds between looks at the input while nothing moves."""
 FASTEST = 1 / 250
 """Least seconds a picture takes, where the display does not set the pace."""
+WARNED = 12.0
+"""Seconds for which it shows what was wrong with what was read."""
 IDLE_MOUSE = 3.0
 """Seconds after which the mouse hides itself on a full screen, while playing."""
 SETTLES = 4
@@ -84,6 +86,7 @@ class Window:
         self._due, self._restless = SETTLES, False
         self._timeline = timeline
         self._arrived: int = timeline.arrived
+        self._doubted = False
         self._last = wall.perf_counter()
         self._glfw = self._started_glfw()
         try:
@@ -104,10 +107,18 @@ class Window:
         while self.update():
             pass
 
+    def _doubt(self) -> None:
+        """Say once that a stream that is arriving looks wrong with its BAP steps."""
+        doubt = getattr(getattr(self._timeline, "animation", None), "doubt", "")
+        if doubt and not self._doubted:
+            self._doubted = True
+            self.session.say(doubt, "warning", WARNED)
+
     def update(self) -> bool:
         """Handle the input and draw one picture, or wait where nothing moves. False once closed."""
         glfw, session = self._glfw, self.session
         begun = wall.perf_counter()
+        self._doubt()
         arrived = self._timeline.arrived  # more of a stream makes the line longer, while paused too
         restless = session.restless
         if restless or self._restless or session.source.looking or arrived != self._arrived:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from fba.cli import options, writer_options
+from fba.cli import options, step_tables, writer_options
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -67,6 +67,10 @@ def command(
     if writing.name == "fba":
         extra["bap_steps"] = bap_steps
     animation = options.read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage)
+    if writing.name == "fba":
+        step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(target) as file:
         write(file, animation, format=writing.name, **extra)
     outputs.say(f"{shown(target)}: {len(animation)} frames, {writing.description}")
+    if writing.name == "fba":
+        step_tables.remind(target, animation, bap_steps)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from fba.animation import Animation
-from fba.cli import options, writer_options
+from fba.cli import options, step_tables, writer_options
 from fba.cli.outputs import (
     STANDARD,
     TEXT_FORMATS,
@@ -183,6 +183,7 @@ def _decode(
     with options.input_file(path) as file:
         data = file.read_bytes()
     animation, planes = _read(data, _name(path), any(t.writing is None for t in targets), bap_steps, salvage)
+    step_tables.warn_of_doubt(path, animation, bap_steps)
     parts = {"face": "FAPs", "body": "BAPs"}
     for target in targets:
         held = parts if target.writing is None else target.writing.carries

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -11,9 +10,9 @@ from typing import Any, NamedTuple
 import click
 
 from fba.animation import Animation
-from fba.cli import capture_report, options
+from fba.cli import capture_report, options, step_tables
 from fba.cli.outputs import Output, Outputs, OutputType, no_clobber_option, shown
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError
 
 CAPTURE = ("spine", "ground", "plant", "origin")
 """Options that say how motion capture becomes BAPs."""
@@ -151,22 +150,27 @@ def command(
         said = capture_report.compared(captures, animation) | said
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
-        if captures and animation.body is not None:
-            _warn_of_steps(settings)
-    coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, settings["bap_steps"])
+    table = settings["bap_steps"]
+    coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, table)
+    step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if as_json:
-        outputs.print_json({"output": str(output), **_figures(coded, animation), **said})
+        used = {"bap_steps": table if animation.body is not None else None}
+        outputs.print_json({"output": str(output), **_figures(coded, animation), **used, **said})
         return
     for line in (_summary(output, coded, animation), *capture_report.lines(said)):
         outputs.say(line)
+    step_tables.remind(output, animation, table, coded.bap_quant)
 
 
 class _Coded(NamedTuple):
+    """bap_quant: the largest that is used; 0 where BAPs go unquantised."""
+
     data: bytes
     planes: int
     intra_planes: int
     clamped: int
+    bap_quant: int
 
 
 def _coded(animation: Animation, settings: Mapping[str, Any]) -> _Coded:
@@ -174,7 +178,7 @@ def _coded(animation: Animation, settings: Mapping[str, Any]) -> _Coded:
     from fba.codec import EncoderOptions, encode_with_statistics
 
     data, statistics = encode_with_statistics(animation, EncoderOptions(**settings))
-    return _Coded(data, statistics.planes, statistics.intra_planes, statistics.clamped)
+    return _Coded(data, statistics.planes, statistics.intra_planes, statistics.clamped, settings["bap_quant"])
 
 
 def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
@@ -185,7 +189,8 @@ def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
     with options.input_file(epf) as file:
         planes = read_epf(file)
     data = encode_planes(animation, planes, bap_steps=bap_steps)
-    return _Coded(data, len(planes), sum(plane.intra for plane in planes), 0)
+    quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
+    return _Coded(data, len(planes), sum(plane.intra for plane in planes), 0, quant)
 
 
 def _refuse_beside_epf() -> None:
@@ -198,16 +203,6 @@ def _refuse_beside_epf() -> None:
             raise click.UsageError(
                 f"{parameter.opts[0]} and --epf contradict each other: the EPF file says how planes are coded"
             )
-
-
-def _warn_of_steps(settings: Mapping[str, Any]) -> None:
-    if settings["bap_steps"] == "iso" and settings["bap_quant"] > 0:
-        warnings.warn(
-            "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
-            "--bap-steps visage has 2 mm and 3.16 rad (decode, play and render need the same option)",
-            FbaWarning,
-            stacklevel=1,
-        )
 
 
 def _bits_per_second(coded: _Coded, animation: Animation) -> float:

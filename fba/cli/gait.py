@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli import options
+from fba.cli import options, step_tables
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
@@ -20,7 +19,6 @@ from fba.cli.outputs import (
     to_option,
     writer_of,
 )
-from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -108,6 +106,8 @@ def command(
             animation = gait.walk(character=character, rate=fps or DEFAULT_RATE, **made)
         _write(animation, writing, output, outputs, bap_steps)
         outputs.say(_summary(animation, output, character, in_place=in_place))
+        if writing.name == "fba":
+            step_tables.remind(output, animation, bap_steps)
 
 
 def _write(animation: Animation, writing: Format, output: Path, outputs: Outputs, bap_steps: str) -> None:
@@ -116,13 +116,7 @@ def _write(animation: Animation, writing: Format, output: Path, outputs: Outputs
     extra: dict[str, Any] = {}
     if writing.name == "fba":
         extra = {"bap_steps": bap_steps, "clamp": True}
-        if bap_steps == "iso":
-            warnings.warn(
-                "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
-                "--bap-steps visage has 2 mm and 3.16 rad (decode, play and render need the same option)",
-                FbaWarning,
-                stacklevel=1,
-            )
+        step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(output) as file:
         write(file, animation, format=writing.name, **extra)
 

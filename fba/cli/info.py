@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fba.cli import options
+from fba.cli import options, step_tables
 from fba.codec.stream_info import PartInfo, StreamInfo
 from fba.errors import FbaError
 
@@ -43,6 +43,8 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, trace: bool,
         try:
             with options.input_file(path) as file:
                 info = probe(file, bap_steps=bap_steps)
+                if info.format == "fba" and info.body is not None:
+                    step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
         except FbaError as error:
             if len(files) == 1:
                 raise

@@ -82,7 +82,11 @@ class _Commands(Group):
 @click.group(
     cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog=examples("fba encode walk.bvh -o walk.fba", "fba info walk.fba", "fba play walk.fba"),
+    epilog=examples(
+        "fba encode walk.bvh -o walk.fba --bap-steps visage",
+        "fba info walk.fba --bap-steps visage",
+        "fba play walk.fba --bap-steps visage",
+    ),
 )
 @click.version_option(__version__, prog_name="fba")
 def group() -> None:

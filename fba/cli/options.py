@@ -268,12 +268,15 @@ def read_input(
     name: str | None = None,
     salvage: bool = False,
     capture: Mapping[str, object] | None = None,
+    said: list[str] | None = None,
 ) -> Animation:
-    """Read a file of any format.
+    """Read a file of any format. Warns where the BAPs of a stream look wrong with these steps.
 
     fps resamples what was read, motion capture while it still turns by rotations; it, or header_fps, and name
-    stand in for a header that a file lacks. capture: options for the readers of motion capture.
+    stand in for a header that a file lacks. capture: options for the readers of motion capture. said: takes
+    the text of that warning.
     """
+    from fba.cli import step_tables
     from fba.formats import format_of, read
 
     wanted: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
@@ -284,6 +287,8 @@ def read_input(
             key: value for key, value in wanted.items() if value is not None and key in found.read_options
         }
         animation = read(file, format=found.name, **taken)
+    if found.name == "fba" and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
+        (said if said is not None else []).append(doubt)
     if fps is not None and animation.rate != fps:
         animation = animation.resample(fps)
     return animation

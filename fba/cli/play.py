@@ -110,9 +110,9 @@ def _play(
     voice = showing.voice(files, sound, "played without sound")
     streams = []
     try:
-        opened = []
+        opened, said = [], list[str]()
         for file in files:
-            opened.append(showing.opened(file, how))
+            opened.append(showing.opened(file, how, said))
             if opened[-1][1]:
                 streams.append(opened[-1][0])
         names = [
@@ -131,13 +131,14 @@ def _play(
             audio_offset=sound.audio_offset,
             file=files[0] if single else None,
             bap_steps=how.bap_steps,
+            warnings=tuple(said),
             panels=("differences",) if compare else (),
             **window,
         )
     finally:
         for stream in streams:
-            if stream.details:  # type: ignore[union-attr]
-                click.echo(f"fba: warning: {stream.name}: {stream.details}", err=True)  # type: ignore[union-attr]
+            for text in filter(None, (stream.details, stream.doubt)):  # type: ignore[union-attr]
+                click.echo(f"fba: warning: {stream.name}: {text}", err=True)
             stream.close()  # type: ignore[union-attr]
 
 

@@ -33,10 +33,11 @@ Shown = tuple["Animation | LiveAnimation", bool]
 """What a file holds, and whether it is a stream that grows."""
 
 
-def opened(file: Path, how: SceneOptions) -> Shown:
+def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Shown:
     """A file's animation; of an FBA stream on standard input or in a FIFO, one that grows. And whether it is.
 
-    What arrives in another format is read to its end first. Raises click.UsageError where standard input is a
+    What arrives in another format is read to its end first. said: see `options.read_input`.
+    Raises click.UsageError where standard input is a
     terminal, what `options.read_input` raises, and what `LiveAnimation.wait` raises.
     """
     bap_steps, fps, salvage = how.bap_steps, how.fps, how.salvage
@@ -44,7 +45,8 @@ def opened(file: Path, how: SceneOptions) -> Shown:
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- is standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
-        return options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage), False
+        animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, said=said)
+        return animation, False
     with contextlib.ExitStack() as stack:
         source: BinaryIO = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
         head = b""

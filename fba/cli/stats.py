@@ -8,7 +8,7 @@ from typing import Any
 import click
 import numpy as np
 
-from fba.cli import options
+from fba.cli import options, step_tables
 from fba.codec.stream_info import StreamInfo
 
 
@@ -23,9 +23,11 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
     rows = []
     for path in files:
         with options.input_file(path) as file:
-            rows.append(
-                {"file": str(path), **statistics(probe_stream(file.read_bytes(), bap_steps=bap_steps))}
-            )
+            data = file.read_bytes()
+        info = probe_stream(data, bap_steps=bap_steps)
+        if info.body is not None:
+            step_tables.warn_of_doubtful_stream(path, data, bap_steps)
+        rows.append({"file": str(path), **statistics(info)})
     if as_json:
         options.print_json(rows if len(rows) > 1 else rows[0])
         return

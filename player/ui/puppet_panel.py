@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 from imgui_bundle import imgui
 
 from fba.errors import FbaError
@@ -267,6 +269,6 @@ def _save(session: Session, performer: Performer, name: str) -> None:
     how = (
         ""
         if steps == "iso" or performer.takes.last is None or performer.takes.last.body is None
-        else (f"; play it with --bap-steps {steps}")
+        else f". Play it with: fba play {shlex.quote(str(path))} --bap-steps {steps}"
     )
     session.say(f"Kept as {path}{how}", seconds=8.0 if how else 4.0)

@@ -158,7 +158,7 @@ def test_motion_capture(run: Run, tmp_path: Path, bvh: Path) -> None:
     assert code == 0
     assert "--bap-steps visage" in err
     code, _, err = run("encode", bvh, "-o", stream, "--bap-steps", "visage")
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, f"Play it with: fba play {stream} --bap-steps visage\n")
     decoded = fba.read(stream, bap_steps="visage")
     assert decoded.rate == 10
     knee = decoded.body.values[:, 10 - 1]  # type: ignore[union-attr]  # BAP 10 l_knee_flexion

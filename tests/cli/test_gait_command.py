@@ -32,7 +32,7 @@ def test_writes_streams_and_says_what_their_steps_do(run: Run, tmp_path: Path) -
     assert "--bap-steps visage" in err
     assert len(fba.read(path)) == 33
     code, _, err = run("gait", "--cycles", 1, "--bap-steps", "visage", "-o", path)
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, f"Play it with: fba play {path} --bap-steps visage\n")
     decoded = fba.read(path, bap_steps="visage").body.values.astype(int)
     apart = np.abs(decoded - gait.walk(cycles=1).body.values)
     assert apart[:, 180:183].max() <= 1  # steps of 2 mm

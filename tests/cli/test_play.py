@@ -78,7 +78,7 @@ def test_a_file_is_played(run: Run, window: Window, talk: Path) -> None:
     assert window.options == {
         "title": "talk.fba", "size": (1280, 720), "camera": None, "loop": False, "speed": 1.0, "start": None,
         "paused": False, "interpolate": True, "audio": None, "audio_offset": 0.0, "file": talk,
-        "bap_steps": "iso", "panels": (),
+        "bap_steps": "iso", "warnings": (), "panels": (),
     }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from player_tracks import face_track
 
 import fba
 from fba.animation import Animation
+from fba.body import gait
 from fba.codec import Decoder
 from fba.errors import DisplayError
 from player.compare import CompareScene
@@ -54,6 +56,20 @@ def test_a_stream_is_shown_while_it_arrives(on_display: str, tmp_path: Path) -> 
             window.transport.play()
             until(window, lambda: not window.transport.playing)
             assert window.transport.frame == 59
+
+
+def test_a_stream_that_is_read_with_other_steps_is_noticed_once(on_display: str, tmp_path: Path) -> None:
+    stream = io.BufferedReader(io.BytesIO(fba.encode(gait.walk(), fba.EncoderOptions(bap_steps="visage"))))  # type: ignore[arg-type]
+    live = LiveAnimation(stream, name="wire")
+    assert live.wait_end(20)
+    with window_of(Scene(live, timeline=LiveTimeline(live)), tmp_path) as window:  # type: ignore[arg-type]
+        until(window, window.session.notices)
+        (notice,) = window.session.notices()
+        assert (notice.kind, notice.text) == ("warning", live.doubt)
+        assert notice.text.endswith("made with --bap-steps visage?")
+        window.session.say("else", about=notice.about)  # takes its place
+        settle(window)
+        assert [one.text for one in window.session.notices()] == ["else"]
 
 
 def test_two_performances_stand_side_by_side(on_display: str, tmp_path: Path) -> None:

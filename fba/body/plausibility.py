@@ -1,0 +1,213 @@
+"""Whether a decoded body moves like a person, and whether the other table of BAP steps fits it better.
+
+Two tables of BAP quantiser steps are in use and no bit of a stream says which (docs/bitstream.md). Under
+the wrong one the root's translation comes out 32 times too large or too small, and joint angles up to 2.7
+times. `find_doubt` measures the motion under the table it was decoded with and under the other, and reports
+only where the first looks wrong and the second does not. The bounds are set so that none of the 177 foreign
+streams and none of our captures, walks and vectors is doubted when it is decoded with its own table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.conventions import NO_BAP, convention
+from fba.body.limits import DEGREES, WHOLE, widest
+from fba.body.posing import MILLIMETRE, UNIT
+from fba.body.skeleton import Skeleton
+from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
+from fba.tracks import BodyTrack
+
+Float = npt.NDArray[np.float64]
+Int = npt.NDArray[np.int64]
+
+SAMPLES = 32
+RUN = 64
+"""At most so many runs of so many successive frames are looked at, spread evenly: the cost has a bound."""
+LEAST = 1.0
+"""Seconds that a motion must last to be judged."""
+MARGIN = 20.0
+"""Degrees that a joint must be beyond `limits.widest` to count."""
+BEYOND = 0.3
+"""By how much larger a share of the frames must have such a joint than under the other table."""
+SWAY = 0.08
+"""Metres a second that the root may move over feet that stand."""
+SLACK = 2.0
+"""How many times as fast as the legs carry it (and sways) the root may go."""
+FASTEST = 8.0
+"""Metres a second that nobody does on average over a whole motion."""
+STRIDING = 0.2
+"""Metres a second at which the legs certainly carry somebody."""
+STANDS = 0.15
+"""Share of what the legs do below which the root stays where it is."""
+SUNK = -2.0
+"""Metres by which a root is lower than in the default posture when nothing of the person shows any more."""
+_FEET = ("l_ankle", "r_ankle", "l_metatarsal", "r_metatarsal")
+_ROOT = ("vertical", "lateral", "frontal")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What `measure` finds in a motion.
+
+    beyond: share of the frames (0..1) in which a joint is `MARGIN` or more beyond all limits. travel: metres
+    a second that the root goes; along: on the ground alone. carried: metres a second that the lowest foot
+    moves against the root, which is how fast the legs carry it. jump: metres, the longest way of the root
+    from a frame to the next. hops: whether one of these ways is more than a quantiser step long. height:
+    metres, median of the root's height over that of the default posture.
+    """
+
+    beyond: float
+    travel: float
+    along: float
+    carried: float
+    jump: float
+    hops: bool
+    height: float
+
+    @property
+    def runs_away(self) -> bool:
+        """Whether the root goes faster than legs and sway can account for, or than anybody does."""
+        return self.travel > min(FASTEST, SLACK * (SWAY + self.carried))
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A motion that looks wrong under the table of BAP steps it was decoded with, and right under another.
+
+    used, likely: names of the tables. findings: what is wrong, in words.
+    """
+
+    used: str
+    likely: str
+    findings: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return (
+            f"BAPs look implausible with the BAP steps {self.used!r} ({', '.join(self.findings)}); "
+            f"made with --bap-steps {self.likely}?"
+        )
+
+
+def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str) -> Doubt | None:
+    """Why the body looks wrong under the table `used` and right under the other; None where that is not so.
+
+    index: (T,) numbers of the frames, at rate frames a second. Values must be as decoded: where they are not
+    multiples of the table's steps (bap_quant 0, or resampled), the table has no say, and None is returned;
+    None as well where both tables or neither look wrong. At most 2048 frames are looked at, in 20 ms.
+    ValueError for an unknown table.
+    """
+    steps = bap_steps(used)
+    moving = np.flatnonzero(body.mask.any(axis=1))
+    numbers = np.asarray(index, dtype=np.int64)[moving]
+    if len(moving) < 2 or numbers[-1] - numbers[0] < LEAST * rate:
+        return None
+    chosen = _samples(len(moving))
+    levels, rests = np.divmod(body.values[moving[chosen]].astype(np.int64), steps)
+    if rests.any():
+        return None
+    now = measure(levels * steps, numbers[chosen], rate)
+    for other in BAP_STEP_TABLES:
+        changed = (steps != bap_steps(other)) & levels.any(axis=0)
+        if other == used or not changed.any():
+            continue
+        findings = _compared(now, measure(levels * bap_steps(other), numbers[chosen], rate))
+        if findings:
+            return Doubt(used, other, findings)
+    return None
+
+
+def measure(values: Int, index: Int, rate: Fraction) -> Motion:
+    """A motion in numbers: BAPs int64 (T, 296) at frame numbers (T,); successive ones are compared."""
+    pairs = np.flatnonzero(np.diff(index) == 1)
+    root = values[:, [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in _ROOT]]
+    ways = np.abs(root[pairs + 1] - root[pairs])
+    quantum = np.gcd.reduce(ways, axis=0)  # rounding alone moves a root by one quantiser step
+    lengths = np.linalg.norm(ways, axis=1) * MILLIMETRE
+    feet = _feet(values)
+    lowest = np.argmin(feet[pairs, :, 1], axis=1)
+    swing = feet[pairs + 1, lowest] - feet[pairs, lowest]
+    seconds = len(pairs) / float(rate) or 1.0
+    return Motion(
+        beyond=float(_beyond(values).mean()),
+        travel=float(lengths.sum() / seconds),
+        along=float(np.linalg.norm(ways[:, 1:], axis=1).sum() * MILLIMETRE / seconds),
+        carried=float(np.linalg.norm(swing[:, [0, 2]], axis=1).sum() / seconds),
+        jump=float(lengths.max(initial=0.0)),
+        hops=bool((ways > quantum).any()),
+        height=float(np.median(root[:, 0])) * MILLIMETRE,
+    )
+
+
+def _compared(now: Motion, other: Motion) -> tuple[str, ...]:
+    """What is wrong with `now` and not with the other reading of the same motion."""
+    findings = []
+    if now.beyond - other.beyond > BEYOND:
+        findings.append(f"joints beyond human limits in {100 * now.beyond:.0f} % of frames")
+    if now.runs_away and (now.hops or now.travel > FASTEST) and not other.runs_away:
+        findings.append(
+            f"the root goes {now.travel:.1f} m/s where the legs carry it {now.carried:.1f} m/s, "
+            f"in jumps of up to {now.jump:.1f} m"
+        )
+    striding = now.carried > STRIDING and other.carried > STRIDING
+    if striding and now.along < STANDS * now.carried and 0.5 < other.along / other.carried < SLACK:
+        findings.append(f"the root stays where it is while the legs carry it {now.carried:.1f} m/s")
+    if now.height < SUNK < other.height:
+        findings.append(f"the body {-now.height:.0f} m under the ground")
+    wrong = (other.runs_away and other.hops) or other.height < SUNK or other.beyond - now.beyond > BEYOND
+    return () if wrong else tuple(findings)
+
+
+def _samples(count: int) -> Int:
+    """Which of so many frames are looked at: all, or runs of successive ones."""
+    if count <= SAMPLES * RUN:
+        return np.arange(count)
+    starts = np.linspace(0, count - RUN, SAMPLES).astype(np.int64)
+    return np.asarray((starts[:, None] + np.arange(RUN)).reshape(-1))
+
+
+def _beyond(values: Int) -> npt.NDArray[np.bool_]:
+    """bool (T,): whether a joint is beyond all limits by the margin. Whole turns do not count."""
+    turning = np.flatnonzero(widest().any(axis=1))
+    low, high = widest()[turning].T
+    angles = values[:, turning] * DEGREES
+    angles -= WHOLE * np.rint((angles - (low + high) / 2) / WHOLE)
+    over: npt.NDArray[np.bool_] = ((angles < low - MARGIN) | (angles > high + MARGIN)).any(axis=1)
+    return over
+
+
+def _feet(values: Int) -> Float:
+    """float64 (T, 4, 3), metres: ankles and balls of the feet from the root's place, along the world's axes.
+
+    `BapSolver` poses whole bodies; this turns four points and needs no compiled loop.
+    """
+    skeleton, rules = Skeleton.default(), convention()
+    result = np.empty((len(values), len(_FEET), 3))
+    for column, name in enumerate(_FEET):
+        point = np.zeros((len(values), 3))
+        joint = skeleton.number(name)
+        while (parent := int(skeleton.parents[joint])) >= 0:
+            point += skeleton.offsets[joint]
+            joint = parent
+            if skeleton.names[joint] in rules.joints:
+                _turn(point, values, rules.joints.index(skeleton.names[joint]))
+        result[:, column] = point
+    return result
+
+
+def _turn(point: Float, values: Int, row: int) -> None:
+    """Turn points (T, 3) in place by the BAPs of a joint, a row of the convention."""
+    rules = convention()
+    for bap, axis, sign in reversed(list(zip(rules.bap[row], rules.axis[row], rules.sign[row], strict=True))):
+        if bap == NO_BAP:
+            continue
+        angle = values[:, bap] * (sign * UNIT)
+        sine, cosine = np.sin(angle), np.cos(angle)
+        one, two = (axis + 1) % 3, (axis + 2) % 3
+        first, second = point[:, one].copy(), point[:, two].copy()
+        point[:, one] = cosine * first - sine * second
+        point[:, two] = sine * first + cosine * second
