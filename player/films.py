@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from fba.errors import DisplayError
 from player.sound import FilmedSound, Soundtrack
+from player.sound_file import av_version
 from player.whole import PathLike, cannot, written
 
 UInt8 = npt.NDArray[np.uint8]
@@ -79,16 +80,24 @@ class Mp4:
                 self._stream = _video_stream(self._container, name, rate, self._size)
                 self._voice = None if soundtrack is None else _Voice(self._container, soundtrack)
             self._reformatter = self._av.video.reformatter.VideoReformatter()
+            version, frames = av_version(self._av), self._av.VideoFrame
+            # Versions before 14 have to copy the pixels.
+            self._framed = frames.from_numpy_buffer if version >= 14 else frames.from_ndarray
+            self._conversion: dict[str, Any] = {
+                "format": "yuv420p",
+                "dst_colorspace": "ITU709",  # by name: version 14 takes no numbers here
+                "dst_color_range": "MPEG",
+            }
+            if version >= 17:  # before, there is one thread, and no argument for it
+                self._conversion["threads"] = 1
             undo.pop_all()
 
     def write(self, pixels: UInt8, number: int) -> None:
         """A picture, uint8 (H, W, 4), at number / rate seconds."""
         width, height = self._size
         with self._failures():
-            shown = self._av.VideoFrame.from_numpy_buffer(pixels[:height, :width], format="rgba")
-            picture = self._reformatter.reformat(
-                shown, format="yuv420p", dst_colorspace=BT709, dst_color_range=STUDIO_RANGE, threads=1
-            )
+            shown = self._framed(pixels[:height, :width], format="rgba")
+            picture = self._reformatter.reformat(shown, **self._conversion)
             picture.pts, picture.time_base = number, 1 / self._rate
             self._container.mux(self._stream.encode(picture))
             if self._voice is not None:

@@ -27,10 +27,15 @@ MOST_AT_ONCE = 1 << 24
 """Samples; one piece of a file that decodes to more is damaged."""
 
 
+def av_version(av: Any) -> int:
+    """The major version of PyAV, of which several from 12 on are supported."""
+    return int(av.__version__.split(".")[0])
+
+
 def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
     """The opened `av` container and its first audio stream; FormatError where there is none to decode."""
     # Tags may be in any encoding. From version 19 on, PyAV takes them as they are and has no argument for it.
-    tags = {"metadata_errors": "replace"} if int(av.__version__.split(".")[0]) < 19 else {}
+    tags = {"metadata_errors": "replace"} if av_version(av) < 19 else {}
     try:
         empty = not path.stat().st_size
         container = None if empty else av.open(str(path), **tags)

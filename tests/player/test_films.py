@@ -5,6 +5,7 @@ from __future__ import annotations
 import wave
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,14 @@ def write_click(path: Path, at: float, *, seconds: float = 1.0, rate: int = 4800
 def pictures(path: Path) -> list[tuple[float, np.ndarray]]:
     """(time, uint8 (H, W, 3)) of every frame."""
     with av.open(str(path)) as film:
-        return [(float(f.time), f.to_ndarray(format="rgb24")) for f in film.decode(video=0)]
+        return [(float(f.time), rgb(f)) for f in film.decode(video=0)]
+
+
+def rgb(frame: Any) -> np.ndarray:
+    """uint8 (H, W, 3); older versions of PyAV do not convert by the colours that a film says it has."""
+    if frame.format.name == "yuv420p":
+        frame = frame.reformat(format="rgb24", src_colorspace="ITU709", src_color_range="MPEG")
+    return frame.to_ndarray(format="rgb24")
 
 
 def sound(path: Path) -> tuple[float, np.ndarray, int]:
