@@ -68,6 +68,34 @@ def test_shellcheck_is_content(script: str) -> None:
     assert done.stdout == ""
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script")
+def test_pythons_are_found_once_each_and_shims_do_not_count(tmp_path: Path) -> None:
+    shims, version = tmp_path / "shims", tmp_path / "pyenv" / "versions" / "3.x" / "bin"
+    shims.mkdir()
+    version.mkdir(parents=True)
+    for minor in range(11, 16):  # as pyenv has them where the version is not chosen
+        shim = shims / f"python3.{minor}"
+        shim.write_text("#!/bin/sh\nexit 127\n")
+        shim.chmod(0o755)
+    (version / "python3").symlink_to(sys.executable)
+    environment = {
+        **{name: value for name, value in os.environ.items() if name not in {"PYTHON", "FBA_VENV"}},
+        "PATH": f"{shims}{os.pathsep}{os.environ['PATH']}",
+        "PYENV_ROOT": str(tmp_path / "pyenv"),
+    }
+    done = subprocess.run(
+        [ROOT / "dev", "pythons"], env=environment, capture_output=True, text=True, check=True
+    )
+    found = [line.split(" ", 1) for line in done.stdout.splitlines()]
+    minors = [int(minor) for minor, _ in found]
+    assert minors == sorted(set(minors))
+    assert sys.version_info.minor in minors
+    for minor, path in found:
+        assert shims not in Path(path).parents
+        ask = [path, "-c", "import sys; print(sys.version_info.minor)"]
+        assert subprocess.run(ask, capture_output=True, text=True, check=True).stdout == f"{minor}\n"
+
+
 # --- the package --------------------------------------------------------------------------------------
 
 

@@ -46,9 +46,10 @@ def pictures(path: Path) -> list[tuple[float, np.ndarray]]:
 
 
 def rgb(frame: Any) -> np.ndarray:
-    """uint8 (H, W, 3); older versions of PyAV do not convert by the colours that a film says it has."""
+    """uint8 (H, W, 3). PyAV before 17 converts by the colour space only where it is named and changes."""
     if frame.format.name == "yuv420p":
-        frame = frame.reformat(format="rgb24", src_colorspace="ITU709", src_color_range="MPEG")
+        colours = {"src_colorspace": "ITU709", "dst_colorspace": "ITU601", "src_color_range": "MPEG"}
+        frame = frame.reformat(format="rgb24", **colours)
     return frame.to_ndarray(format="rgb24")
 
 
