@@ -8,7 +8,9 @@ in both worlds: they cast NumPy scalars with `int()` before doing arithmetic on 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from functools import partial
+from types import FunctionType
+from typing import Any, TypeVar, cast
 
 try:
     from numba import config, njit
@@ -25,18 +27,34 @@ def compiled(function: Function) -> Function:
 
 def inlined(function: Function) -> Function:
     """Like `compiled`, for small helpers that only compiled functions call."""
-    return _compiled(function, inline="always")
+    return _compiled(function, forceinline=True)
 
 
-def _compiled(function: Function, **options: str) -> Function:
+def _compiled(function: Function, **options: bool) -> Function:
     if njit is None:
         return function
-    result: Function
-    try:
-        result = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
-    except RuntimeError:  # no folder to keep machine code in: neither beside the source nor in a home
-        result = njit(nogil=True, error_model="numpy", **options)(function)
+    # Nobody calls these through C: numba's wrapper for that took a quarter of the time to compile.
+    dispatcher: Any = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+    if not config.DISABLE_JIT:
+        from fba.machine_code import MachineCode
+
+        dispatcher._cache = MachineCode(cast(FunctionType, function))
+        dispatcher.get_call_template = partial(_call_by_type, dispatcher)
+    result: Function = dispatcher
     return result
+
+
+def _call_by_type(dispatcher: Any, arguments: Any, named: Any) -> Any:
+    """How another compiled function calls this one: by the types of the arguments alone.
+
+    Numba would compile it once more for each constant that is passed to it.
+    """
+    from numba.types import unliteral
+
+    plain = [unliteral(one) for one in arguments]
+    return type(dispatcher).get_call_template(
+        dispatcher, plain, {key: unliteral(one) for key, one in named.items()}
+    )
 
 
 def is_compiled() -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import os
 import sys
-import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,6 +18,8 @@ Kept = TypeVar("Kept", bound=npt.NDArray[Any])
 
 MOST_FILES = 96
 """So many are kept; the longest unused goes first."""
+DIGEST = 32
+"""Bytes at the start of a file that tell whether the rest is as it was written."""
 
 
 def key_of(name: str, *parts: npt.ArrayLike) -> str:
@@ -41,7 +43,7 @@ def kept(
     """
     kinds = [np.dtype(one) for one in (kind if isinstance(kind, list) else [kind] * len(shapes))]
     folder = _folder()
-    path = None if folder is None else folder / f"{key}.npz"
+    path = None if folder is None else folder / f"{key}.fbk"
     if path is not None:
         found: list[Kept] | None = _read(path, shapes, kinds)
         if found is not None:
@@ -72,21 +74,35 @@ def _folder() -> Path | None:
 def _read(
     path: Path, shapes: tuple[tuple[int, ...], ...], kinds: Sequence[np.dtype[Any]]
 ) -> list[Any] | None:
-    most = 4096
-    for shape, kind in zip(shapes, kinds, strict=True):
-        most += kind.itemsize * int(np.prod(shape)) + 1024
+    size = DIGEST + sum(kind.itemsize * math.prod(shape) for shape, kind in zip(shapes, kinds, strict=True))
     try:
-        if path.stat().st_size > most:
+        if path.stat().st_size != size:
             return None
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            found = [np.asarray(file[f"arr_{number}"]) for number in range(len(shapes))]
-        os.utime(path)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        content = path.read_bytes()
+        with contextlib.suppress(
+            OSError
+        ):  # the longest unused goes first: somebody else's file stays as it is
+            os.utime(path)
+    except OSError:
         return None
-    for array, shape, kind in zip(found, shapes, kinds, strict=True):
-        if array.dtype != kind or array.shape != shape or not np.isfinite(array).all():
+    if content[:DIGEST] != _digest(content[DIGEST:], path.stem, kinds, shapes):
+        return None
+    found, place = [], DIGEST
+    for shape, kind in zip(shapes, kinds, strict=True):
+        count = math.prod(shape)
+        found.append(np.frombuffer(content, kind, count, place).reshape(shape).copy())
+        place += kind.itemsize * count
+        if not np.isfinite(found[-1]).all():
             return None
     return found
+
+
+def _digest(
+    content: bytes, key: str, kinds: Sequence[np.dtype[Any]], shapes: Sequence[tuple[int, ...]]
+) -> bytes:
+    """Of the numbers of all arrays, and of what they are."""
+    about = f"{key} {[kind.str for kind in kinds]} {list(shapes)} "
+    return hashlib.blake2b(about.encode() + content, digest_size=DIGEST).digest()
 
 
 def _write(path: Path, arrays: list[Kept]) -> None:
@@ -96,6 +112,8 @@ def _write(path: Path, arrays: list[Kept]) -> None:
     with contextlib.suppress(OSError, ValueError, FormatError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic(path) as file:
-            np.savez(file, *arrays)
-        for old in sorted(path.parent.glob("*.npz"), key=lambda one: one.stat().st_mtime)[:-MOST_FILES]:
+            content = b"".join(array.tobytes() for array in arrays)
+            kinds, shapes = [array.dtype for array in arrays], [array.shape for array in arrays]
+            file.write(_digest(content, path.stem, kinds, shapes) + content)
+        for old in sorted(path.parent.glob("*.fbk"), key=lambda one: one.stat().st_mtime)[:-MOST_FILES]:
             old.unlink(missing_ok=True)

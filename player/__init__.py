@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from player.camera import Camera, Subject
     from player.compare import CompareScene
     from player.contact_sheet import contact_sheet
+    from player.display import check_display
     from player.film_sheet import film_sheet
     from player.live import LiveAnimation, LiveTimeline
     from player.notebook import Preview
@@ -45,6 +46,7 @@ _PLACES = {
     "Subject": "player.camera",
     "Timeline": "player.timeline",
     "Transport": "player.transport",
+    "check_display": "player.display",
     "contact_sheet": "player.contact_sheet",
     "default_camera": "player.scene",
     "film_sheet": "player.film_sheet",
@@ -69,6 +71,7 @@ __all__ = [
     "Subject",
     "Timeline",
     "Transport",
+    "check_display",
     "contact_sheet",
     "default_camera",
     "film_sheet",

@@ -38,7 +38,8 @@ class Edges:
         self.sides[:, 0] = owner[start]
         uses = np.diff(np.append(start, len(ordered)))
         self.sides[uses == 2, 1] = owner[start[uses == 2] + 1]
-        self.triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+        # Copies: what cannot be written to is another type, and the loops would be compiled for both.
+        self.triangles = np.array(triangles, dtype=np.int32, order="C")
         # Room to work in.
         self.seen = np.empty((0, 3), dtype=np.float32)
         self.facing = np.empty(len(triangles), dtype=np.int8)
@@ -73,7 +74,7 @@ class Outliner:
         edges = self._edges_of(mesh)
         clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
         if edges.sway is None or edges.sway[0] is not mesh.shape.sway:
-            edges.sway = (mesh.shape.sway, np.ascontiguousarray(mesh.shape.sway, dtype=np.float32))
+            edges.sway = (mesh.shape.sway, np.array(mesh.shape.sway, dtype=np.float32, order="C"))
         if len(edges.seen) != len(mesh.positions):
             edges.seen = np.empty((len(mesh.positions), 3), dtype=np.float32)
         places = np.ascontiguousarray(mesh.positions, dtype=np.float32)

@@ -70,6 +70,8 @@ def bake(
     visible = np.ones((count, len(directions)), dtype=np.float32)
     through = np.zeros_like(visible)
     if is_compiled() and count:
+        # Those of a model cannot be written to, which is another type: the loops would be compiled for both.
+        normals, triangles = normals.copy(), triangles.copy()
         rows = np.arange(count) if within is None or not within.any() else np.flatnonzero(within)
         chosen = vertices[rows]
         centre = (chosen.min(axis=0) + chosen.max(axis=0)) / 2

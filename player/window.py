@@ -12,6 +12,7 @@ from fba.errors import DisplayError, FbaWarning
 from player.camera import Camera
 from player.context import import_moderngl
 from player.controls import Controls
+from player.display import HOW_WITHOUT, started_glfw
 from player.overlay import Overlay
 from player.renderer import Renderer
 from player.screen import FullScreen
@@ -29,10 +30,6 @@ if TYPE_CHECKING:
 
 PathLike = str | os.PathLike[str]
 
-HOW_WITHOUT = (
-    "On a machine without a display, `fba render FILE -o OUT.mp4` makes a film instead; "
-    "with one, check that the variable DISPLAY (or WAYLAND_DISPLAY) is set"
-)
 LOST = (
     "OpenGL stopped working ({reason}): the graphics driver was reset, or has no memory left. Start the "
     "player again; a smaller window, or LIBGL_ALWAYS_SOFTWARE=1 (drawing without the graphics card), may help"
@@ -88,7 +85,7 @@ class Window:
         self._arrived: int = timeline.arrived
         self._doubted = False
         self._last = wall.perf_counter()
-        self._glfw = self._started_glfw()
+        self._glfw = started_glfw(self._problems)
         try:
             self._open(size)
             self._furnish(panels)
@@ -173,21 +170,6 @@ class Window:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def _started_glfw(self) -> Any:
-        try:
-            import glfw
-        except ImportError as error:
-            raise DisplayError(
-                f"the window needs the Python package glfw, which cannot be used: {error}. "
-                f"{cure(error, 'glfw')}. {HOW_WITHOUT}"
-            ) from error
-        glfw.set_error_callback(lambda code, text: self._problems.append(_text(text)))
-        if not glfw.init():
-            raise DisplayError(
-                f"no window can be opened: {self._reason('there is no display')}. {HOW_WITHOUT}"
-            )
-        return glfw
 
     def _open(self, size: tuple[int, int]) -> None:
         glfw = self._glfw
@@ -323,7 +305,3 @@ class Window:
         if text != self._shown_title:
             self._glfw.set_window_title(self._window, text)
             self._shown_title = text
-
-
-def _text(value: bytes | str) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

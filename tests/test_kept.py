@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +29,69 @@ def test_what_was_made_is_found_again(tmp_path: Path, monkeypatch: pytest.Monkey
     assert kept("two", shapes, lambda: numbers(2))[0][0, 0] == 2
 
 
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 nothing", b"x" * 100_000, None])
+@pytest.mark.parametrize("content", [b"", b"nothing", b"x" * 44, b"x" * 100_000])
 def test_a_damaged_file_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
     kept("one", ((3, 2),), lambda: numbers(1))
-    path = tmp_path / "fba" / "one.npz"
-    if content is None:  # what another version wrote
-        np.savez(path, np.full((3, 2), np.nan, dtype=np.float16))
-    else:
-        path.write_bytes(content)
+    path = tmp_path / "fba" / "one.fbk"
+    path.write_bytes(content)
     assert kept("one", ((3, 2),), lambda: numbers(5))[0][0, 0] == 5
     assert kept("one", ((3, 2),), lambda: numbers(6))[0][0, 0] == 5
+
+
+def test_every_flipped_bit_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FBA_CACHE", str(tmp_path))
+    kept("one", ((3, 2),), lambda: numbers(1))
+    path = tmp_path / "fba" / "one.fbk"
+    good = path.read_bytes()
+    for bit in range(8 * len(good)):
+        bad = bytearray(good)
+        bad[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(bad)
+        assert (kept("one", ((3, 2),), lambda: numbers(1))[0] == 1).all(), bit
+        assert path.read_bytes() == good, bit
+
+
+def test_a_cut_file_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FBA_CACHE", str(tmp_path))
+    kept("one", ((3, 2),), lambda: numbers(1))
+    path = tmp_path / "fba" / "one.fbk"
+    good = path.read_bytes()
+    for length in range(len(good)):
+        path.write_bytes(good[:length])
+        assert (kept("one", ((3, 2),), lambda: numbers(1))[0] == 1).all()
+        assert path.read_bytes() == good
+
+
+def test_another_kind_of_the_same_size_is_not_taken_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FBA_CACHE", str(tmp_path))
+    kept("one", ((3, 2),), lambda: numbers(1))
+    path = tmp_path / "fba" / "one.fbk"
+    path.rename(path.with_name("two.fbk"))
+    assert (kept("two", ((3, 2),), lambda: numbers(2))[0] == 2).all()  # nor what was kept for another key
+    made = kept("one", ((3, 2),), lambda: numbers(3))
+    assert made[0].dtype == np.float16
+    integers: list[npt.NDArray[Any]] = [np.full((3, 2), 7, dtype=np.int16)]
+    assert (kept("one", ((3, 2),), lambda: integers, np.int16)[0] == 7).all()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits of POSIX")
+def test_a_full_disk_is_no_error(tmp_path: Path) -> None:
+    code = """
+import resource, sys
+import numpy as np
+from fba.kept import kept
+resource.setrlimit(resource.RLIMIT_FSIZE, (20, 20))
+print(kept("one", ((3, 2),), lambda: [np.ones((3, 2), np.float16)])[0].sum())
+"""
+    environment = {**os.environ, "FBA_CACHE": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.stdout, done.stderr) == ("6.0\n", "")
+    assert list((tmp_path / "fba").iterdir()) == []
 
 
 def test_not_more_is_kept_than_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,7 +142,9 @@ def test_neighbours_out_of_range_are_not_believed(tmp_path: Path, monkeypatch: p
     body = BodyModel.default()
     first = rings(body.vertices, body.normals, body.triangles)
     (path,) = (tmp_path / "fba").iterdir()
-    np.savez(path, np.full_like(first[0], len(body.vertices)), first[1])
+    path.unlink()
+    wrong: list[npt.NDArray[Any]] = [np.full_like(first[0], len(body.vertices)), first[1]]
+    kept(path.stem, (first[0].shape, first[1].shape), lambda: wrong, [np.int32, np.float32])
     again = rings(body.vertices, body.normals, body.triangles)
     assert (again[0] == first[0]).all()
     assert (again[1] == first[1]).all()

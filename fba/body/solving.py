@@ -290,7 +290,6 @@ def solve(
     return True
 
 
-@compiled
 def joint_angles(local: Float, count: int, axis: Int, sign: Float, angles: Float) -> None:
     """local float64 (3, 3, T) -> angles (3, T), each frame close to the one before.
 
@@ -301,4 +300,6 @@ def joint_angles(local: Float, count: int, axis: Int, sign: Float, angles: Float
     before = np.zeros((1, 3))
     limits = np.zeros((1, 3, 2))
     cosines = np.zeros(frames)
+    # as `solve` passes them, for the types that are compiled already
+    axis, sign = np.array(axis, dtype=np.int64), np.array(sign)
     _angles(local, frames, count, 0, axis, sign, before, limits, False, work, cosines, angles)

@@ -51,7 +51,6 @@ def _away(turn: float, usual: float) -> float:
     return difference - TURN * math.floor(difference / TURN + 0.5)
 
 
-@compiled
 def follow(sideways: Float, natural: Float, ease: Float, usual: float, period: float, path: Float) -> None:
     """Fills path, float64 (T,): turns in radians, without jumps of whole turns.
 
@@ -60,6 +59,14 @@ def follow(sideways: Float, natural: Float, ease: Float, usual: float, period: f
     by which turning since the frame before costs less. usual: the turn where nothing says otherwise.
     period: seconds a frame.
     """
+    _search(sideways, natural, ease, usual, period, path)
+    centre = usual + TURN * math.floor((float(np.median(path)) - usual) / TURN + 0.5)
+    _refine(sideways, natural, ease, centre, period, path)
+
+
+@compiled
+def _search(sideways: Float, natural: Float, ease: Float, usual: float, period: float, path: Float) -> None:
+    """Fills the path with the best one over the grid: dynamic programming."""
     count = path.shape[0]
     step = TURN / STATES
     sines = np.zeros(STATES)
@@ -100,19 +107,20 @@ def follow(sideways: Float, natural: Float, ease: Float, usual: float, period: f
         state = (state + int(origin[t, state])) % STATES
     for t in range(1, count):
         path[t] = path[t - 1] + _away(path[t], path[t - 1])
-    _refine(sideways, natural, ease, usual, period, path)
 
 
 @compiled
-def _refine(sideways: Float, natural: Float, ease: Float, usual: float, period: float, path: Float) -> None:
-    """Improves the path: Newton's method, whose equations couple each frame with its neighbours only."""
+def _refine(sideways: Float, natural: Float, ease: Float, centre: float, period: float, path: Float) -> None:
+    """Improves the path: Newton's method, whose equations couple each frame with its neighbours only.
+
+    centre: the usual turn, with the number of whole turns that brings it closest to the path.
+    """
     count = path.shape[0]
     stiff = 2.0 / (SPEED * SPEED * period)
     own = np.zeros(count)
     right = np.zeros(count)
     move = np.zeros(count)
     bonds = stiff * ease[1:]
-    centre = usual + TURN * math.floor((float(np.median(path)) - usual) / TURN + 0.5)
     for _ in range(STEPS):
         for t in range(count):
             c = math.cos(path[t])

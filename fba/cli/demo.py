@@ -78,6 +78,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
 
 def _played(player: object, animation: Animation, *, asked: bool) -> bool:
     try:
+        player.check_display()  # type: ignore[attr-defined]
         click.echo("opening a window; Esc closes it")
         player.play(animation, loop=True, title="fba demo")  # type: ignore[attr-defined]
     except DisplayError as error:

@@ -151,7 +151,8 @@ def command(
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
     table = settings["bap_steps"]
-    coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, table)
+    with options.progress("encoding", None):
+        coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, table)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if as_json:

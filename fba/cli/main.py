@@ -13,11 +13,13 @@ from typing import Any, NoReturn
 import click
 
 from fba import __version__
+from fba.cli.compiling import Notice
 from fba.cli.interruption import Interruptions
 from fba.cli.leaving import INTERRUPTED, TEXT
 from fba.cli.options import Group, examples
 from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import hasten
+from fba.compilation import heard
 from fba.errors import FbaError, FbaWarning
 
 _COMMANDS = {
@@ -100,7 +102,7 @@ def main(arguments: list[str] | None = None) -> None:
 
     arguments: None for those of the process, which then is taken as doing nothing else.
     """
-    program = NAME
+    program, own = NAME, arguments is None
     if arguments is None:
         hasten()
         program = program_words()
@@ -109,8 +111,9 @@ def main(arguments: list[str] | None = None) -> None:
     warnings.simplefilter("always", FbaWarning)
     warnings.showwarning = _show_warning
     interruptions = Interruptions()
+    notice = Notice(next((one for one in arguments if one in _COMMANDS), "")) if own else None
     try:
-        with interruptions:
+        with interruptions, heard(notice):
             result = group.main(arguments, prog_name=program, standalone_mode=False)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)

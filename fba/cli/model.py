@@ -162,9 +162,9 @@ def import_(
     from fba.face.importers import import_model
 
     outputs = _outputs(output, [source, points], no_clobber=no_clobber)
-    model = import_model(
-        source, kind=kind, points=points, unit=unit, up=up, kinds=_kinds(kinds) or None, name=name
-    )
+    chosen = _kinds(kinds) or None
+    with options.progress("importing", None):
+        model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=chosen, name=name)
     _write(model, output, outputs)
 
 
@@ -211,9 +211,11 @@ def fit(
     from fba.face.calibration import fit as fitted
 
     outputs = _outputs(output, [points, base], no_clobber=no_clobber)
-    model = _read(base)
-    wanted = _points(points, model)
-    face = fitted(model, wanted, unit=_unit(unit), tables=tables, name=name or points.stem)
+    scale = _unit(unit)
+    with options.progress("fitting", None):
+        model = _read(base)
+        wanted = _points(points, model)
+        face = fitted(model, wanted, unit=scale, tables=tables, name=name or points.stem)
     _write(face, output, outputs)
 
 

@@ -325,14 +325,30 @@ class Progress:
     def __enter__(self) -> Progress:
         if sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Task,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
             from rich.progress import Progress as Bar
+            from rich.text import Text
+
+            class Steps(MofNCompleteColumn):
+                def render(self, task: Task) -> Text:
+                    return Text() if task.total is None else super().render(task)  # not "0/?"
+
+            class Time(TimeRemainingColumn):
+                def render(self, task: Task) -> Text:
+                    return TimeElapsedColumn().render(task) if task.total is None else super().render(task)
 
             columns = (
                 TextColumn("{task.description}"),
                 BarColumn(),
-                MofNCompleteColumn(),
-                TimeRemainingColumn(),
+                Steps(),
+                Time(),
             )
             self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
             self._bar.start()
@@ -355,5 +371,8 @@ class Progress:
 
 
 def progress(label: str, total: int | None) -> Progress:
-    """A progress bar for a `with` statement; call it with the number of steps done."""
+    """A progress bar for a `with` statement; call it with the number of steps done.
+
+    Where the total is None, and until `Progress.of` tells it, the bar only moves, with the seconds so far.
+    """
     return Progress(label, total)

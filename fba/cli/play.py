@@ -75,11 +75,14 @@ def command(
     check_files(files, how, sound, "window")
     if [str(file) for file in files].count("-") > 1:
         raise click.UsageError("standard input (-) can be shown once")
+    if not files and sound.audio is not None:
+        raise click.UsageError("--audio goes with a file to play")
+    if not files and how.model is None and how.body is None:
+        raise click.UsageError("give a file to play, or a --model or --body to move by hand")
+    import player
+
+    player.check_display()  # before anything that takes long
     if not files:
-        if sound.audio is not None:
-            raise click.UsageError("--audio goes with a file to play")
-        if how.model is None and how.body is None:
-            raise click.UsageError("give a file to play, or a --model or --body to move by hand")
         dropped = _puppet(how, size)
     else:
         dropped = _play(

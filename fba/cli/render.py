@@ -172,12 +172,13 @@ def command(
 
     audio = showing.voice(files, sound, "the film has no sound") if mp4 else None
     outputs = target.outputs([*files, how.model, how.body, audio], no_clobber=no_clobber, replace=replace)
-    animations = [
-        options.read_input(file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage)
-        for file in files
-    ] or [still(faps, visemes, expressions)]
-    names = showing.names_of(files) or [""]
-    scene = showing.scene([(animation, False) for animation in animations], names, how)
+    with options.progress("preparing", None):
+        animations = [
+            options.read_input(file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage)
+            for file in files
+        ] or [still(faps, visemes, expressions)]
+        names = showing.names_of(files) or [""]
+        scene = showing.scene([(animation, False) for animation in animations], names, how)
     heard = f", with the sound of {audio}" if audio is not None else ""
     with target.file(outputs) as name:
         if sheet is not None:
@@ -269,7 +270,7 @@ def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, i
     from player.picture_files import check_picture, write_picture
 
     check_picture(output, transparent=False)
-    with options.usage_errors():
+    with options.progress("rendering", None), options.usage_errors():
         pixels = contact_sheet(what, options.read_model(model), tile=size)
     write_picture(output, pixels)
     return f"{pixels.shape[1]}x{pixels.shape[0]}"

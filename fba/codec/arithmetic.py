@@ -294,7 +294,7 @@ def _halve(added: UInt16, tree: UInt16, slot: int, size: int, usual: int) -> tup
     total = size
     below_usual = usual
     for symbol in range(size):
-        half = int(added[slot, symbol]) >> 1
+        half = int(np.int64(added[slot, symbol])) >> 1  # signed, as wherever `_raise` is called
         added[slot, symbol] = half
         total += half
         if half > 0 and symbol != usual:

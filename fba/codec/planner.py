@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.codec import plane, quantiser, slots, syntax
+from fba.codec import quantiser, slots, syntax
+from fba.codec.plane import quantise
 from fba.codec.settings import (
     QUANT_MAX,
     RANGE_CODE_MAX,
@@ -235,11 +236,11 @@ def _extremes(
                 following = False
                 continue
             value = int(values[frame, column])
-            level = plane.quantise(value, one_step)
+            level = quantise(value, one_step)
             extremes[0, column] = max(int(extremes[0, column]), level)
             extremes[1, column] = max(int(extremes[1, column]), -level)
             if following:
-                change = plane.quantise(value - last, one_step)
+                change = quantise(value - last, one_step)
                 extremes[2, column] = max(int(extremes[2, column]), change)
                 extremes[3, column] = max(int(extremes[3, column]), -change)
                 last += change * one_step

@@ -44,6 +44,7 @@ class Window:
 def window(monkeypatch: pytest.MonkeyPatch) -> Window:
     stand_in = Window()
     monkeypatch.setattr(player, "play", stand_in)
+    monkeypatch.setattr(player, "check_display", lambda: None)
     return stand_in
 
 

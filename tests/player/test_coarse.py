@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from fba.compiled import is_compiled
+from fba.kept import kept
 from player.coarse import TOLERANCES, Coarser, coarser
 from player.detail import Details, distance, same
 from player.places import Places
@@ -122,14 +123,18 @@ def test_a_file_that_was_tampered_with_is_made_anew(tmp_path: Path) -> None:
     unit, triangles = sphere_mesh(24, 32)
     points = (unit * 0.1).astype(np.float32)
     good = Coarser(points, 1, triangles.astype(np.int32)).within(0.0016)
-    (path,) = (tmp_path / "fba").glob("coarse-*.npz")
+    (path,) = (tmp_path / "fba").glob("coarse-*.fbk")
     count = len(points)
-    np.savez(path, np.full(count, 10**6, dtype=np.int32), np.zeros(count, dtype=np.int32))
+    zeros = np.zeros(count, dtype=np.int32)
+    path.unlink()
+    kept(path.stem, ((count,),) * 2, lambda: [np.full(count, 10**6, dtype=np.int32), zeros], np.int32)
     again = Coarser(points, 1, triangles.astype(np.int32)).within(0.0016)
     assert good is not None
     assert again is not None
     np.testing.assert_array_equal(good, again)
-    np.savez(path, np.roll(np.arange(count), 1).astype(np.int32), np.zeros(count, dtype=np.int32))  # a circle
+    circle = np.roll(np.arange(count), 1).astype(np.int32)
+    path.unlink()
+    kept(path.stem, ((count,),) * 2, lambda: [circle, zeros], np.int32)
     assert Coarser(points, 1, triangles.astype(np.int32)).within(0.0016) is not None  # and no endless walk
 
 

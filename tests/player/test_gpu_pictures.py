@@ -146,7 +146,7 @@ def test_a_card_is_measured_by_real_pictures(monkeypatch: pytest.MonkeyPatch, tm
         found = view.frame(0.0)
         assert view.deformed[1].startswith("measured: ")
     assert same(wanted, found)
-    assert len(list(tmp_path.rglob("deform-*.npz"))) == 1
+    assert len(list(tmp_path.rglob("deform-*.fbk"))) == 1
 
 
 def broken(*_: object, **__: object) -> None:

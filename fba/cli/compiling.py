@@ -1,0 +1,34 @@
+"""Says, once, why a command takes longer the first time."""
+
+from __future__ import annotations
+
+import click
+
+MANY = 5
+"""So many functions that are to be compiled are worth a word: fewer take less than about two seconds."""
+SECONDS = {
+    "info": 7,
+    "stats": 7,
+    "decode": 7,
+    "encode": 11,
+    "convert": 11,
+    "bench": 11,
+    "play": 25,
+    "render": 25,
+}
+"""About how long everything that a command may need takes to compile, on a machine with two cores."""
+OTHERWISE = 15
+
+
+class Notice:
+    """Writes one line to standard error when a command is about to compile for seconds."""
+
+    def __init__(self, command: str) -> None:
+        self._seconds = SECONDS.get(command, OTHERWISE)
+        self._functions = 0
+
+    def __call__(self) -> None:
+        """A function is about to be compiled."""
+        self._functions += 1
+        if self._functions == MANY:
+            click.echo(f"fba: compiling, once (up to about {self._seconds} s)", err=True)

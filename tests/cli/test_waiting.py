@@ -1,0 +1,87 @@
+"""What is said while a command takes long: that it compiles, and how far it is."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fba.cli import options
+from fba.cli.compiling import MANY, Notice
+from fba.compiled import is_compiled
+
+Run = Callable[..., Any]
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def on_terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Standard error as a terminal; in the test itself, since pytest sets it again before each."""
+    found = Terminal()
+    monkeypatch.setattr(sys, "stderr", found)
+    monkeypatch.setenv("TERM", "xterm")
+    return found
+
+
+def test_compiling_is_said_once_and_only_where_it_takes_long(capsys: pytest.CaptureFixture[str]) -> None:
+    notice = Notice("render")
+    for _ in range(MANY - 1):
+        notice()
+    assert capsys.readouterr().err == ""
+    for _ in range(50):
+        notice()
+    assert capsys.readouterr().err == "fba: compiling, once (up to about 25 s)\n"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not is_compiled(), reason="nothing is compiled here")
+def test_the_first_use_says_that_it_compiles_the_second_does_not(tmp_path: Path, bvh: Path) -> None:
+    command = [sys.executable, "-m", "fba", "info", str(bvh)]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "numba"), "FBA_CACHE": str(tmp_path)}
+    first, second = (
+        subprocess.run(command, env=environment, capture_output=True, text=True, check=True) for _ in range(2)
+    )
+    assert first.stderr.count("compiling, once") == 1
+    assert second.stderr == ""
+    assert first.stdout == second.stdout
+
+
+def test_a_bar_without_a_total_only_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = on_terminal(monkeypatch)
+    with options.progress("fitting", None):
+        time.sleep(0.15)
+    assert "fitting" in terminal.getvalue()
+    assert "/?" not in terminal.getvalue()
+    assert "0:00:00" in terminal.getvalue()
+
+
+def test_a_bar_counts_as_soon_as_the_total_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = on_terminal(monkeypatch)
+    with options.progress("rendering", None) as step:
+        step.of(3, 8)
+        time.sleep(0.15)
+    assert "3/8" in terminal.getvalue()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only X11 and Wayland can be absent")
+def test_without_a_display_nothing_else_is_tried(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("glfw")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    (tmp_path / "broken.fba").write_bytes(b"nothing")
+    refused = run("play", tmp_path / "broken.fba")
+    assert refused.code == 1
+    assert "DISPLAY" in refused.err
+    assert "broken" not in refused.err
