@@ -25,6 +25,7 @@ from conformance.reader import (
 )
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import BAP_STEP_TABLES
+from fba.recognition import HEAD_BYTES, but_recognised
 
 __all__ = ["Element", "Levels", "Walker", "decode_values", "element_dict", "format_trace", "planes", "trace"]
 
@@ -132,7 +133,8 @@ class Walker:
         if found < 0 or not reader.data.startswith(b"\0\0\1"):
             raise reader.error(
                 f"an FBA object starts with {' or '.join(f'{c:08x}' for c in OBJECT_START_CODES)}, "
-                f"found {reader.data[:4].hex() or 'nothing'}; is this an FBA stream?",
+                f"found {reader.data[:4].hex() or 'nothing'}"
+                f"{but_recognised(reader.data[:HEAD_BYTES]) or '; is this an FBA stream?'}",
                 bit=0,
             )
         if found:

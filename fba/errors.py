@@ -12,21 +12,75 @@
     └── DisplayError                        also OSError      no window, no OpenGL, no video encoder
 
 Something read with doubts, but read, is an `FbaWarning`.
+
+What an argument of the called function can do about it is a `Remedy` of its own, so that the command line can
+name its option in place of the argument.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
 
 
-class FbaError(Exception):
+@dataclass(frozen=True)
+class Remedy:
+    """What an argument of the called function can do about an error.
+
+    argument: its name. text: what to do, with `{}` where the argument stands. value: how it could be given,
+    as Python. call: the function, where it is another than the one that was called.
+    """
+
+    argument: str
+    text: str
+    value: str
+    call: str = ""
+
+    def __str__(self) -> str:
+        """In Python's words: "give one with fps=25"."""
+        given = f"{self.argument}={self.value}"
+        return self.said(f"{self.call}({given})" if self.call else given)
+
+    def said(self, given: str) -> str:
+        """The text with this in the place of the argument; without an argument, the text as it is."""
+        return self.text.replace("{}", given) if self.argument else self.text
+
+
+class _Remediable:
+    """An exception with remedies; its text ends in them."""
+
+    remedies: tuple[Remedy, ...] = ()
+
+    @property
+    def finding(self) -> str:
+        """The text without the remedies."""
+        return super().__str__()
+
+    def with_remedies(self, *remedies: Remedy) -> Self:
+        """The same exception, with these remedies."""
+        self.remedies = remedies
+        return self
+
+    def __str__(self) -> str:
+        return "; ".join([self.finding, *map(str, self.remedies)])
+
+
+class FbaError(_Remediable, Exception):
     """Base of every error that this package raises on purpose."""
 
 
-class FbaWarning(UserWarning):
+class FbaWarning(_Remediable, UserWarning):
     """The input was read, but something in it was odd; the text says what and what was assumed."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """For an error about an unknown word: " (did you mean 'joy'?)", or "" where nothing comes near."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(word.lower(), list(known), n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 class BitstreamError(FbaError, ValueError):

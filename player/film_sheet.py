@@ -13,7 +13,7 @@ from fba.errors import RangeError
 from player.camera import Camera
 from player.lettering import label_font, shortened
 from player.offscreen import Offscreen
-from player.recording import as_scene
+from player.recording import as_scene, check_inside
 from player.showable import Showable
 from player.times import timecode
 
@@ -76,6 +76,9 @@ def chosen(scene: Showable, count: int, start: float | None, end: float | None) 
     """Positions of frames in the animation, at even distances in time; each once, in order."""
     timeline = scene.timeline
     times = np.array([float(timeline.time_of(frame)) for frame in range(timeline.frames)])
+    for name, value in (("start", start), ("end", end)):
+        if value is not None and math.isfinite(value):
+            check_inside(scene, name, value)
     low = -math.inf if start is None else start
     high = math.inf if end is None else end
     if math.isnan(low) or math.isnan(high):

@@ -29,6 +29,8 @@ SMOOTH_RATES = (Fraction(10), Fraction(120))
 """A film's own rate lies between these where none is asked for."""
 MOST_FRAMES = 1_000_000
 """A longer film is refused: its times are damaged, or a part of it was meant."""
+SLACK = 0.001
+"""Seconds that a time may lie outside the animation: people round them."""
 PICTURE_SAMPLES = 4
 """Samples a pixel of a single picture, which may take its time."""
 SIZE, GIF_SIZE = (1280, 720), (480, 270)
@@ -89,6 +91,8 @@ def render(
         raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
     if audio is not None:
         raise ValueError("a picture has no sound; leave the audio out, or write an .mp4")
+    if start is not None:
+        check_inside(scene, "start", start)
     at = _moment(scene, frame, time if time is not None else start)
     with (
         _background(scene, clear=transparent),
@@ -226,14 +230,29 @@ def _moment(scene: Showable, frame: int | None, time: float | None) -> float:
                 limits=(0, frames - 1),
             )
         return float(scene.timeline.time_of(range(frames)[frame]))
-    return float(scene.timeline.start) if time is None else float(time)
+    if time is None:
+        return float(scene.timeline.start)
+    check_inside(scene, "time", time)
+    return float(time)
+
+
+def check_inside(scene: Showable, name: str, time: float) -> None:
+    """Raises RangeError for a time before the animation begins or after it ends, ValueError for one that is
+    not finite. name: what the error calls it."""
+    if not math.isfinite(time):
+        raise ValueError(f"{name} must be a finite number of seconds, not {time}")
+    begin, stop = float(scene.timeline.start), float(scene.timeline.end)
+    if not begin - SLACK <= time <= stop + SLACK:
+        raise RangeError(
+            f"{name} {time:g} s is outside the animation, which goes from {begin:g} s to {stop:g} s"
+        )
 
 
 def _stretch(scene: Showable, rate: Fraction, start: float | None, end: float | None) -> tuple[Fraction, int]:
     """Time of the first picture and how many there are."""
     for name, value in (("start", start), ("end", end)):
-        if value is not None and not math.isfinite(value):
-            raise ValueError(f"{name} must be a finite number of seconds, not {value}")
+        if value is not None:
+            check_inside(scene, name, value)
     begin, stop = scene.timeline.start, scene.timeline.end
     first = begin if start is None else max(Fraction(start).limit_denominator(10**6), begin)
     last = stop if end is None else min(Fraction(end).limit_denominator(10**6), stop)

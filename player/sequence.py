@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import FormatError, UnsupportedError
+from fba.errors import FormatError, Remedy, UnsupportedError
 from player.picture_files import check_picture, write_picture
 from player.recorder import FILMS
 from player.whole import PathLike, cannot
@@ -93,10 +93,8 @@ class Sequence:
         there = names.there()
         if there and not replace:
             raise FormatError(
-                f"{_several(names, there)} there already; choose another folder, or let them be replaced "
-                "(--replace)",
-                path=names.folder,
-            )
+                f"{_several(names, there)} there already; choose another folder", path=names.folder
+            ).with_remedies(Remedy("replace", "or have them replaced with {}", "True"))
         if beyond := [number for number in there if number >= count]:
             raise FormatError(
                 f"{_several(names, beyond)} left from a longer sequence, and would follow the {count} new "

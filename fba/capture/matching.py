@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
-from fba.errors import ModelError
+from fba.errors import ModelError, Remedy
 from fba.parameters import joints
 
 REQUIRED = ("HumanoidRoot",)
@@ -69,8 +69,13 @@ def match(names: Sequence[str]) -> tuple[str, dict[str, int]]:
     if len(best[1]) < FEWEST:
         some = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
         raise ModelError(
-            f"no known skeleton family fits these {len(names)} joint names: {some}; "
-            "pass joints={source name: joint of the standard}, e.g. joints={'Pelvis': 'HumanoidRoot', ...}"
+            f"no known skeleton family fits these {len(names)} joint names: {some}"
+        ).with_remedies(
+            Remedy(
+                "joints",
+                "name each joint's counterpart in the standard with {}",
+                "{'Pelvis': 'HumanoidRoot', ...}",
+            )
         )
     return best
 

@@ -13,7 +13,7 @@ from fba.body.solving import joint_angles
 from fba.capture import aiming, hinges, rest, rotations, spine
 from fba.capture.footing import Footing
 from fba.capture.motion import SkeletonMotion
-from fba.errors import FbaWarning
+from fba.errors import FbaWarning, Remedy
 from fba.parameters import BAP_COUNT, baps
 
 Float = npt.NDArray[np.float64]
@@ -240,10 +240,11 @@ class Retarget:
         """Metres of the body for one unit of the source."""
         unit = rest.scale(self.motion, self.mapped, self.skeleton)
         if unit is None:
+            text = (
+                "the source has neither whole legs nor whole arms: its unit is unknown; taken as centimetres"
+            )
             warnings.warn(
-                "the source has neither whole legs nor whole arms, so its unit is unknown; taken as "
-                "centimetres (pass scale= for another)",
-                FbaWarning,
+                FbaWarning(text).with_remedies(Remedy("scale", "give another, in metres, with {}", "0.001")),
                 stacklevel=4,
             )
             return 0.01

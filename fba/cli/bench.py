@@ -16,16 +16,30 @@ from fba.cli import options
     cls=options.Command,
     epilog=options.examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"),
 )
-@click.argument("file", metavar="FILE.fba", type=options.EXISTING)
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
 @click.option("--rounds", type=click.IntRange(1, 1000), default=9, show_default=True)
 @options.bap_steps_option
 @options.json_option
-def command(file: Path, rounds: int, bap_steps: str, as_json: bool) -> None:
-    """Measure decoding and encoding of a stream on one core: medians over several rounds.
+def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool) -> None:
+    """Measure decoding and encoding of streams on one core: medians over several rounds.
 
     A symbol is one coded value of one plane. How the codec compares with a textbook's is in the bench/
     folder of the source.
     """
+    each = options.EachFile(files)
+    results = []
+    for path in files:
+        with each.file(path):
+            results.append(_measured(path, rounds, bap_steps))
+            if not as_json:
+                _print(results[-1])
+    if as_json:
+        options.print_json(results if len(files) > 1 else results[0])
+    each.finish()
+
+
+def _measured(file: Path, rounds: int, bap_steps: str) -> dict[str, Any]:
+    """Symbols of a stream, and seconds and symbols a second of each way to code it."""
     from fba.codec import Decoder, EncoderOptions, decode, encode
     from fba.compiled import is_compiled
 
@@ -55,13 +69,21 @@ def command(file: Path, rounds: int, bap_steps: str, as_json: bool) -> None:
             run()
             times.append(perf_counter() - start)
         timings[name] = {"seconds": median(times), "symbols_per_second": symbols / median(times)}
-    if as_json:
-        options.print_json({"file": str(file), "symbols": symbols, "compiled": is_compiled(), **timings})
-        return
-    how = "compiled" if is_compiled() else "not compiled: numba is missing or switched off"
-    click.echo(f"{file}: {len(animation)} frames, {symbols} symbols ({how})")
-    for name, timing in timings.items():
-        click.echo(
-            f"  {name}: {1000 * timing['seconds']:.2f} ms, "
-            f"{timing['symbols_per_second'] / 1e6:.2f} million symbols/s"
-        )
+    return {
+        "file": str(file),
+        "frames": len(animation),
+        "symbols": symbols,
+        "compiled": is_compiled(),
+        **timings,
+    }
+
+
+def _print(result: dict[str, Any]) -> None:
+    how = "compiled" if result["compiled"] else "not compiled: numba is missing or switched off"
+    click.echo(f"{result['file']}: {result['frames']} frames, {result['symbols']} symbols ({how})")
+    for name, timing in result.items():
+        if isinstance(timing, dict):
+            click.echo(
+                f"  {name}: {1000 * timing['seconds']:.2f} ms, "
+                f"{timing['symbols_per_second'] / 1e6:.2f} million symbols/s"
+            )

@@ -35,14 +35,14 @@ def limited(animation: Animation, limits: str) -> tuple[Animation, dict[str, Any
     return animation, {"limits": said, "limits_clamped": limits == "clamp"}
 
 
-def compared(captures: Sequence[Path], animation: Animation) -> dict[str, Any]:
+def compared(captures: Sequence[Path], animation: Animation, format: str | None = None) -> dict[str, Any]:
     """The angle between every bone of a capture and the body's, before it is coded."""
     from fba.capture import retarget_report
     from fba.formats import format_of
 
     reports = []
     for path in captures:
-        motion = import_module(f"fba.formats.{format_of(path).name}").read_motion(path)
+        motion = import_module(f"fba.formats.{format_of(path, format).name}").read_motion(path)
         report = asdict(retarget_report(motion, animation))
         reports.append({"input": str(path), **report})
     return {"captures": reports}

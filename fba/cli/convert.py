@@ -35,6 +35,7 @@ from fba.cli.outputs import (
 @click.argument("source", metavar="IN", type=options.EXISTING)
 @click.argument("target", metavar="OUT", type=OutputType())
 @options.fps_option("Resample to this frame rate; default: the input's own.")
+@options.from_option
 @to_option
 @no_clobber_option
 @writer_options.writer_options
@@ -44,6 +45,7 @@ def command(
     source: Path,
     target: Path,
     fps: Fraction | None,
+    format: str | None,
     to: str | None,
     no_clobber: bool,
     bap_steps: str,
@@ -66,7 +68,7 @@ def command(
     extra = writer_options.settings(target, writing, given)
     if writing.name == "fba":
         extra["bap_steps"] = bap_steps
-    animation = options.read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage)
+    animation = options.read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage, format=format)
     if writing.name == "fba":
         step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(target) as file:

@@ -99,16 +99,21 @@ def command(
     if output is not None and written_as is not None:
         settings = writer_options.settings(output, written_as, given)
     reports = []
+    each = options.EachFile(inputs)
     with options.progress("decoding", len(inputs)) as step:
         for path in inputs:
-            reports.append(_decode(path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage))
+            with each.file(path):
+                reports.append(
+                    _decode(path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage)
+                )
             step(1)
     if as_json:
         outputs.print_json(reports if several else reports[0])
-        return
-    for report in reports:
-        written = ", ".join(shown(Path(name)) for name in report["written"])
-        outputs.say(f"{report['input']}: {report['frames']} frames to {written}")
+    else:
+        for report in reports:
+            written = ", ".join(shown(Path(name)) for name in report["written"])
+            outputs.say(f"{report['input']}: {report['frames']} frames to {written}")
+    each.finish()
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 )
 @no_clobber_option
 @options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
+@options.from_option
 @click.option("--name", help="Name of the sequence, for input without a header.")
 @click.option(
     "--quant",
@@ -120,6 +121,7 @@ def command(
     output: Path,
     no_clobber: bool,
     fps: Fraction | None,
+    format: str | None,
     name: str | None,
     epf: Path | None,
     limits: str,
@@ -140,14 +142,14 @@ def command(
     with options.progress("reading", len(inputs)) as step:
         animation = _joined(
             inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
-            capture=capture,
+            capture=capture, format=format,
         )  # fmt: skip
-    captures = [path for path in inputs if _captured(path)]
+    captures = [path for path in inputs if _captured(path, format)]
     animation, said = capture_report.limited(animation, limits)
     if report:
         if animation.body is None:
             raise click.UsageError("--report compares bones of motion capture, and there is no body")
-        said = capture_report.compared(captures, animation) | said
+        said = capture_report.compared(captures, animation, format) | said
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
     table = settings["bap_steps"]
@@ -232,10 +234,10 @@ def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
     return f"{text}; {coded.clamped} values clamped" if coded.clamped else text
 
 
-def _captured(path: Path) -> bool:
+def _captured(path: Path, format: str | None) -> bool:
     from fba.formats import format_of
 
-    return str(path) != "-" and format_of(path).captured
+    return str(path) != "-" and format_of(path, format).captured
 
 
 def _joined(
@@ -247,6 +249,7 @@ def _joined(
     salvage: bool,
     step: options.Progress,
     capture: Mapping[str, object],
+    format: str | None,
 ) -> Animation:
     """Face and body of all inputs as one animation."""
     from fba.formats import merge
@@ -254,7 +257,7 @@ def _joined(
     result: Animation | None = None
     for path in inputs:
         animation = options.read_input(
-            path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture
+            path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format
         )
         step(1)
         if not len(animation):

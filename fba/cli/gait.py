@@ -45,7 +45,8 @@ DEFAULT_RATE = Fraction(30)
 @click.option("--character", default="normal", show_default=True, metavar="NAME", help="One of --list.")
 @click.option("--cycles", type=float, metavar="N", help="How many strides; default: 4.")
 @click.option("--seconds", type=float, metavar="SECONDS", help="How long, in place of --cycles.")
-@options.fps_option("Frame rate; default: 30.")
+@options.fps_option("Frame rate; default: 30. With --find: that of a file without a header.")
+@options.from_option
 @click.option("--in-place", is_flag=True, help="Walk on the spot.")
 @click.option(
     "-o",
@@ -71,6 +72,7 @@ def command(
     cycles: float | None,
     seconds: float | None,
     fps: Fraction | None,
+    format: str | None,
     in_place: bool,
     output: Path | None,
     to: str | None,
@@ -92,7 +94,7 @@ def command(
     if listed:
         _list(as_json)
     elif find is not None:
-        _find(find, bap_steps, as_json)
+        _find(find, bap_steps, fps, format, as_json)
     elif output is not None:
         if as_json:
             raise click.UsageError("--json goes with --list and --find")
@@ -146,11 +148,11 @@ def _list(as_json: bool) -> None:
         click.echo(f"{c.name:{width}}  {pace}  {c.about}")
 
 
-def _find(file: Path, bap_steps: str, as_json: bool) -> None:
+def _find(file: Path, bap_steps: str, fps: Fraction | None, format: str | None, as_json: bool) -> None:
     from fba.body import gait
     from fba.errors import FormatError
 
-    animation = options.read_input(file, bap_steps=bap_steps)
+    animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, format=format)
     if animation.body is None:
         raise FormatError("has no body to walk with", path=file)
     found = gait.detect(animation)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import click
 
 from fba.cli import options, step_tables
 from fba.codec.stream_info import PartInfo, StreamInfo
-from fba.errors import FbaError
 
 
 @click.command(
@@ -25,39 +25,43 @@ from fba.errors import FbaError
 @click.option(
     "--trace", is_flag=True, help="List every syntax element of an FBA stream with its bit position."
 )
+@options.fps_option("Frame rate of a file without a header.")
+@options.from_option
+@options.salvage_option
 @click.option("--values", is_flag=True, help="With --trace: the decoded symbols of every segment as well.")
-def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, trace: bool, values: bool) -> None:
+def command(
+    files: tuple[Path, ...],
+    bap_steps: str,
+    as_json: bool,
+    trace: bool,
+    values: bool,
+    fps: Fraction | None,
+    format: str | None,
+    salvage: bool,
+) -> None:
     """What a file holds: frames, rate, parameters, bits. Reads any format, by content.
 
     --trace reads the stream a second time, bit by bit, with a decoder of its own: slow, and independent.
     """
+    each = options.EachFile(files)
     if trace:
         for path in files:
-            _trace(path, bap_steps=bap_steps, as_json=as_json, values=values)
+            with each.file(path):
+                _trace(path, bap_steps=bap_steps, as_json=as_json, values=values)
+        each.finish()
         return
-    from fba.formats import probe
-
     found = []
-    failed = 0
     for path in files:
-        try:
-            with options.input_file(path) as file:
-                info = probe(file, bap_steps=bap_steps)
-                if info.format == "fba" and info.body is not None:
-                    step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
-        except FbaError as error:
-            if len(files) == 1:
-                raise
-            failed += 1
-            click.echo(f"fba: error: {path}: {error}", err=True)
-            continue
-        found.append({"file": str(path), **info.to_dict()})
-        if not as_json:
-            _print(path, info)
+        with each.file(path), options.input_file(path) as file:
+            info = options.probed(file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage)
+            if info.format == "fba" and info.body is not None:
+                step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
+            found.append({"file": str(path), **info.to_dict()})
+            if not as_json:
+                _print(path, info)
     if as_json:
         options.print_json(found if len(files) > 1 else found[0])
-    if failed:
-        raise click.exceptions.Exit(1)
+    each.finish()
 
 
 def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:

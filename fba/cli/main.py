@@ -16,7 +16,7 @@ from fba import __version__
 from fba.cli.compiling import Notice
 from fba.cli.interruption import Interruptions
 from fba.cli.leaving import INTERRUPTED, TEXT
-from fba.cli.options import Group, examples
+from fba.cli.options import Group, described, examples
 from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import hasten
 from fba.compilation import heard
@@ -152,7 +152,7 @@ def _say_interrupted() -> NoReturn:
 
 def _one_line(error: BaseException) -> str:
     if isinstance(error, MemoryError):
-        return "not enough memory for this; work on parts of it (--start, --end)"
+        return "not enough memory for this; work on a shorter part, or at a lower frame rate"
     if isinstance(error, OSError) and error.strerror and not isinstance(error, FbaError):
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     return " ".join(str(error).split()) or type(error).__name__
@@ -160,7 +160,8 @@ def _one_line(error: BaseException) -> str:
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
     if issubclass(category, FbaWarning):
-        click.echo(f"fba: warning: {message}", err=True)
+        text = described(message) if isinstance(message, FbaWarning) else str(message)
+        click.echo(f"fba: warning: {text}", err=True)
 
 
 if __name__ == "__main__":

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
@@ -16,9 +18,12 @@ import click
 
 from fba.animation import Animation
 from fba.cli.program import NAME, with_program
+from fba.errors import FbaError, FbaWarning, FormatError, OptionError, Remedy
 
 if TYPE_CHECKING:
+    from fba.codec.stream_info import StreamInfo
     from fba.face.model import FaceModel
+    from fba.formats.registry import Format
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
@@ -39,6 +44,9 @@ class InputType(click.Path):
 
 
 EXISTING = InputType()
+RATES = (Fraction(1, 3600), Fraction(10_000))
+"""Frames a second that make sense to ask for; what BVH files are read with."""
+STANDARD_INPUT = "standard input"
 
 
 class Command(click.Command):
@@ -51,6 +59,13 @@ class Command(click.Command):
 
     def get_help(self, ctx: click.Context) -> str:
         return as_typed(super().get_help(ctx), ctx)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except FbaError as error:
+            error.remedies = in_options(error.remedies, ctx)
+            raise
 
 
 class Group(Command, click.Group):
@@ -66,6 +81,64 @@ def as_typed(text: str, context: click.Context | None = None) -> str:
     return with_program(text, root.info_name or NAME, root.command.list_commands(root))
 
 
+OPTIONS = {
+    "fps": "fps",
+    "rate": "fps",
+    "format": "format",
+    "salvage": "salvage",
+    "clamp": "clamp",
+    "points": "points",
+    "kind": "kind",
+    "replace": "replace",
+}
+"""Arguments of the library, and the names of the parameters of commands that do the same."""
+OTHERS = (("encode",), ("convert",), ("model", "import"))
+"""Commands that may have an option which the current one lacks."""
+
+
+def in_options(remedies: Iterable[Remedy], context: click.Context) -> tuple[Remedy, ...]:
+    """The remedies with options in place of arguments: of this command, else of another, else as Python."""
+    return tuple(Remedy("", _in_option(remedy, context), "") for remedy in remedies)
+
+
+def described(error: FbaError | FbaWarning) -> str:
+    """The text of an error or a warning in the words of the command that runs now."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return str(error)
+    return "; ".join([error.finding, *map(str, in_options(error.remedies, context))])
+
+
+def _in_option(remedy: Remedy, context: click.Context) -> str:
+    if not remedy.argument:
+        return remedy.text  # was translated before
+    name = OPTIONS.get(remedy.argument)
+    if remedy.call == "fba.write" and name == "format":
+        name = "to"
+    given = _option(context.command, name, remedy.value)
+    if given is not None:
+        return remedy.said(given)
+    for words in OTHERS if name is not None else ():
+        command: click.Command | None = context.find_root().command
+        for word in words:
+            assert isinstance(command, click.Group)
+            command = command.get_command(context, word)
+        given = None if command is None else _option(command, name, remedy.value)
+        if given is not None:
+            return remedy.said(f"{given} of `fba {' '.join(words)}`")
+    call = remedy.call or "fba.read"
+    python = f"{call}(FILE, {remedy.argument}={remedy.value})"
+    return f"{remedy.said(python)} in Python; the command line has no option for it"
+
+
+def _option(command: click.Command, name: str | None, value: str) -> str | None:
+    """How an option is written with a value, "--fps 25"; None where the command does not have it."""
+    for param in command.params:
+        if isinstance(param, click.Option) and param.name == name:
+            return param.opts[0] if param.is_flag else f"{param.opts[0]} {value.strip(chr(39))}"
+    return None
+
+
 class RateType(click.ParamType[Fraction]):
     """A frame rate: 25, 29.97, 30000/1001."""
 
@@ -74,10 +147,14 @@ class RateType(click.ParamType[Fraction]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
         from fba.formats.rates import parse_rate
 
+        low, high = RATES
         try:
-            return parse_rate(value)
+            rate = parse_rate(value)
         except ValueError as error:
-            self.fail(str(error), param, ctx)
+            self.fail(f"{error}; it may be {low} to {high}", param, ctx)
+        if not low <= rate <= high:
+            self.fail(f"{value} frames/s are out of reach: a frame rate may be {low} to {high}", param, ctx)
+        return rate
 
 
 class PeriodType(click.ParamType[Fraction]):
@@ -95,6 +172,21 @@ class PeriodType(click.ParamType[Fraction]):
         return seconds
 
 
+class MomentType(click.ParamType[float]):
+    """A time in an animation, in seconds; it may be negative."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            seconds = float(value)
+        except ValueError:
+            seconds = math.nan
+        if not math.isfinite(seconds):
+            self.fail(f"{value!r} is not a number of seconds", param, ctx)
+        return seconds
+
+
 class SizeType(click.ParamType[tuple[int, int]]):
     """Width and height in pixels: 1280x720."""
 
@@ -107,6 +199,15 @@ class SizeType(click.ParamType[tuple[int, int]]):
         if not (width.isdecimal() and height.isdecimal()) or not (0 < int(width) <= 16384 > int(height) > 0):
             self.fail(f"{value!r} is not a size; write e.g. 1280x720", param, ctx)
         return int(width), int(height)
+
+
+def from_option(command: Decorated) -> Decorated:
+    return click.option(
+        "--from",
+        "format",
+        metavar="FORMAT",
+        help="Format of what is read, where neither content nor suffix say it: fap, bap, fba, bvh, gltf.",
+    )(command)
 
 
 def fps_option(text: str) -> Callable[[Decorated], Decorated]:
@@ -256,7 +357,28 @@ def input_file(path: Path) -> Iterator[Path]:
         with spooled.open("wb") as file:
             while chunk := sys.stdin.buffer.read(1 << 20):
                 file.write(chunk)
-        yield spooled
+        with renamed(spooled, STANDARD_INPUT):
+            yield spooled
+
+
+@contextmanager
+def renamed(path: Path, name: str) -> Iterator[None]:
+    """Errors and warnings about a temporary file call it by a name that the user knows."""
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", FbaWarning)
+            yield
+    except FbaError as error:
+        error.args = (error.finding.replace(str(path), name),)
+        if isinstance(error, FormatError) and error.path == str(path):
+            error.path = name
+        raise
+    finally:
+        for warning in caught:
+            said = warning.message
+            if isinstance(said, FbaWarning):
+                said.args = (said.finding.replace(str(path), name),)
+            warnings.warn(said, warning.category, stacklevel=3)
 
 
 def read_input(
@@ -269,20 +391,23 @@ def read_input(
     salvage: bool = False,
     capture: Mapping[str, object] | None = None,
     said: list[str] | None = None,
+    format: str | None = None,
 ) -> Animation:
-    """Read a file of any format. Warns where the BAPs of a stream look wrong with these steps.
+    """Read a file of any format, or of the one that `format` names.
+
+    Warns where the BAPs of a stream look wrong with these steps.
 
     fps resamples what was read, motion capture while it still turns by rotations; it, or header_fps, and name
     stand in for a header that a file lacks. capture: options for the readers of motion capture. said: takes
     the text of that warning.
     """
     from fba.cli import step_tables
-    from fba.formats import format_of, read
+    from fba.formats import read
 
     wanted: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
     wanted |= {"salvage": salvage or None, "rate": fps, **(capture or {})}
     with input_file(path) as file:
-        found = format_of(file)
+        found = _format_of(file, format)
         taken = {
             key: value for key, value in wanted.items() if value is not None and key in found.read_options
         }
@@ -292,6 +417,74 @@ def read_input(
     if fps is not None and animation.rate != fps:
         animation = animation.resample(fps)
     return animation
+
+
+def probed(
+    path: Path, *, bap_steps: str, fps: Fraction | None, format: str | None, salvage: bool
+) -> StreamInfo:
+    """What a file of any format holds; fps: the rate of one that says none."""
+    from fba.formats import probe
+
+    found = _format_of(path, format)
+    wanted: dict[str, object] = {"fps": fps, "salvage": salvage or None}
+    taken = {key: value for key, value in wanted.items() if value is not None and key in found.read_options}
+    return probe(path, bap_steps=bap_steps, format=found.name, **({} if found.name == "fba" else taken))
+
+
+def _format_of(file: Path, format: str | None) -> Format:
+    from fba.formats import format_of
+
+    try:
+        return format_of(file, format)
+    except OptionError as error:
+        raise click.BadParameter(str(error), param_hint="--from") from error
+
+
+class EachFile:
+    """Works through files of which some may be bad: their errors name them, and the others go on.
+
+    ::
+
+        each = EachFile(files)
+        for path in files:
+            with each.file(path):
+                ...
+        each.finish()
+    """
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self._several = len(files) > 1
+        self._failed = 0
+
+    @contextmanager
+    def file(self, path: Path) -> Iterator[None]:
+        """Around all that is done with one file. The error of a lone file is raised on, with its name."""
+        name = STANDARD_INPUT if str(path) == "-" else str(path)
+        try:
+            yield
+        except FbaError as error:
+            if name not in error.finding:
+                error.args = (f"{name}: {error.finding}",)
+            if not self._several:
+                raise
+            self._fail(described(error))
+        except click.UsageError as error:
+            if not self._several:
+                raise
+            self._fail(error.message if name in error.message else f"{name}: {error.message}")
+        except OSError as error:
+            if not self._several:
+                raise
+            self._fail(f"{name}: {error.strerror or error}")
+
+    def _fail(self, text: str) -> None:
+        self._failed += 1
+        click.echo(f"fba: error: {as_typed(' '.join(text.split()))}", err=True)
+
+    def finish(self) -> None:
+        """Ends the command with exit code 1 where a file failed."""
+        if self._failed:
+            raise click.exceptions.Exit(1)
 
 
 @contextmanager

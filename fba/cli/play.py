@@ -38,7 +38,9 @@ if TYPE_CHECKING:
     "--speed", type=click.FloatRange(0.1, 4.0), default=1.0, show_default=True, help="1: as recorded."
 )
 @click.option("--loop", is_flag=True, help="Start again at the end.")
-@click.option("--start", type=float, metavar="SECONDS", help="From when, in the file's own times.")
+@click.option(
+    "--start", type=options.MomentType(), metavar="SECONDS", help="From when, in the file's own times."
+)
 @click.option("--paused", is_flag=True, help="Wait for the space key.")
 @click.option(
     "--interpolate/--no-interpolate",

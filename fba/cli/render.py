@@ -96,9 +96,13 @@ class SheetType(click.ParamType[str | int]):
 )
 @click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
 @click.option("--frame", type=int, help="For a picture: which frame; -1 is the last.")
-@click.option("--time", type=float, metavar="SECONDS", help="For a picture: at what time.")
-@click.option("--start", type=float, metavar="SECONDS", help="For a film or a sheet: from when.")
-@click.option("--end", type=float, metavar="SECONDS", help="For a film or a sheet: until when.")
+@click.option("--time", type=options.MomentType(), metavar="SECONDS", help="For a picture: at what time.")
+@click.option(
+    "--start", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: from when."
+)
+@click.option(
+    "--end", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: until when."
+)
 @scene_options.sound_options("Sound of an MP4,")
 @click.option("--transparent", is_flag=True, help="PNG without a background.")
 @click.option("--replace", is_flag=True, help="Numbered pictures that exist are overwritten.")
@@ -174,7 +178,9 @@ def command(
     outputs = target.outputs([*files, how.model, how.body, audio], no_clobber=no_clobber, replace=replace)
     with options.progress("preparing", None):
         animations = [
-            options.read_input(file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage)
+            options.read_input(
+                file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage, format=how.format
+            )
             for file in files
         ] or [still(faps, visemes, expressions)]
         names = showing.names_of(files) or [""]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from fractions import Fraction
@@ -28,6 +27,7 @@ class SceneOptions:
     body: Path | None
     arrange: str | None
     fps: Fraction | None
+    format: str | None
     camera: str | None
     view: str
     shows: tuple[tuple[str, object], ...]
@@ -59,6 +59,7 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Command], Command]:
         options.body_option,
         arrangement,
         options.fps_option(fps),
+        options.from_option,
         options.camera_option,
         options.view_option,
         options.show_option,
@@ -72,11 +73,6 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Command], Command]:
 def sound_options(kind: str = "Sound") -> Callable[[Command], Command]:
     """The command gets them as `sound`, a `SoundOptions`. kind: what the help calls it."""
 
-    def finite(context: click.Context, option: click.Parameter, value: float) -> float:
-        if not math.isfinite(value):
-            raise click.BadParameter(f"{value} is not a number of seconds")
-        return value
-
     return _gathered(
         "sound",
         SoundOptions,
@@ -89,10 +85,9 @@ def sound_options(kind: str = "Sound") -> Callable[[Command], Command]:
         click.option("--no-audio", is_flag=True, help="No sound."),
         click.option(
             "--audio-offset",
-            type=float,
+            type=options.MomentType(),
             default=0.0,
             metavar="SECONDS",
-            callback=finite,
             help="The sound begins this much later; earlier where it is negative.",
         ),
     )

@@ -8,7 +8,6 @@ import stat
 import sys
 import tempfile
 import warnings
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -17,7 +16,7 @@ import click
 from fba.animation import Animation
 from fba.cli import options
 from fba.cli.scene_options import SceneOptions, SoundOptions
-from fba.errors import FbaError, FbaWarning, FormatError
+from fba.errors import FbaWarning, FormatError
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
@@ -45,7 +44,9 @@ def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Show
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- is standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
-        animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, said=said)
+        animation = options.read_input(
+            file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, said=said, format=how.format
+        )
         return animation, False
     with contextlib.ExitStack() as stack:
         source: BinaryIO = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
@@ -55,7 +56,7 @@ def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Show
         if not head:
             raise FormatError("is empty: it ended before its first byte", path=name)
         if not head.startswith(STREAMS):
-            return _spooled(head, source, name, bap_steps, fps, salvage), False
+            return _spooled(head, source, name, how), False
         from player.live import LiveAnimation, wait_for
 
         close = stack.pop_all().close
@@ -163,22 +164,18 @@ def _fifo(file: Path) -> BinaryIO:
     return open(file, "rb")
 
 
-def _spooled(
-    head: bytes, source: BinaryIO, name: str, bap_steps: str, fps: Fraction | None, salvage: bool
-) -> Animation:
+def _spooled(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> Animation:
     with tempfile.TemporaryDirectory(prefix="fba-") as folder:
         path = Path(folder) / "stdin"
         with path.open("wb") as file:
             file.write(head)
             while chunk := source.read(1 << 20):
                 file.write(chunk)
-        try:
+        with options.renamed(path, name):
             animation = options.read_input(
-                path, bap_steps=bap_steps, header_fps=fps, name=name, salvage=salvage
-            )
-        except FbaError as error:
-            error.args = (str(error).replace(str(path), name),)  # nobody knows that file
-            raise
+                path, bap_steps=how.bap_steps, header_fps=how.fps, name=name, salvage=how.salvage,
+                format=how.format,
+            )  # fmt: skip
     if animation.name != path.name:
         return animation
     return Animation(animation.rate, animation.index, animation.face, animation.body, name)

@@ -21,16 +21,24 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
     from fba.codec import probe_stream
 
     rows = []
+    each = options.EachFile(files)
     for path in files:
-        with options.input_file(path) as file:
+        with each.file(path), options.input_file(path) as file:
             data = file.read_bytes()
-        info = probe_stream(data, bap_steps=bap_steps)
-        if info.body is not None:
-            step_tables.warn_of_doubtful_stream(path, data, bap_steps)
-        rows.append({"file": str(path), **statistics(info)})
+            info = probe_stream(data, bap_steps=bap_steps)
+            if info.body is not None:
+                step_tables.warn_of_doubtful_stream(path, data, bap_steps)
+            rows.append({"file": str(path), **statistics(info)})
     if as_json:
-        options.print_json(rows if len(rows) > 1 else rows[0])
+        options.print_json(rows if len(files) > 1 else rows[0])
+        each.finish()
         return
+    if rows:
+        _print(rows)
+    each.finish()
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -18,6 +18,7 @@ from fba.codec.clock import StreamClock
 from fba.codec.plane_reader import PlaneReader, Planes
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
+from fba.recognition import HEAD_BYTES, but_recognised
 
 _CHUNK = 1 << 16
 """Bytes that `decode` hands over at a time, so that blocks do not pile up."""
@@ -74,6 +75,7 @@ class Decoder:
         self._finished = False
         self._objects = 0
         self._object_end = 0  # byte of the stream at which the last object was over
+        self._seems = ""  # what a stream that begins with no head seems to be
         self._no_head: BitstreamError | None = None  # why what the stream begins with is none
         self._clock = StreamClock()
         self._lost_from = 0
@@ -143,8 +145,9 @@ class Decoder:
         if self._objects == 0 and self._scanned == 0 and self._no_head is None:
             head = buffer.data[: min(buffer.length, 3)].tobytes()
             if head != syntax.START_CODE_PREFIX[: len(head)] or (final and buffer.length < 4):
+                self._seems = but_recognised(buffer.data[: min(buffer.length, HEAD_BYTES)].tobytes())
                 found = (
-                    f"it begins with {buffer.data[: min(buffer.length, 4)].tobytes().hex(' ')}"
+                    f"it begins with {buffer.data[: min(buffer.length, 4)].tobytes().hex(' ')}{self._seems}"
                     if head
                     else "it is empty"
                 )
@@ -173,7 +176,9 @@ class Decoder:
             self._scanned = max(self._scanned, buffer.length - 3)
         if final:
             if self._objects == 0:
-                raise BitstreamError("no FBA object start code (00 00 01 ba) in the stream", plane=0, bit=0)
+                raise BitstreamError(
+                    f"no FBA object start code (00 00 01 ba) in the stream{self._seems}", plane=0, bit=0
+                )
             rest = buffer.offset + buffer.length - self._object_end
             if rest > 0:
                 self._warn(f"{rest} bytes follow the end of the FBA object; they were not read")

@@ -134,13 +134,12 @@ class Encoder:
         if len(wrong) and not self.options.clamp:
             frame, slot, value = wrong[0]
             raise RangeError(
-                f"the value {value} cannot be carried: it lies outside 0..{INTENSITY_MAX}; correct it, or "
-                "clamp it (--clamp)",
+                f"the value {value} cannot be carried: it lies outside 0..{INTENSITY_MAX}; correct it",
                 parameter=slots.label(slot),
                 value=value,
                 limits=(0, INTENSITY_MAX),
                 frame=self._position + frame,
-            )
+            ).with_remedies(planner.CLAMP)
         self.statistics.clamped += len(wrong)
 
     def _encode_run(

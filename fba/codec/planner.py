@@ -25,7 +25,7 @@ from fba.codec.settings import (
 )
 from fba.codec.slots import Int64
 from fba.compiled import compiled
-from fba.errors import FbaWarning, RangeError
+from fba.errors import FbaWarning, RangeError, Remedy
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, Bap, Fap, baps, faps
 
 PRESETS = ("reference",)
@@ -179,9 +179,13 @@ def frame_rate(rate: Fraction) -> FrameRate:
     if fields is None:
         nearest = max(Fraction(round(rate * 16), 16), Fraction(1, 16))
         raise RangeError(
-            f"{rate} frames/s cannot be coded: a rate is n/16 below 256, or 1000/1001 of that; resample "
-            f"first, e.g. to {float(min(nearest, Fraction(4095, 16))):g} (--fps)"
-        )
+            f"{rate} frames/s cannot be coded: a rate is n/16 below 256, or 1000/1001 of that"
+        ).with_remedies(
+            Remedy(
+                "rate", "resample first, e.g. with {}", f"{float(min(nearest, Fraction(4095, 16))):g}",
+                "Animation.resample",
+            )
+        )  # fmt: skip
     return fields
 
 
@@ -249,6 +253,9 @@ def _extremes(
             following = True
 
 
+CLAMP = Remedy("clamp", "or bring what does not fit as near as can be with {}", "True", "EncoderOptions")
+
+
 def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) -> RangeError:
     """The error for a value that no range can carry: frame, parameter, limits, what would help."""
     part = slots.FACE_BIT if slot < slots.FAPS.stop else slots.BODY_BIT
@@ -274,12 +281,12 @@ def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) 
         remedy = f"no {name} would do"
     return RangeError(
         f"the value {value} cannot be carried: with {name} {options.quant(part)} the largest is {largest}; "
-        f"{remedy}; or clamp it (--clamp)",
+        f"{remedy}",
         parameter=slots.label(slot),
         value=value,
         limits=(-largest, largest),
         frame=position,
-    )
+    ).with_remedies(CLAMP)
 
 
 def _largest(part: int, column: int, quant: int, table: str) -> int:

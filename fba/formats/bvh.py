@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -19,6 +20,7 @@ from fba.animation import Animation
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError
+from fba.recognition import HEAD_BYTES, but_recognised
 from fba.source import read_whole
 
 MAX_JOINTS = 4096
@@ -60,6 +62,7 @@ def read(
     ground: str = "floor",
     plant: bool = True,
     spine: str | int = "spread",
+    joints: Mapping[str, str] | None = None,
 ) -> Animation:
     """A BVH file as BAPs (see `fba.capture.from_skeleton` for the options).
 
@@ -69,15 +72,19 @@ def read(
     motion = read_motion(path)
     try:
         return from_skeleton(
-            motion, rate, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
+            motion, rate, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
         )
     except ModelError as error:
-        raise FormatError(str(error), path=path) from error
+        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
 
 
 def read_motion(path: str | Path) -> SkeletonMotion:
     """The skeleton and its motion as the file has them. Raises FormatError, warns (FbaWarning)."""
-    text = read_whole(path).decode("utf-8-sig", errors="replace")
+    data = read_whole(path)
+    kind = but_recognised(data[:HEAD_BYTES])
+    if kind and not re.match(rb"(?:\xef\xbb\xbf)?\s*HIERARCHY\b", data, re.IGNORECASE):
+        raise FormatError(f"a BVH file begins with HIERARCHY{kind}", path=path)
+    text = data.decode("utf-8-sig", errors="replace")
     return parse(text, name=Path(path).stem, path=path)
 
 

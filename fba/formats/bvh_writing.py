@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.atomic import atomic
-from fba.errors import FormatError, OptionError
+from fba.errors import FormatError, OptionError, Remedy
 from fba.formats.body_frames import shown_baps
 from fba.source import Path
 
@@ -64,8 +64,9 @@ def write(
         raise OptionError(f"unit must be lengths in the file for one metre, 1e-6 to 1e6, not {unit}")
     if not RATES[0] <= animation.rate <= RATES[1]:
         raise FormatError(
-            f"{float(animation.rate):g} frames/s cannot be written as BVH; resample (--fps)", path=path
-        )
+            f"{float(animation.rate):g} frames/s cannot be written as BVH, which takes 1/3600 to 10000",
+            path=path,
+        ).with_remedies(Remedy("rate", "resample first, e.g. with {}", "30", "Animation.resample"))
     values = shown_baps(animation, path, "BVH")
     solver = BapSolver(skeleton, axes)
     kept = _kept(solver, values, joints == "moving")

@@ -12,7 +12,7 @@ from fba.formats.epf_reading import read_epf
 from fba.formats.epf_tags import TAGS
 from fba.formats.epf_writing import write_epf
 from fba.formats.text import UTF8_MARK, content, decoded
-from fba.source import Path
+from fba.source import Path, read_head
 
 __all__ = ["read_animation", "read_epf", "sniff_epf", "write_epf"]
 
@@ -24,7 +24,10 @@ def sniff_epf(head: bytes, suffix: str) -> bool:
 
 
 def read_animation(path: Path) -> Animation:
-    """Says what an EPF file is for: it holds no animation. Always raises UnsupportedError."""
+    """Says what an EPF file is for: it holds no animation. Always raises: UnsupportedError, or FormatError for
+    what is no EPF file."""
+    if not sniff_epf(read_head(path), ""):
+        read_epf(path)  # says what is wrong with it
     raise UnsupportedError(
         f"{path}: is an encoder parameter file (EPF): it says how to code an animation and holds none; "
         "use it with `fba encode IN.fap -o OUT.fba --epf FILE`, or fba.formats.epf.read_epf",

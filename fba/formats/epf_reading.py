@@ -30,6 +30,7 @@ from fba.errors import FbaWarning
 from fba.formats.epf_tags import BODY, FACE, PARTS, TAGS, Part
 from fba.formats.text import Lines, content, decoded
 from fba.formats.values import FRAME_NUMBER_MAX
+from fba.recognition import but_recognised
 from fba.source import Path, open_source
 
 SKIP_MAX = 1_000_000
@@ -313,7 +314,10 @@ def read_epf(path: Path) -> list[PlaneSettings]:
                 continue
             tag = decoded(name)
             if tag not in TAGS:
-                raise lines.error("unknown tag; an EPF line begins with FBM, FFR, ISI, FMT, ...", token=tag)
+                kind = but_recognised(lines.head)
+                raise lines.error(
+                    f"unknown tag; an EPF line begins with FBM, FFR, ISI, FMT, ...{kind}", token=tag
+                )
             if tag == "FBM":
                 if block:
                     reader.plane(block)

@@ -88,5 +88,5 @@ def located(path: Path) -> Iterator[None]:
     try:
         yield
     except (BitstreamError, RangeError) as error:
-        error.args = (f"{os.fspath(path)}: {error}",)
+        error.args = (f"{os.fspath(path)}: {error.finding}",)
         raise

@@ -12,10 +12,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FbaWarning, FormatError, Remedy
 from fba.formats.layout import Layout
 from fba.formats.rates import parse_rate
-from fba.formats.text import Header, Lines, content, is_header, is_mask, parse_header
+from fba.formats.text import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
 from fba.formats.values import Bool, Int32, Int64, Row, ValueParser
 from fba.source import Path, open_source
 
@@ -65,7 +65,9 @@ def read_frames(
             if not salvage or not reader.count:
                 raise
             warnings.warn(
-                f"{error}; salvaged the {reader.count} frames before the damage", FbaWarning, stacklevel=3
+                f"{error.finding}; salvaged the {reader.count} frames before the damage",
+                FbaWarning,
+                stacklevel=3,
             )
     return reader.frames(header)
 
@@ -82,9 +84,8 @@ def _header(
         if is_mask(tokens):
             if rate is None:
                 raise lines.error(
-                    "the file begins with frames: it has no header, so its frame rate is unknown; "
-                    "give one with --fps (fps=), and a name with --name (name=)"
-                )
+                    "the file begins with frames: it has no header, so its frame rate is unknown"
+                ).with_remedies(GIVE_RATE)
             return Header("", name or "", rate, None), line
         # a name may hold a "#": the comment is only cut off where the line makes no sense with it
         try:
@@ -141,7 +142,7 @@ class _Reader:
                 self.flush()
                 pending_bytes = 0
         if mask is not None:
-            raise self.lines.error(f"the last frame is cut: a mask without values; {_SALVAGE}")
+            raise self.lines.error("the last frame is cut: a mask without values").with_remedies(SALVAGE)
 
     def flush(self, salvage: bool = False) -> None:
         """Parse the pending lines; salvage: those before the first damaged one, without raising."""
@@ -198,11 +199,10 @@ class _Reader:
         width = len(tokens) - 1 if len(tokens) - 1 in layout.widths else len(tokens)
         if width not in layout.widths:
             cut = len(tokens) < max(layout.widths) and self._at_end()
-            raise self.lines.error(
-                f"the last frame is cut: {len(tokens)} of {widths} mask bits; {_SALVAGE}"
-                if cut
-                else f"expected a mask of {widths} bits, found {len(tokens)}"
-            )
+            if cut:
+                what = f"the last frame is cut: {len(tokens)} of {widths} mask bits"
+                raise self.lines.error(what).with_remedies(SALVAGE)
+            raise self.lines.error(f"expected a mask of {widths} bits, found {len(tokens)}")
         bits = np.zeros(layout.columns, dtype=bool)
         bits[:width] = [token == b"1" for token in tokens[:width]]
         slots = np.concatenate([[True], bits[layout.parameter]])
@@ -224,8 +224,8 @@ class _Reader:
         number = self.lines.number
         if len(tokens) < wanted and self._at_end():
             raise self.lines.error(
-                f"the last frame is cut: {found} of {wanted - 1}; {_SALVAGE}", line=number, token=tokens[-1]
-            )
+                f"the last frame is cut: {found} of {wanted - 1}", line=number, token=tokens[-1]
+            ).with_remedies(SALVAGE)
         raise self.lines.error(
             f"the mask above asks for {wanted - 1} values behind the frame number, found {found}",
             line=number,
@@ -253,7 +253,7 @@ class _Reader:
         return True
 
 
-_SALVAGE = "--salvage (salvage=True) reads the frames before it"
+SALVAGE = Remedy("salvage", "{} reads the frames before it", "True")
 
 
 def _increasing(index: Int64, lines: Int64, path: Path) -> Int64:

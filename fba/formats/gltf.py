@@ -7,6 +7,7 @@ with all rotations the identity. So rotations are taken against the bind pose, i
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy.typing as npt
 from fba.animation import Animation
 from fba.capture import SkeletonMotion, from_skeleton, matching, rotations
 from fba.capture.skeleton import MOST_FRAMES
-from fba.errors import FbaWarning, FormatError, ModelError
+from fba.errors import FbaWarning, FormatError, ModelError, Remedy
 from fba.formats.gltf_own import note_of, read_note
 from fba.formats.gltf_pose import BindPose, Sampler, key_times
 from fba.gltf import Animation as Clip
@@ -46,6 +47,7 @@ def read(
     ground: str = "floor",
     plant: bool = True,
     spine: str | int = "spread",
+    joints: Mapping[str, str] | None = None,
     clip: str | int | None = None,
 ) -> Animation:
     """A glTF skeleton's animation as BAPs (see `fba.capture.from_skeleton`, and `read_motion` for clip).
@@ -58,7 +60,9 @@ def read(
     """
     try:
         gltf = read_gltf(path)
-        plain = (scale, origin, ground, plant, spine) == (None, "source", "floor", True, "spread")
+        plain = (joints, scale, origin, ground, plant, spine) == (
+            None, None, "source", "floor", True, "spread",
+        )  # fmt: skip
         if plain and gltf.animations:
             own = gltf.animations[0] if clip is None else _clip(gltf, clip, set(range(len(gltf.nodes))))
             note = note_of(gltf, own)
@@ -66,9 +70,11 @@ def read(
                 animation = read_note(gltf, own, note)
                 return animation if rate is None else animation.resample(Fraction(rate))
         motion = motion_of(gltf, clip=clip, rate=rate)
-        return from_skeleton(motion, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine)
+        return from_skeleton(
+            motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
+        )
     except ModelError as error:
-        raise FormatError(str(error), path=path) from error
+        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
 
 
 def read_motion(
@@ -209,10 +215,9 @@ def _clip(gltf: Gltf, clip: str | int | None, nodes: set[int]) -> Clip:
                 f"{gltf.file}: no animation turns the joints of the skeleton; there is no motion"
             )
         if len(moving) > 1:
+            text = f"{gltf.file}: has {len(moving)} animations, {names}; {moving[0].name!r} is read"
             warnings.warn(
-                f"{gltf.file}: has {len(moving)} animations, {names}; {moving[0].name!r} is read "
-                "(choose with clip=)",
-                FbaWarning,
+                FbaWarning(text).with_remedies(Remedy("clip", "choose with {}", repr(moving[1].name))),
                 stacklevel=5,
             )
         return moving[0]

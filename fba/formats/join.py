@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba.errors import FormatError
+from fba.errors import FormatError, Remedy
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -27,7 +27,11 @@ def merge(face_animation: Animation, body_animation: Animation) -> Animation:
     if face_animation.rate != body_animation.rate:
         raise FormatError(
             f"{_name(face_animation)} has {face_animation.rate} frames/s, {_name(body_animation)} "
-            f"{body_animation.rate}; resample one of them first (--fps, Animation.resample)"
+            f"{body_animation.rate}"
+        ).with_remedies(
+            Remedy(
+                "rate", "resample one of them first, with {}", f"{face_animation.rate}", "Animation.resample"
+            )
         )
     index = np.union1d(face_animation.index, body_animation.index)
     face, body = face_animation.face, body_animation.body

@@ -34,7 +34,8 @@ def parse_rate(text: str | float | Fraction) -> Fraction:
         text = str(text)
         if not _NUMBER.fullmatch(text):
             raise FormatError(
-                'a frame rate is a positive number such as 25, 29.97 or "30000/1001"', token=text
+                "a frame rate is a positive number without an exponent, such as 25, 29.97 or 30000/1001",
+                token=text,
             )
         whole, _, denominator = text.partition("/")
         if denominator and not int(denominator):

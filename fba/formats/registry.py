@@ -16,11 +16,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
-from fba.errors import FbaWarning, FormatError, OptionError, UnsupportedError
+from fba.errors import FbaWarning, FormatError, OptionError, Remedy, UnsupportedError, did_you_mean
+from fba.recognition import but_recognised
 from fba.source import Path, read_head
 
 if TYPE_CHECKING:
     from fba.codec import StreamInfo
+
+
+UNKNOWN = Remedy("format", "if it is one of them, name it with {}", "'bvh'")
 
 
 class Lazy:
@@ -125,11 +129,9 @@ def format_of(path: Path, format: str | None = None) -> Format:
     if found is None and by_suffix:
         return by_suffix[0]  # its reader says what is wrong with it
     if found is None:
-        raise FormatError(
-            f"is in no format known here: {_list()}; if it is one of them, "
-            "give the file that suffix, or format= in Python",
-            path=path,
-        )
+        kind = but_recognised(head)
+        error = FormatError(f"is in no format known here: {_list()}{kind}", path=path)
+        raise error if kind else error.with_remedies(UNKNOWN)
     if by_suffix and found not in by_suffix:
         warnings.warn(
             f"{os.fspath(path)}: is named {suffix}, but holds {found.name.upper()} content; "
@@ -185,10 +187,10 @@ def writer_for(path: Path, format: str | None = None) -> Format:
         by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
         if not by_suffix:
             raise FormatError(
-                f"the suffix does not say which format to write; known: {_list(writing=True)} (or format=)",
+                f"the suffix does not say which format to write; known: {_list(writing=True)}",
                 path=path,
                 token=suffix or None,
-            )
+            ).with_remedies(Remedy("format", "or name it with {}", "'fba'", "fba.write"))
         chosen = by_suffix[0]
     if chosen.write is None:
         raise UnsupportedError(
@@ -198,11 +200,18 @@ def writer_for(path: Path, format: str | None = None) -> Format:
     return chosen
 
 
-def probe(data_or_path: bytes | bytearray | memoryview | Path, *, bap_steps: str = "iso") -> StreamInfo:
+def probe(
+    data_or_path: bytes | bytearray | memoryview | Path,
+    *,
+    bap_steps: str = "iso",
+    format: str | None = None,
+    **options: Any,
+) -> StreamInfo:
     """What an FBA stream, in memory or in a file, or a file of another format holds.
 
-    bap_steps: as for `fba.decode`; it matters to no more than what counts as damage. Values of a stream
-    are decoded, but not kept; damage is stepped over and listed. Raises FormatError, BitstreamError.
+    bap_steps: as for `fba.decode`; it matters to no more than what counts as damage. format: as for `read`.
+    options: those of the reader, for other formats than FBA. Values of a stream are decoded, but not kept;
+    damage is stepped over and listed. Raises FormatError, BitstreamError.
     """
     from fba.codec import StreamInfo, probe_stream
     from fba.formats.fba import located
@@ -210,11 +219,12 @@ def probe(data_or_path: bytes | bytearray | memoryview | Path, *, bap_steps: str
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
         return probe_stream(data_or_path, bap_steps=bap_steps)
-    found = format_of(data_or_path)
+    found = format_of(data_or_path, format)
     if found.name == "fba":
         with located(data_or_path):
             return probe_stream(read_whole(data_or_path), bap_steps=bap_steps)
-    animation = found.read(data_or_path)
+    _check_options(found.name, "reading", options, found.read_options)
+    animation = found.read(data_or_path, **options)
     return StreamInfo.of_animation(animation, found.name, os.stat(data_or_path).st_size)
 
 
@@ -223,7 +233,8 @@ def _named(name: str) -> Format:
     for entry in formats():
         if wanted == entry.name or f".{wanted}" in entry.suffixes:
             return entry
-    raise OptionError(f"there is no format {name!r}; known: {', '.join(entry.name for entry in formats())}")
+    known = [entry.name for entry in formats()]
+    raise OptionError(f"there is no format {name!r}{did_you_mean(wanted, known)}; known: {', '.join(known)}")
 
 
 def _check_options(name: str, doing: str, options: dict[str, Any], known: tuple[str, ...]) -> None:

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, BinaryIO
 
-from fba.errors import FormatError
+from fba.errors import FormatError, Remedy
 from fba.formats.rates import parse_rate
+from fba.recognition import HEAD_BYTES, but_recognised
 from fba.source import Path
 
 if TYPE_CHECKING:
@@ -34,6 +35,9 @@ _MASK_LIKE = 60
 """A line of at least this many 0s and 1s is taken for a mask, not for a header."""
 
 
+GIVE_RATE = Remedy("fps", "give one with {}", "25")
+
+
 class Lines:
     """The lines of a text file, without their ends; `number` is that of the last one given out (1-based).
 
@@ -43,6 +47,7 @@ class Lines:
     def __init__(self, file: BinaryIO, size: int, path: Path) -> None:
         self.number = 0
         self.path = path
+        self.head = b""  # how the file begins, once the first line was given out
         self._lines = self._split(file, size)
 
     def __iter__(self) -> Iterator[bytes]:
@@ -70,6 +75,7 @@ class Lines:
             size -= len(block)
             if first:
                 first = False
+                self.head = block[:HEAD_BYTES]
                 for mark, encoding in _MARKS:
                     if block.startswith(mark):
                         raise self.error(f"is {encoding} text; save it as UTF-8 or ASCII")
@@ -78,7 +84,10 @@ class Lines:
                     continue
             if b"\0" in block:
                 at = self.number + (rest + block[: block.index(b"\0")]).count(b"\n") + 1
-                raise self.error("holds NUL bytes: binary data or a damaged file, not text", line=at)
+                raise self.error(
+                    f"holds NUL bytes: binary data or a damaged file, not text{but_recognised(self.head)}",
+                    line=at,
+                )
             data = rest + block
             lines = data.splitlines()
             # the last line may go on in the next block, and a final CR may be half of a CR LF
@@ -141,9 +150,8 @@ def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Hea
     """
     tokens = line.split()
     if not is_header(tokens):
-        raise lines.error(
-            "expected a header `<version> <name> <frame rate> <number of frames>`", token=line.strip()
-        )
+        what = "expected a header `<version> <name> <frame rate> <number of frames>`"
+        raise lines.error(what + but_recognised(lines.head), token=line.strip())
     try:
         frames = int(float(tokens[-1]))  # some programs write 107.0
     except (ValueError, OverflowError):
@@ -153,7 +161,7 @@ def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Hea
             rate = parse_rate(decoded(tokens[-2]))
         except FormatError as error:
             reason = str(error).partition(" (found")[0]
-            raise lines.error(f"{reason}; give one with --fps (fps=)", token=tokens[-2]) from None
+            raise lines.error(reason, token=tokens[-2]).with_remedies(GIVE_RATE) from None
     name = decoded(b" ".join(tokens[1:-2]))
     return Header(decoded(tokens[0]), name, rate, frames if frames >= 0 else None)
 

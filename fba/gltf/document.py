@@ -16,6 +16,7 @@ from urllib.parse import unquote
 from fba.errors import FbaError, ModelError
 from fba.gltf import glb
 from fba.gltf.values import Budget, Value
+from fba.recognition import HEAD_BYTES, but_recognised
 from fba.source import Path, open_source
 
 MAX_JSON = 64 << 20
@@ -81,7 +82,8 @@ def parse_document(data: bytes, file: str, folder: str | None = None) -> Documen
     if data[:4] == glb.MAGIC:
         text, binary = glb.split(data, file)
     elif data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
-        raise ModelError(f"{file}: is no glTF 2.0: neither a .glb container nor the JSON of a .gltf")
+        kind = but_recognised(data[:HEAD_BYTES])
+        raise ModelError(f"{file}: is no glTF 2.0: neither a .glb container nor the JSON of a .gltf{kind}")
     root = Value(parse_json(text, file), file)
     asset = root.member("asset")
     version = asset.member("version").text(100)

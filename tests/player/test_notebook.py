@@ -124,7 +124,7 @@ def test_an_empty_clip_is_a_line_and_names_are_only_text(talking: Animation) -> 
 
 
 def test_where_nothing_is(talking: Animation) -> None:
-    assert "nothing lies between" in shown(Preview(talking, start=7.0)).text
+    assert "start 7 s is outside the animation" in shown(Preview(talking, start=7.0)).text
     with pytest.raises(ValueError, match="16 pixels"):
         Preview(talking, width=8)
     with pytest.raises(ValueError, match="finite"):

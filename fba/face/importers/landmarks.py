@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import ModelError
+from fba.errors import ModelError, Remedy
 from fba.face.authoring.shape_names import canonical, fap_of
 from fba.face.eyeball import sphere
 from fba.face.importers.pieces import Piece
@@ -44,7 +44,7 @@ def find_points(pieces: Sequence[Piece], path: str) -> Float64:
     eyes = _eyes(pieces, path)
     skin = [piece for piece in pieces if piece.part.kind == "skin"]
     if not skin:
-        raise ModelError(f"{path}: no part is skin; name the kinds of the parts{_how(path)}")
+        raise ModelError(f"{path}: no part is skin; name the kinds of the parts").with_remedies(POINTS)
     shapes = _Shapes(skin[0])
     found = _from_faps(shapes) if shapes.faps >= FEWEST_FAPS else _from_arkit(shapes, eyes, path)
     for name, side in (("3.5", "left"), ("3.6", "right")):
@@ -104,16 +104,17 @@ def _eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, float,
     if missing:
         raise ModelError(
             f"{path}: {' and '.join(missing)} (feature points 3.5 and 3.6) not found: no part is named "
-            f"as an eyeball, none is a round shell{_how(path)}"
-        )
+            f"as an eyeball, none is a round shell"
+        ).with_remedies(POINTS)
     return found
 
 
-def _how(path: str) -> str:
-    return (
-        "; give the feature points, as points=FILE or as a file beside the head, with lines 'name,x,y,z' "
-        "or 'name,vertex'"
-    )
+POINTS = Remedy(
+    "points",
+    "put a file of its feature points beside the head, with lines 'name,x,y,z' or 'name,vertex', or name one "
+    "with {}",
+    "FILE",
+)
 
 
 def _from_faps(shapes: _Shapes) -> dict[str, Float64]:
@@ -137,8 +138,8 @@ def _from_arkit(
     if missing:
         raise ModelError(
             f"{path}: the shapes {', '.join(missing)} are missing, by which the lids (3.1 to 3.4) and lips "
-            f"(2.2, 2.3, 8.3, 8.4) would be found{_how(path)}"
-        )
+            f"(2.2, 2.3, 8.3, 8.4) would be found"
+        ).with_remedies(POINTS)
     found: dict[str, Float64] = {}
     for side in ("left", "right"):
         found |= _lids(shapes, eyes[side], side)

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import ModelError
+from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
 from fba.face.importers.files import beside, whole
 from fba.face.importers.looks import LOOKS
@@ -92,9 +92,8 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
     if len(base.vertices) != VERTICES or missing:
         raise ModelError(
             f"{file}: this is not MakeHuman's base mesh hm08: {len(base.vertices)} vertices instead of "
-            f"{VERTICES}" + (f", no group {missing[0]!r}" if missing else "") + "; import another OBJ file "
-            "with kind='obj' and its feature points"
-        )
+            f"{VERTICES}" + (f", no group {missing[0]!r}" if missing else "")
+        ).with_remedies(Remedy("kind", "import another OBJ file with {} and its feature points", "'obj'"))
     sources = [_skin(base)]
     sources += _eyes(file, base)
     for name, kind, groups in HELPERS:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import FbaWarning, ModelError
+from fba.errors import FbaWarning, ModelError, Remedy
 from fba.face.feature_points import names, row_of
 from fba.face.importers.fdp import sides
 from fba.face.importers.files import lines
@@ -83,10 +83,10 @@ def _beside(path: str | os.PathLike[str]) -> GivenPoints:
         if candidate.is_file():
             return given_points(candidate)
     raise ModelError(
-        f"{place}: a mesh needs its feature points; give them as points=FILE, or put them beside it as "
+        f"{place}: a mesh needs its feature points; put them beside it as "
         f"{place.stem}.points.csv with lines 'name,x,y,z' or 'name,vertex' (vertices count from 0), for "
         "instance '9.3,297' for the tip of the nose"
-    )
+    ).with_remedies(Remedy("points", "or name their file with {}", "FILE"))
 
 
 def _places(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64, dict[str, int]]:

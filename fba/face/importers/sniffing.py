@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fba.errors import FormatError, ModelError
+from fba.recognition import but_recognised
 from fba.source import read_head
 
 KINDS: Mapping[str, str] = {
@@ -36,7 +37,8 @@ def sniff(path: str | os.PathLike[str]) -> str:
     kind = _of_content(head, place)
     if kind is None:
         reads = "; ".join(KINDS.values())
-        raise ModelError(f"{place}: no face can be read from this file. Read are: {reads}")
+        found = but_recognised(head)
+        raise ModelError(f"{place}: no face can be read from this file{found}. Read are: {reads}")
     return kind
 
 

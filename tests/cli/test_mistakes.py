@@ -1,0 +1,275 @@
+"""Mistakes of users: what the program then says names options that exist, and files that are meant."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pytest
+
+import fba
+from fba import Animation
+from fba.cli.main import _COMMANDS, group
+from fba.errors import FormatError, Remedy
+
+Run = Callable[..., tuple[int, str, str]]
+SAMPLE = Path(fba.__file__).parent / "samples" / "hello.bvh"
+
+
+@pytest.fixture
+def headless(tmp_path: Path, face: Animation) -> Path:
+    """A FAP file without a header."""
+    path = tmp_path / "headless.fap"
+    fba.write(path, face)
+    lines = [line for line in path.read_text().splitlines() if not line.startswith(("2.2", "#"))]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def cut(tmp_path: Path, face: Animation) -> Path:
+    """A FAP file whose last frame lacks its values."""
+    path = tmp_path / "cut.fap"
+    fba.write(path, face)
+    path.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
+    return path
+
+
+@pytest.fixture
+def streams(tmp_path: Path, face: Animation) -> list[Path]:
+    """A good stream, a BVH file named as one, and another good one."""
+    paths = [tmp_path / name for name in ("one.fba", "two.fba", "three.fba")]
+    for path in paths:
+        fba.write(path, face)
+    paths[1].write_bytes(SAMPLE.read_bytes())
+    return paths
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["info"], ["encode", "-o", "{out}.fba"], ["convert", "{file}", "{out}.fap"], ["gait", "--find"]],
+)
+def test_a_rate_can_be_given_wherever_one_is_asked_for(
+    run: Run, tmp_path: Path, headless: Path, command: list[str]
+) -> None:
+    words = [word.format(file=headless, out=tmp_path / "out") for word in command]
+    if str(headless) not in words:
+        words.append(str(headless))
+    code, _, err = run(*words)
+    assert code == 1
+    assert err.endswith("its frame rate is unknown; give one with --fps 25\n")
+    code, _, err = run(*words, "--fps", "25")
+    if command[0] == "gait":
+        assert "has no body" in err  # it was read
+    else:
+        assert (code, err) == (0, "")
+
+
+def test_info_has_the_salvage_that_it_names(run: Run, cut: Path) -> None:
+    code, _, err = run("info", cut)
+    assert code == 1
+    assert err.endswith("; --salvage reads the frames before it\n")
+    code, out, err = run("info", cut, "--salvage")
+    assert code == 0
+    assert "49 frames" in out
+    assert "salvaged the 49 frames" in err
+    assert "--salvage" not in err
+
+
+def test_an_option_of_another_command_is_named_with_it(run: Run, tmp_path: Path) -> None:
+    import numpy as np
+
+    values, mask = np.zeros((1, 68), dtype=np.int32), np.zeros((1, 68), dtype=bool)
+    values[0, 13], mask[0, 13] = 2000, True
+    fba.write(tmp_path / "wild.fap", Animation(25, np.arange(1), fba.FaceTrack(values, mask)))
+    code, _, err = run("convert", tmp_path / "wild.fap", tmp_path / "wild.fba")
+    assert code == 1
+    assert err.endswith("or bring what does not fit as near as can be with --clamp of `fba encode`\n")
+
+
+def test_what_only_python_can_do_is_shown_as_python(run: Run, bvh: Path) -> None:
+    bvh.write_text(re.sub(r"(ROOT|JOINT) (\w+)", lambda m: f"{m[1]} part{m.start()}", bvh.read_text()))
+    code, _, err = run("info", bvh)
+    assert code == 1
+    assert err.endswith(
+        "name each joint's counterpart in the standard with fba.read(FILE, joints={'Pelvis': 'HumanoidRoot', "
+        "...}) in Python; the command line has no option for it\n"
+    )
+    names = re.findall(r"(?:ROOT|JOINT) (\w+)", bvh.read_text())
+    ends = ("hip", "knee", "ankle")
+    joints = ["HumanoidRoot", *(f"{s}_{e}" for s in "lr" for e in ends), "vl5", "vc4", "skullbase"]
+    animation = fba.read(bvh, joints=dict(zip(names, joints, strict=True)))
+    assert len(animation) == 3
+    assert animation.body is not None
+    assert animation.body.mask.any()
+
+
+def test_a_format_can_be_named(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "walk.txt"
+    path.write_text("\n" + " " * 70_000 + "\n" + SAMPLE.read_text())
+    code, _, err = run("info", path)
+    assert code == 1
+    assert err.endswith("; if it is one of them, name it with --from bvh\n")
+    code, out, _ = run("info", path, "--from", "bvh")
+    assert code == 0
+    assert f"{path}: BVH" in out
+    code, _, err = run("info", path, "--from", "bhv")
+    assert code == 2
+    assert "there is no format 'bhv' (did you mean 'bvh'?)" in err
+    code, _, err = run("convert", SAMPLE, tmp_path / "walk.xyz")
+    assert code == 1
+    assert "or name it with --to fba" in err
+
+
+def test_remedies_in_the_words_of_python(headless: Path, tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"; give one with fps=25$") as caught:
+        fba.read(headless)
+    assert caught.value.finding.endswith("its frame rate is unknown")
+    assert caught.value.remedies == (Remedy("fps", "give one with {}", "25"),)
+    (tmp_path / "a.txt").write_text("Hello.\n")
+    with pytest.raises(FormatError, match=r"name it with format='bvh'$"):
+        fba.read(tmp_path / "a.txt")
+
+
+def test_messages_of_the_library_name_no_options() -> None:
+    """An option exists on some commands only; a `Remedy` knows on which."""
+    found = []
+    root = Path(fba.__file__).parents[1]
+    for package in ("fba", "player", "conformance"):
+        for path in (root / package).rglob("*.py"):
+            if "cli" in path.parts or "argparse" in path.read_text(encoding="utf-8"):
+                continue
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+                if re.search(r"[\"' (]--[a-z]{3,}", line) and "`fba " not in line:
+                    found.append(f"{path}:{number}: {line.strip()}")
+    assert not found
+
+
+def test_options_for_arguments_exist() -> None:
+    from fba.cli.options import OPTIONS
+
+    context = click.Context(group, info_name="fba")
+    taken = {param.name for name in _COMMANDS for param in _params(group.get_command(context, name))}
+    assert set(OPTIONS.values()) <= taken
+
+
+def _params(command: click.Command | None) -> list[click.Parameter]:
+    assert command is not None
+    found = list(command.params)
+    for each in getattr(command, "commands", {}).values():
+        found += _params(each)
+    return found
+
+
+@pytest.mark.parametrize("command", ["info", "stats", "bench", "decode"])
+def test_one_bad_file_of_several_is_named_and_the_others_go_on(
+    run: Run, tmp_path: Path, streams: list[Path], command: str
+) -> None:
+    streams[1].write_bytes(b"\0\0\1\xba\xff")
+    more = {"bench": ["--rounds", "1"], "decode": ["--fap", str(tmp_path)]}.get(command, [])
+    code, out, err = run(command, *streams, *more)
+    assert code == 1
+    assert err.startswith(f"fba: error: {streams[1]}: ")
+    assert err.count("two.fba") == 1
+    assert err.count("\n") == 1
+    assert out.count("one.fba") == out.count("three.fba") == 1
+    if command == "decode":
+        assert sorted(path.name for path in tmp_path.glob("*.fap")) == ["one.fap", "three.fap"]
+    code, out, _ = run(command, *streams, *more, "--json")
+    assert code == 1
+    assert [Path(row.get("file") or row["input"]).name for row in json.loads(out)] == ["one.fba", "three.fba"]
+    code, out, err = run(command, streams[1], *more)
+    assert (code, out) == (1, "")
+    assert err.startswith(f"fba: error: {streams[1]}: ")
+    assert err.count("two.fba") == 1
+
+
+@pytest.mark.parametrize("command", ["stats", "bench", "decode", "info --trace"])
+def test_what_is_no_stream_is_said_to_be_what_it_is(
+    run: Run, tmp_path: Path, streams: list[Path], command: str
+) -> None:
+    more = ["--fap", str(tmp_path)] if command == "decode" else []
+    code, _, err = run(*command.split(), streams[1], *more)
+    assert code == 1
+    assert err.startswith(f"fba: error: {streams[1]}: ")
+    assert "it seems to be BVH motion capture" in err
+
+
+def test_standard_input_is_called_so(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    class Stdin:
+        buffer = io.BytesIO()
+
+    monkeypatch.setattr(sys, "stdin", Stdin)
+    code, _, err = run("encode", "-", "-o", tmp_path / "x.fba")
+    assert code == 1
+    assert err == "fba: error: standard input: is empty (0 bytes); was it fully copied or written?\n"
+    Stdin.buffer = io.BytesIO(b"2.2 a 25 9\n" + b"1 " * 68 + b"\n")
+    code, _, err = run("info", "-")
+    assert code == 1
+    assert err.startswith("fba: error: standard input:2: the last frame is cut")
+
+
+@pytest.mark.parametrize(
+    ("rate", "text"),
+    [
+        ("0", "the frame rate must be more than 0"),
+        ("-25", "a frame rate is a positive number"),
+        ("nan", "a frame rate is a positive number"),
+        ("1e9", "a frame rate is a positive number without an exponent"),
+        ("1e-9", "a frame rate is a positive number without an exponent"),
+        ("1000000000", "1000000000 frames/s are out of reach"),
+        ("0.0000001", "0.0000001 frames/s are out of reach"),
+        ("25/0", "a frame rate cannot be divided by 0"),
+        ("fast", "such as 25, 29.97 or 30000/1001"),
+    ],
+)
+def test_rates_out_of_reach(run: Run, tmp_path: Path, rate: str, text: str) -> None:
+    code, _, err = run("convert", SAMPLE, tmp_path / "a.bap", "--fps", rate)
+    assert code == 2
+    assert text in err
+    assert "may be 1/3600 to 10000" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (
+            ["-o", "a.png", "--time", "99"],
+            1,
+            "time 99 s is outside the animation, which goes from 0 s to 2 s",
+        ),
+        (
+            ["-o", "a.png", "--time", "-5"],
+            1,
+            "time -5 s is outside the animation, which goes from 0 s to 2 s",
+        ),
+        (["-o", "a.png", "--time", "nan"], 2, "'nan' is not a number of seconds"),
+        (["-o", "a.png", "--frame", "50"], 1, "there is no frame 50: the animation has 50 (0 to 49)"),
+        (["-o", "a.png", "--start", "3"], 1, "start 3 s is outside the animation"),
+        (["-o", "a.gif", "--start", "3"], 1, "start 3 s is outside the animation"),
+        (["-o", "a.gif", "--start", "-1"], 1, "start -1 s is outside the animation"),
+        (["-o", "a.gif", "--end", "50"], 1, "end 50 s is outside the animation, which goes from 0 s to 2 s"),
+        (["-o", "a.gif", "--end", "inf"], 2, "'inf' is not a number of seconds"),
+        (["-o", "a.png", "--contact-sheet", "4", "--end", "50"], 1, "end 50 s is outside the animation"),
+    ],
+)
+def test_times_outside_the_animation(
+    run: Run,
+    tmp_path: Path,
+    face: Animation,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    text: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    fba.write("face.fap", face)
+    ended, _, err = run("render", "face.fap", *arguments)
+    assert ended == code
+    assert text in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["face.fap"]
