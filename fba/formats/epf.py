@@ -24,8 +24,8 @@ def sniff_epf(head: bytes, suffix: str) -> bool:
 
 
 def read_animation(path: Path) -> Animation:
-    """Says what an EPF file is for: it holds no animation. Always raises: UnsupportedError, or FormatError for
-    what is no EPF file."""
+    """Says what an EPF file is for: it holds no animation. Always raises UnsupportedError, or FormatError for a
+    file of another kind."""
     if not sniff_epf(read_head(path), ""):
         read_epf(path)  # says what is wrong with it
     raise UnsupportedError(
