@@ -24,8 +24,10 @@ def sniff_epf(head: bytes, suffix: str) -> bool:
 
 
 def read_animation(path: Path) -> Animation:
-    """Says what an EPF file is for: it holds no animation. Always raises UnsupportedError, or FormatError for a
-    file of another kind."""
+    """Says what an EPF file is for: it holds no animation.
+
+    Always raises: UnsupportedError, or FormatError for a file of another kind.
+    """
     if not sniff_epf(read_head(path), ""):
         read_epf(path)  # says what is wrong with it
     raise UnsupportedError(
