@@ -73,6 +73,6 @@ def command(
         step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(target) as file:
         write(file, animation, format=writing.name, **extra)
-    outputs.say(f"{shown(target)}: {len(animation)} frames, {writing.description}")
+    outputs.say(f"{shown(target)}: {len(animation)} frames, {writing.written or writing.description}")
     if writing.name == "fba":
         step_tables.remind(target, animation, bap_steps)

@@ -20,7 +20,7 @@ from fba.cli.options import Group, described, examples
 from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import hasten
 from fba.compilation import heard
-from fba.errors import FbaError, FbaWarning
+from fba.errors import FbaError, FbaWarning, did_you_mean
 
 _COMMANDS = {
     "info": "What a file holds: frames, rate, parameters, bits; every syntax element with --trace.",
@@ -69,6 +69,13 @@ class _Commands(Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in _COMMANDS and not args[0].startswith("-"):
+            ctx.fail(f"there is no command {args[0]!r}{did_you_mean(args[0], _COMMANDS)}")
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:

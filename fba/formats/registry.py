@@ -54,7 +54,8 @@ class Format:
     name: as in `format=`. suffixes: lower case, with the dot, the first is the usual one. sniff: whether
     a file with this beginning (up to 64 KiB) and this lower-case suffix is one. read, write: file to
     Animation and back; write is None where there is no writer. carries: the parts that it can hold.
-    captured: motion capture, whose parameters are worked out when it is read.
+    captured: motion capture, whose parameters are worked out when it is read. written: what a written file
+    is, where that is less than `description` says.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Format:
     write: Callable[..., None] | None
     carries: tuple[str, ...] = ("face", "body")
     captured: bool = False
+    written: str = ""
 
     @property
     def read_options(self) -> tuple[str, ...]:
@@ -92,10 +94,12 @@ def formats() -> tuple[Format, ...]:
         Format(
             "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
             place("sniff_fap"), place("read_fap"), place("write_fap"), ("face",),
+            written="ASCII face animation parameters, version 2.2",
         ),
         Format(
             "bap", (".bap",), "ASCII body animation parameters, versions 3.1 and 3.2",
             place("sniff_bap"), place("read_bap"), place("write_bap"), ("body",),
+            written="ASCII body animation parameters, version 3.2",
         ),
         Format(
             "epf", (".epf",), "encoder parameter file: how to code an animation; holds none itself",
@@ -109,7 +113,7 @@ def formats() -> tuple[Format, ...]:
         Format(
             "gltf", (".glb", ".gltf"), "glTF 2.0: read, an animated skeleton; written, a skinned person",
             place("sniff", "gltf"), place("read", "gltf"), place("write", "gltf_writing"),
-            captured=True,
+            captured=True, written="glTF 2.0, a skinned person",
         ),
     )  # fmt: skip
 

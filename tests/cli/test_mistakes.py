@@ -126,6 +126,19 @@ def test_a_format_can_be_named(run: Run, tmp_path: Path) -> None:
     assert "or name it with --to fba" in err
 
 
+def test_convert_names_the_version_that_it_writes(run: Run, tmp_path: Path, face: Animation) -> None:
+    fba.write(tmp_path / "a.fba", face)
+    code, out, _ = run("convert", tmp_path / "a.fba", tmp_path / "a.fap")
+    assert (code, out) == (0, f"{tmp_path}/a.fap: 50 frames, ASCII face animation parameters, version 2.2\n")
+
+
+def test_a_misspelt_command(run: Run) -> None:
+    code, _, err = run("encdoe", "walk.bvh")
+    assert code == 2
+    assert "there is no command 'encdoe' (did you mean 'encode'?)" in err
+    assert "there is no command 'xyz'\n" in run("xyz")[2]
+
+
 def test_remedies_in_the_words_of_python(headless: Path, tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"; give one with fps=25$") as caught:
         fba.read(headless)
