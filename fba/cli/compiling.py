@@ -6,18 +6,9 @@ import click
 
 MANY = 5
 """So many functions that are to be compiled are worth a word: fewer take less than about two seconds."""
-SECONDS = {
-    "info": 7,
-    "stats": 7,
-    "decode": 7,
-    "encode": 11,
-    "convert": 11,
-    "bench": 11,
-    "play": 25,
-    "render": 25,
-}
-"""About how long everything that a command may need takes to compile, on a machine with two cores."""
-OTHERWISE = 15
+SECONDS = {"info": 8, "stats": 5, "decode": 5, "bench": 8, "encode": 13, "convert": 13}
+"""About how long everything that a command may need takes to compile, in seconds of one core."""
+OTHERWISE = 35
 
 
 class Notice:

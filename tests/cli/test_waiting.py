@@ -40,7 +40,7 @@ def test_compiling_is_said_once_and_only_where_it_takes_long(capsys: pytest.Capt
     assert capsys.readouterr().err == ""
     for _ in range(50):
         notice()
-    assert capsys.readouterr().err == "fba: compiling, once (up to about 25 s)\n"
+    assert capsys.readouterr().err == "fba: compiling, once (up to about 35 s)\n"
 
 
 @pytest.mark.slow
