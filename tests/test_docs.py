@@ -1,94 +1,339 @@
-"""Every command and every piece of code in the documentation runs."""
+"""Every block of code in the documentation runs as it stands, and every link leads somewhere.
+
+Each page is followed as a reader would: from its first block to its last, in a fresh folder that holds
+the sample files and nothing else. The language after the three backticks says what a block is:
+
+    sh, python      runs
+    console         needs a window, a network or the checkout: listed in `ILLUSTRATIONS` with the reason; the
+                    `fba` commands in it must be ones that the command line accepts
+    text            what the blocks before it print, line by line ("..." stands for lines left out)
+    csv, json, tree data to read
+
+A block of no language, or indented instead of fenced, is an error: nothing is left out silently.
+"""
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import urlsplit
 
+import click
 import graphics
-import numpy as np
 import pytest
 
-import fba
-from fba import Animation, FaceTrack
-from fba.formats import merge
+from fba.cli.main import _COMMANDS, group
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 SAMPLES = ROOT / "fba" / "samples"
 
+RUN = {"sh", "python"}
+DATA = {"csv", "json", "tree"}
+COMMAND = re.compile(r"^\s*(\$ |fba |\./dev|python3? |pip |cd |import |from \w+ import )")
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """The files that the pages speak of."""
-    talk = fba.read(SAMPLES / "hello.fap")[:60]
-    body = fba.read(SAMPLES / "hello.bvh")
-    gesture = body.resample(25)[:60]
-    fba.write(tmp_path / "talk.fap", talk)
-    fba.write(tmp_path / "old.fap", talk)
-    fba.write(tmp_path / "gesture.bap", gesture)
-    shutil.copy(SAMPLES / "hello.bvh", tmp_path / "walk.bvh")
-    lines = (tmp_path / "talk.fap").read_text().splitlines()
-    first_frame = next(i for i, line in enumerate(lines) if line.startswith(("0 ", "1 ")) and len(line) > 130)
-    (tmp_path / "headless.fap").write_text("\n".join(lines[first_frame:]) + "\n")
-    values = np.zeros((5, 68), dtype=np.int32)
-    values[:, 13] = [0, 900, 1800, 2700, 900]  # FAP 14 has a step of 1: 1860 is the end of its ranges
-    mask = np.zeros((5, 68), dtype=bool)
-    mask[:, 13] = True
-    fba.write(tmp_path / "wild.fap", Animation(25, np.arange(5), FaceTrack(values, mask)))
-    fba.write(tmp_path / "talk.fba", talk)
-    fba.write(tmp_path / "small.fba", talk, fap_quant=8)
-    fba.write(tmp_path / "both.fba", merge(talk, gesture), bap_steps="visage", clamp=True)
-    damaged = bytearray(fba.encode(talk, fba.EncoderOptions(intra_period=1, start_codes=True)))
-    damaged[len(damaged) // 2] ^= 0x5A
-    (tmp_path / "damaged.fba").write_bytes(damaged)
-    planes = fba.Decoder().push((tmp_path / "talk.fba").read_bytes())
-    from fba.formats.epf import write_epf
-
-    write_epf(tmp_path / "talk.epf", [frame.plane.settings for frame in planes])
-    return tmp_path
-
-
-def blocks(page: Path, language: str) -> list[str]:
-    return re.findall(
-        rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
-    )
+WINDOW = "opens a window, which stays until somebody closes it"
+ARRIVING = "waits for a stream that arrives over a network"
+SYSTEM = "installs system packages"
+CHECKOUT = "sets up or tests the checkout, which .ci/run does"
+MISMATCH = (
+    "fba: warning: walk.fba: BAPs look implausible with the BAP steps 'iso' "
+    "(the root goes 25.0 m/s where the legs"
+)
+ILLUSTRATIONS = {
+    ("README.md", "./dev demo --out demo"): CHECKOUT,
+    ("README.md", ". .venv/bin/activate"): "chooses or makes an environment; .ci/run installs the wheel",
+    ("docs/develop.md", "./dev test"): CHECKOUT,
+    ("docs/develop.md", "python examples/figure/make_head.py"): "replaces the built-in head",
+    ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",
+    ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",
+    ("docs/motion-capture.md", MISMATCH): "a warning, with figures of another file",
+    ("docs/play.md", "fba play face.fba"): WINDOW,
+    ("docs/play.md", "fba play face.fba --paused"): WINDOW,
+    ("docs/play.md", "fba play face.fba --audio voice.mp3 --audio-offset -0.04"): WINDOW,
+    ("docs/play.md", "fba play hello.fap small.fba"): WINDOW,
+    ("docs/play.md", "nc host 7000 | fba play -"): ARRIVING,
+    ("docs/play.md", "apt-get install libegl1 libgl1"): SYSTEM,
+    (
+        "docs/play.md",
+        "import fba, player, pyrender",
+    ): "pyrender is not installed; tests/player has tests of it",
+}
+"""Blocks that do not run: page and first line, and why not."""
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_page(page: Path, folder: Path) -> None:
+class Block(NamedTuple):
+    page: str
+    line: int
+    language: str
+    code: str
+
+    @property
+    def place(self) -> str:
+        return f"{self.page}:{self.line}"
+
+    @property
+    def key(self) -> tuple[str, str]:
+        return self.page, self.code.split("\n", 1)[0].split("  ")[0].strip()
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+@cache
+def lines_of(page: Path) -> list[str]:
+    return page.read_text(encoding="utf-8").split("\n")
+
+
+@cache
+def blocks(page: Path) -> list[Block]:
+    """All blocks of code of a page, in order; those that are indented instead of fenced have no language."""
+    found: list[Block] = []
+    fence: tuple[int, str, list[str]] | None = None
+    blank = True
+    for number, line in enumerate(lines_of(page), 1):
+        if fence is not None:
+            if line.strip() == "```":
+                found.append(Block(name_of(page), fence[0], fence[1], "\n".join(fence[2]) + "\n"))
+                fence = None
+            else:
+                fence[2].append(line)
+            continue
+        if line.startswith("```"):
+            fence = (number, line[3:].strip(), [])
+        elif line.startswith("    ") and blank:
+            found.append(Block(name_of(page), number, "", line))
+        blank = not line.strip()
+    assert fence is None, f"{name_of(page)}:{fence[0]}: this block has no end"
+    return found
+
+
+def prose(page: Path) -> str:
+    """A page without its blocks of code and without `code` in its lines."""
+    kept: list[str] = []
+    inside = False
+    for line in lines_of(page):
+        if line.startswith("```"):
+            inside = not inside
+        elif not inside:
+            kept.append(line)
+    return re.sub(r"`[^`\n]*`", "", "\n".join(kept))
+
+
+def links(page: Path) -> list[str]:
+    return re.findall(r"\]\(([^()\s]+)\)", prose(page))
+
+
+def slug(heading: str) -> str:
+    """The anchor that GitHub gives a heading."""
+    text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading.strip().strip("#").strip()).lower()
+    return re.sub(r"[^\w\- ]", "", text.replace("`", "")).replace(" ", "-")
+
+
+@cache
+def anchors(page: Path) -> set[str]:
+    found: set[str] = set()
+    inside = False
+    for line in lines_of(page):
+        inside ^= line.startswith("```")
+        if not inside and re.match(r"#{1,6} ", line):
+            anchor, number = slug(line), 0
+            while (anchor if not number else f"{anchor}-{number}") in found:
+                number += 1
+            found.add(anchor if not number else f"{anchor}-{number}")
+    return found
+
+
+def id_of(page: Path) -> str:
+    return page.name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=id_of)
+def test_every_block_says_what_it_is(page: Path) -> None:
+    for block in blocks(page):
+        assert block.language, f"{block.place}: a block of code needs a fence and a language"
+        assert block.language in RUN | DATA | {"console", "text"}, f"{block.place}: {block.language}?"
+        if block.language == "console":
+            assert block.key in ILLUSTRATIONS, (
+                f"{block.place}: let it run, or say in ILLUSTRATIONS why not: {block.key}"
+            )
+        elif block.language not in RUN:
+            commands = [line for line in block.code.splitlines() if COMMAND.match(line)]
+            assert not commands, f"{block.place}: looks like a command, and does not run: {commands}"
+
+
+def test_every_reason_for_not_running_belongs_to_a_block() -> None:
+    there = {block.key for page in PAGES for block in blocks(page) if block.language == "console"}
+    assert not set(ILLUSTRATIONS) - there
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=id_of)
+def test_page_runs_from_its_first_block_to_its_last(page: Path, tmp_path: Path) -> None:
+    folder, place = tmp_path / "reader", tmp_path / "place"
+    folder.mkdir()
+    for sample in SAMPLES.iterdir():
+        shutil.copy(sample, folder)
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    programs = [(["sh", "-e", "-c", code], code) for code in blocks(page, "sh")]
-    programs += [([sys.executable, "-c", code], code) for code in blocks(page, "python")]
+    printed: set[str] = set()
     undrawn = False
-    for command, code in programs:
+    for block in blocks(page):
+        if block.language == "text":
+            shown = {line.strip() for line in block.code.splitlines()} - {"", "..."}
+            assert undrawn or shown <= printed, f"{block.place}: nothing before it prints {shown - printed}"
+        if block.language not in RUN:
+            continue
+        if block.language == "python":
+            command = [sys.executable, "-c", block.code]
+        else:  # where it leads with `cd`, the next block begins
+            command = ["sh", "-e", "-c", f"{block.code}\npwd >{shlex.quote(str(place))}"]
         run = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
-        )
+            command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
         if run.returncode and "OpenGL" in run.stderr and graphics.missing_opengl():
             undrawn = True
             continue
-        assert run.returncode == 0, f"{page.name}:\n{code}\n{run.stdout[-2000:]}\n{run.stderr}"
+        assert not run.returncode, f"{block.place}:\n{block.code}\n{run.stdout[-2000:]}\n{run.stderr}"
+        printed.update(line.strip() for line in run.stdout.splitlines())
+        if block.language == "sh":
+            folder = Path(place.read_text().strip())
     if undrawn:
         graphics.skip(graphics.missing_opengl())
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def fba_commands(code: str) -> Iterator[list[str]]:
+    """The arguments of every call of `fba` in a piece of shell code."""
+    code = code.replace("\\\n", " ")
+    for line in code.splitlines():
+        words: list[str] = []
+        for word in [*shlex.split(line, comments=True), ";"]:
+            if word in {"|", ";", "&&", "&", ">", "<"} or word.endswith(";"):
+                if word not in {";"}:
+                    words.append(word.rstrip(";"))
+                if words[:1] == ["fba"] or words[:2] == ["./dev", "fba"]:
+                    arguments = words[words.index("fba") + 1 :]
+                    yield [one for one in arguments if one not in {"|", "&&", "&", ">", "<", ""}]
+                words = []
+            else:
+                words.append(word)
+
+
+def accept(arguments: list[str]) -> None:
+    """Let the command line take these arguments apart, without doing anything. Raises click's errors."""
+    command: click.Command = group
+    context = click.Context(group, info_name="fba")
+    while isinstance(command, click.Group) and arguments and not arguments[0].startswith("-"):
+        name, *arguments = arguments
+        found = command.get_command(context, name)
+        assert found is not None, f"there is no command {name}"
+        command = found
+    arguments = [word.replace("*", "any") for word in arguments]
+    for word in arguments:  # files and folders that only the reader has
+        path = Path(word)
+        if word.startswith("../") or word.endswith("/"):
+            path.mkdir(exist_ok=True)
+        elif re.fullmatch(r"[\w/.-]*\w\.[a-z]\w+", word):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+    with command.make_context("fba", arguments, parent=context):
+        pass
+
+
+@pytest.mark.parametrize("page", PAGES, ids=id_of)
+def test_commands_that_do_not_run_are_accepted(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for block in blocks(page):
+        if block.language == "console":
+            for arguments in fba_commands(block.code):
+                try:
+                    accept(arguments)
+                except click.ClickException as error:
+                    pytest.fail(f"{block.place}: fba {shlex.join(arguments)}: {error.format_message()}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=id_of)
+def test_options_in_the_text_exist(page: Path) -> None:
+    """`fba render --fps` within a sentence: that command, with that option."""
+    inside = False
+    for number, line in enumerate(lines_of(page), 1):
+        inside ^= line.startswith("```")
+        for command in [] if inside else re.findall(r"`fba ([^`]+)`", line):
+            words = command.split()
+            context = click.Context(group, info_name="fba")
+            found: click.Command | None = group
+            while isinstance(found, click.Group) and words and re.fullmatch(r"[a-z]+", words[0]):
+                found = found.get_command(context, words.pop(0))
+            assert found is not None, f"{name_of(page)}:{number}: fba {command}: no such command"
+            options = {"--help", "--version"}
+            for parameter in found.params:
+                options.update(parameter.opts, parameter.secondary_opts)
+            unknown = {word.split("=")[0] for word in words if word.startswith("-") and word != "-"} - options
+            assert not unknown, f"{name_of(page)}:{number}: fba {command}: no option {sorted(unknown)}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=id_of)
 def test_links_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
-        assert (page.parent / target).exists(), f"{page.name} links to {target}"
+    for target in links(page):
+        place = f"{name_of(page)} links to {target}"
+        if re.match(r"[a-z][a-z0-9+.-]*:", target):
+            parts = urlsplit(target)
+            assert parts.scheme == "https", f"{place}: not https"
+            assert "." in parts.netloc, f"{place}: no host"
+            continue
+        file, _, anchor = target.partition("#")
+        there = (page.parent / file).resolve() if file else page
+        assert there.exists(), f"{place}: no such file"
+        if anchor:
+            assert anchor in anchors(there), f"{place}: no such heading; there are {sorted(anchors(there))}"
 
 
-def test_every_subcommand_has_examples_that_run(folder: Path) -> None:
-    """The commands under --help use names that the pages use as well."""
-    from fba.cli.main import _COMMANDS, group
+def test_every_page_can_be_reached_from_the_readme() -> None:
+    reached, waiting = set(), [ROOT / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        if page in reached or page.suffix != ".md" or not page.is_file():
+            continue
+        reached.add(page)
+        waiting += [
+            (page.parent / link.partition("#")[0]).resolve() for link in links(page) if ":" not in link
+        ]
+    assert not {name_of(page) for page in PAGES} - {name_of(page) for page in reached}
 
-    for name in _COMMANDS:
-        command = group.get_command(None, name)  # type: ignore[arg-type]
-        assert command is not None
-        assert command.epilog, f"fba {name} --help shows no example"
-        assert f"fba {name}" in command.epilog
+
+def test_every_picture_is_used() -> None:
+    used = {(page.parent / link).resolve() for page in PAGES for link in links(page) if ":" not in link}
+    assert not {path.name for path in (DOCS / "images").iterdir()} - {path.name for path in used}
+
+
+@pytest.mark.parametrize("name", list(_COMMANDS))
+def test_examples_under_help_are_accepted(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What `fba NAME --help` shows as examples is in the words that the command understands."""
+    (tmp_path / "reader").mkdir()
+    monkeypatch.chdir(tmp_path / "reader")
+    command = group.get_command(click.Context(group), name)
+    assert command is not None
+    commands = [command]
+    if isinstance(command, click.Group):
+        commands += command.commands.values()
+    for one in commands:
+        assert one.epilog, f"{name} {one.name}: --help shows no example"
+        examples = list(fba_commands(one.epilog))
+        assert examples, f"{name} {one.name}: --help shows no example"
+        for arguments in examples:
+            assert arguments[0] == name
+            try:
+                accept(arguments)
+            except click.ClickException as error:
+                pytest.fail(f"fba {shlex.join(arguments)}: {error.format_message()}")

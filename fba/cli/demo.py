@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shlex
 import tempfile
-from importlib.resources import as_file, files
+from importlib.resources import files
 from pathlib import Path
 from threading import Timer
 
@@ -20,6 +20,8 @@ from fba.errors import DisplayError
 
 BAP_STEPS = "visage"
 """The standard's own table moves a root in steps of 64 mm, which shows."""
+SAMPLES = ("hello.bvh", "hello.fap")
+"""A body and a face, which come with fba."""
 PATIENCE = 4.0
 """Seconds after which it says why nothing is to be seen yet."""
 COMPILING = "compiling for this machine, on the first run only: about a minute in all"
@@ -29,7 +31,7 @@ COMPILING = "compiling for this machine, on the first run only: about a minute i
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for what is made; default: a new one among the temporary files.",
+    help="Folder for the samples and what is made of them; default: a new temporary one.",
 )
 @no_clobber_option
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
@@ -37,7 +39,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     """Encode the sample animation, say how small it became, and play it.
 
     A script made the sample; it is not motion capture. Without a display, make a video and a picture of it
-    instead.
+    instead. The folder gets the sample files as well, hello.bvh and hello.fap.
     """
     import player
     from fba.codec import EncoderOptions, encode, probe_stream
@@ -46,19 +48,23 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
     folder.mkdir(parents=True, exist_ok=True)
     stream, video, picture = (folder / f"hello{suffix}" for suffix in (".fba", ".mp4", ".png"))
-    made = [Output("--out", path) for path in (stream, video, picture)]
-    outputs = Outputs(made, no_clobber=no_clobber)
+    sources = [folder / name for name in SAMPLES]
+    outputs = Outputs(
+        [Output("--out", path) for path in (*sources, stream, video, picture)], no_clobber=no_clobber
+    )
     compiling = Timer(PATIENCE, click.echo, [COMPILING], {"err": True})
     compiling.daemon = True
     compiling.start()
-    with as_file(files("fba") / "samples") as samples:
-        body, face = read(samples / "hello.bvh"), read(samples / "hello.fap")
-        source_bytes = sum((samples / name).stat().st_size for name in ("hello.bvh", "hello.fap"))
+    for source in sources:
+        outputs.write(source, (files("fba") / "samples" / source.name).read_bytes())
+    body, face = (read(source) for source in sources)
+    source_bytes = sum(source.stat().st_size for source in sources)
     animation = merge(face, body.resample(face.rate))
     compiling.cancel()
+    click.echo(f"samples: {' and '.join(map(str, sources))}")
     click.echo(
-        f"sample: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and face at "
-        f"{options.rate_text(face.rate)} frames/s, {source_bytes} bytes of text (BVH and FAP)"
+        f"animation: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and face at "
+        f"{options.rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
     )
     data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
     outputs.write(stream, data)
