@@ -51,7 +51,8 @@ MISMATCH = (
 )
 ILLUSTRATIONS = {
     ("README.md", "./dev demo --out demo"): CHECKOUT,
-    ("README.md", ". .venv/bin/activate"): "chooses or makes an environment; .ci/run installs the wheel",
+    ("README.md", ". .venv/bin/activate"): "chooses an environment",
+    ("README.md", "pip install ."): "makes an environment; .ci/run installs the wheel and runs the demo",
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "python examples/figure/make_head.py"): "replaces the built-in head",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",

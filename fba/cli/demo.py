@@ -63,8 +63,8 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     compiling.cancel()
     click.echo(f"samples: {' and '.join(map(str, sources))}")
     click.echo(
-        f"animation: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and face at "
-        f"{options.rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
+        f"animation: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and "
+        f"face at {options.rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
     )
     data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
     outputs.write(stream, data)

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 import fba
 from fba.cli import demo
+from fba.cli.main import group
 
 SAMPLES = Path(fba.__file__).parent / "samples"
 
@@ -18,7 +19,7 @@ def test_the_folder_has_the_samples_and_the_stream_made_of_them(
 ) -> None:
     monkeypatch.setattr(demo, "_render", lambda *_: None)
     folder = tmp_path / "demo"
-    result = CliRunner().invoke(demo.command, ["--no-play", "--out", str(folder)])
+    result = CliRunner().invoke(group, ["demo", "--no-play", "--out", str(folder)])
     assert result.exit_code == 0, result.output
     names = sorted(path.name for path in SAMPLES.iterdir())
     assert names == ["hello.bvh", "hello.fap"]
