@@ -312,7 +312,7 @@ def test_several_files_stand_in_one_picture(run: Run, clip: Path, tmp_path: Path
         (("-o", "a.gif", "--audio", "clip.fba"), "--audio goes into an .mp4"),
         (("-o", "a.png", "--audio-offset", "0.1"), "--audio-offset goes into an .mp4"),
         (("-o", "a.mp4", "--audio-offset", "0.1"), "there is none: give one with --audio"),
-        (("-o", "a.mp4", "--audio-offset", "nan"), "nan is not a number of seconds"),
+        (("-o", "a.mp4", "--audio-offset", "nan"), "'nan' is not a number of seconds"),
         (("-o", "a.png", "--contact-sheet", "0"), "neither a number of frames nor one of 'faps'"),
         (("-o", "a.png", "--contact-sheet", "faps"), "--contact-sheet faps makes a picture without a file"),
         (("-o", "a.mp4", "--contact-sheet", "3"), "makes one picture"),

@@ -22,6 +22,12 @@ WARNED = "BAPs look implausible with the BAP steps 'iso' (the root goes "
 ASKED = "; made with --bap-steps visage?\n"
 
 
+@pytest.fixture(autouse=True)
+def a_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No window is opened here: `play` need not find a display for one."""
+    monkeypatch.setattr(player, "check_display", lambda: None)
+
+
 @pytest.fixture
 def walk(tmp_path: Path) -> Path:
     """A walk, made with the table that is not the default."""

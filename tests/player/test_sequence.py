@@ -62,7 +62,9 @@ def test_an_older_sequence_is_not_mixed_with(tmp_path: Path) -> None:
     Sequence(numbered, 2)  # an empty folder is fine
     for name in ("000.png", "002.png", "x.png", "0000000.jpg"):
         (tmp_path / name).write_bytes(b"old")
-    with pytest.raises(FormatError, match=r"000.png to 002.png \(2 pictures\) are there already.*--replace"):
+    with pytest.raises(
+        FormatError, match=r"000.png to 002.png \(2 pictures\) are there already.*replace=True"
+    ):
         Sequence(numbered, 3)
     Sequence(numbered, 3, replace=True)
     with pytest.raises(FormatError, match=r"002.png is left from a longer sequence"):
