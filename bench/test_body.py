@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fba.body import BapSolver, Skeleton
-from fba.body.conventions import convention
+from fba.body.solve.conventions import convention
 from fba.parameters import baps
 
 POSES = 2000

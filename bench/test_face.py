@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from fba.face import neutral_points
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 

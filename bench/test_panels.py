@@ -13,13 +13,13 @@ import pytest
 import fba
 from fba import Animation
 from fba.errors import DisplayError
-from player.scene import Scene
-from player.ui.session import Session
-from player.ui.source import Source
+from fba_player.scene.scene import Scene
+from fba_player.session.session import Session
+from fba_player.session.source import Source
 
 pytest.importorskip("imgui_bundle", exc_type=ImportError)
 
-from player.ui.picture import Studio
+from fba_player.ui.window_picture import Studio
 
 GOAL = 2e-3
 """Seconds a picture."""

@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 import fba
-import player
+import fba_player
 from fba import Animation, BodyTrack
 from fba.parameters import baps
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-import player
+import fba_player
 from fba.body import gait
-from player.camera import Camera
+from fba_player.view.camera import Camera
 
 TARGET = Path(__file__).with_name("images") / "gait.jpg"
 PHASES = 8

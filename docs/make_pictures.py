@@ -10,12 +10,12 @@ import numpy.typing as npt
 from PIL import Image
 
 import fba
-import player
+import fba_player
 from fba import Animation, FaceTrack
 from fba.face import FaceModel, feature_point_names
 from fba.face.calibration import fit
 from fba.formats import merge
-from player.recording import write_picture
+from fba_player.export.render import write_picture
 
 UInt8 = npt.NDArray[np.uint8]
 

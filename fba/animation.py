@@ -191,7 +191,7 @@ class Animation:
     def _repr_html_(self) -> str | None:
         """A small film, for notebooks; None where the player is not installed."""
         try:
-            notebook = import_module("player.notebook")  # by name: the player stands above this module
+            notebook = import_module("fba_player.export.notebook")  # by name: the player stands above this module
         except ImportError:
             return None
         return str(notebook.Preview(self)._repr_html_())

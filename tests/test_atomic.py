@@ -13,7 +13,7 @@ import pytest
 
 from fba.atomic import atomic
 from fba.errors import DisplayError, FormatError
-from player.whole import written
+from fba.atomic_path import written
 
 
 def put(path: Path | str, data: bytes = b"new") -> None:
@@ -47,7 +47,7 @@ def test_whatever_interrupts_leaves_the_old_file(
     assert os.listdir(tmp_path) == ["a"]
 
 
-@pytest.mark.parametrize("writer", ["fba.atomic import atomic as w", "player.whole import written as w"])
+@pytest.mark.parametrize("writer", ["fba.atomic import atomic as w", "fba.atomic_path import written as w"])
 def test_an_interruption_just_when_the_temporary_file_appears(tmp_path: Path, writer: str) -> None:
     code = f"""
 import os

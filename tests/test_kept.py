@@ -13,8 +13,8 @@ import numpy.typing as npt
 import pytest
 
 from fba.body.model import BodyModel
-from fba.body.rings import rings
-from fba.kept import MOST_FILES, kept, key_of
+from fba.body.skin.moving_normals import rings
+from fba.cache import MOST_FILES, kept, key_of
 
 
 def numbers(value: float) -> list[npt.NDArray[np.float16]]:
@@ -82,7 +82,7 @@ def test_a_full_disk_is_no_error(tmp_path: Path) -> None:
     code = """
 import resource, sys
 import numpy as np
-from fba.kept import kept
+from fba.cache import kept
 resource.setrlimit(resource.RLIMIT_FSIZE, (20, 20))
 print(kept("one", ((3, 2),), lambda: [np.ones((3, 2), np.float16)])[0].sum())
 """

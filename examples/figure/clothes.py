@@ -16,7 +16,7 @@ from person import Person
 from scipy.interpolate import PchipInterpolator
 
 from fba.body import Skeleton
-from fba.mesh import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]

@@ -24,12 +24,12 @@ from sculpt import ORIGIN
 from shoulders import sloping
 
 from fba.body import Skeleton
-from fba.body.influences import strongest
+from fba.body.skin.skin_weights import strongest
 from fba.body.model import BodyModel, BodyPart, Material
-from fba.body.posture import FINGERS
+from fba.body.solve.bind_pose import FINGERS
 from fba.face.model import FaceModel, point_row
-from fba.mesh import vertex_normals
-from player.visibility import bake
+from fba.mesh.meshes import vertex_normals
+from fba_player.figure.occlusion import bake
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]

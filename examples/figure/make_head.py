@@ -183,7 +183,7 @@ def _finish(surface: Refined, where: sculpt.Marks) -> Float64:
 
 def _nostrils(surface: Refined) -> Float64:
     """(V,) 1 outside, dark within the nostrils, where little light falls."""
-    from player.visibility import bake
+    from fba_player.figure.occlusion import bake
 
     v = surface.vertices
     normals = vertex_normals(v, surface.triangles)

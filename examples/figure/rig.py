@@ -17,7 +17,7 @@ import numpy.typing as npt
 from person import Person, person, proportioned
 
 from fba.body import Skeleton
-from fba.body.posture import FINGERS, bind_matrices, chain, shares, unposed, vertebrae
+from fba.body.solve.bind_pose import FINGERS, bind_matrices, chain, shares, unposed, vertebrae
 
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from clothes import MIRROR, Garment
 
-from fba.mesh import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]

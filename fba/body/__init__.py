@@ -6,22 +6,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fba.body.conventions import convention_names
+    from fba.body.solve.conventions import convention_names
     from fba.body.definition import BodyDefinition
-    from fba.body.limits import Excess, Limit, Limits
+    from fba.body.solve.limits import Excess, Limit, Limits
     from fba.body.skeleton import Skeleton
-    from fba.body.solver import BapSolver
-    from fba.body.wrapping import wrapped
+    from fba.body.solve.solver import BapSolver
+    from fba.body.solve.angle_wrap import wrapped
 
 _PLACES = {
-    "BapSolver": "fba.body.solver",
+    "BapSolver": "fba.body.solve.solver",
     "BodyDefinition": "fba.body.definition",
-    "Excess": "fba.body.limits",
-    "Limit": "fba.body.limits",
-    "Limits": "fba.body.limits",
+    "Excess": "fba.body.solve.limits",
+    "Limit": "fba.body.solve.limits",
+    "Limits": "fba.body.solve.limits",
     "Skeleton": "fba.body.skeleton",
-    "convention_names": "fba.body.conventions",
-    "wrapped": "fba.body.wrapping",
+    "convention_names": "fba.body.solve.conventions",
+    "wrapped": "fba.body.solve.angle_wrap",
 }
 
 __all__ = [

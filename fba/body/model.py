@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
-from fba.mesh import Material, Meshes, joined, mesh_arrays
+from fba.mesh.meshes import Material, Meshes, joined, mesh_arrays
 
 if TYPE_CHECKING:
-    from fba.body.skinning import Skinner
+    from fba.body.skin.skinning import Skinner
 
 __all__ = ["BODY_PART_KINDS", "INFLUENCES", "BodyModel", "BodyPart", "Material"]
 
@@ -177,7 +177,7 @@ class BodyModel(Meshes[BodyPart]):
     @cached_property
     def skinner(self) -> Skinner:
         """What `skin` uses; made on first use."""
-        from fba.body.skinning import Skinner
+        from fba.body.skin.skinning import Skinner
 
         return Skinner(
             self.vertices,

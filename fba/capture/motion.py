@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import MAX_FRAMES
-from fba.capture import rotations
+from fba import rotations
 from fba.errors import ModelError
 
 

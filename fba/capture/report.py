@@ -10,7 +10,10 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.body import BapSolver
-from fba.capture import feet, ground, matching, rest
+from fba.capture import matching
+from fba.capture.limbs import soles
+from fba.capture.limbs import ground
+from fba.capture import rest_alignment
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 
@@ -64,7 +67,7 @@ class RetargetReport:
     family: str
     frames: int
     bones: tuple[BoneError, ...]
-    feet: FeetError | None
+    soles: FeetError | None
     unused: tuple[str, ...]
     missing: tuple[str, ...]
 
@@ -107,7 +110,7 @@ def retarget_report(
     if not count:
         raise ModelError("retarget_report: the motion and the animation have no frame in common")
 
-    alignment = rest.align(motion, mapped, skeleton)
+    alignment = rest_alignment.align(motion, mapped, skeleton)
     turned, places = motion.world()
     places = places @ alignment.upright.T
     order = {name: number for number, name in enumerate(skeleton.names)}
@@ -124,7 +127,7 @@ def retarget_report(
             theirs = places[begin:end, mapped[aim]] - places[begin:end, mapped[joint]]
             angles[begin:end, column] = _between(ours, theirs)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
-        own = feet.body_soles(skeleton, frames, matrices[:, 0, :3, 3], toes)
+        own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3], toes)
         has_feet = own is not None
         if own is not None:
             heights[:, begin:end] = own.lowest
@@ -139,10 +142,10 @@ def retarget_report(
         )
         for column, (joint, aim) in enumerate(aims)
     )
-    metres = rest.scale(motion, mapped, skeleton) if scale is None else scale
+    metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
     standing = None
     if has_feet and metres:
-        source = feet.source_soles(motion, mapped, alignment.upright, turned, places, metres)
+        source = soles.source_soles(motion, mapped, alignment.upright, turned, places, metres)
         standing = _feet(source, heights) if source is not None else None
     used = set(mapped.values())
     return RetargetReport(
@@ -162,7 +165,7 @@ def _between(a: Float, b: Float) -> Float:
     return result
 
 
-def _feet(source: feet.Soles, body: Float) -> FeetError | None:
+def _feet(source: soles.Soles, body: Float) -> FeetError | None:
     middles = source.points.mean(axis=1)
     level = ground.found(source.lowest, middles).under(middles)[:, : body.shape[1]]
     above = source.lowest[:, : body.shape[1]] - level

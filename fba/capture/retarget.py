@@ -9,9 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body import BapSolver, wrapped
-from fba.body.solving import joint_angles
-from fba.capture import aiming, hinges, rest, rotations, spine
-from fba.capture.footing import Footing
+from fba.body.solve.solver_loops import joint_angles
+from fba.capture import spine
+from fba.capture.limbs import bone_ik
+from fba.capture.limbs import hinges
+from fba.capture import rest_alignment
+from fba import rotations
+from fba.capture.limbs.foot_planting import Footing
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning, Remedy
 from fba.parameters import BAP_COUNT, baps
@@ -54,7 +58,7 @@ class Retarget:
     ) -> None:
         self.solver, self.motion, self.mapped = solver, motion, mapped
         self.skeleton = solver.skeleton
-        alignment = rest.align(motion, mapped, self.skeleton)
+        alignment = rest_alignment.align(motion, mapped, self.skeleton)
         turned, places = motion.world()
         upright = alignment.upright
         self.upright, self.turned = upright, turned
@@ -150,8 +154,8 @@ class Retarget:
         start = self._closest(joint, np.swapaxes(above, 1, 2) @ self.wanted[joint])
         if bone is None:
             bone = self.bone(joint, self.aims[joint])
-        angles = aiming.aim(axes, start, bone, wanted, np.full(len(axes), LOOSE))
-        self.wanted[joint] = above @ aiming.product(axes, angles)
+        angles = bone_ik.aim(axes, start, bone, wanted, np.full(len(axes), LOOSE))
+        self.wanted[joint] = above @ bone_ik.product(axes, angles)
 
     def _hinge(self, upper: str, lower: str) -> None:
         if self.aims.get(upper) != lower or lower not in self.aims:
@@ -188,12 +192,12 @@ class Retarget:
         turn = self._closest(inner, np.swapaxes(above, 1, 2) @ self.wanted[inner])
         start = np.concatenate([turn * CLAVICLE_SHARE, turn * (1 - CLAVICLE_SHARE)], axis=1)
         own = turn.shape[1]
-        target = aiming.Target(
+        target = bone_ik.Target(
             ((pieces[0], own), (pieces[1], len(axes))), rotations.inside(above, self._direction(inner))
         )
-        angles = aiming.aim_all(axes, start, (target,), np.full(len(axes), LOOSE))
-        self.wanted[inner] = above @ aiming.product(axes[:own], angles[:, :own])
-        self.wanted[outer] = self.wanted[inner] @ aiming.product(axes[own:], angles[:, own:])
+        angles = bone_ik.aim_all(axes, start, (target,), np.full(len(axes), LOOSE))
+        self.wanted[inner] = above @ bone_ik.product(axes[:own], angles[:, :own])
+        self.wanted[outer] = self.wanted[inner] @ bone_ik.product(axes[own:], angles[:, own:])
 
     def _forearm(self, side: str) -> None:
         """The forearm takes its share of the hand's twist."""
@@ -224,21 +228,21 @@ class Retarget:
             starts.append(self._closest(joint, np.swapaxes(before, 1, 2) @ self.wanted[joint]))
             before = self.wanted[joint]
             pieces = ((self.bone(joint, self.aims[joint]), len(axes)),)
-            targets.append(aiming.Target(pieces, rotations.inside(above, self._direction(joint))))
+            targets.append(bone_ik.Target(pieces, rotations.inside(above, self._direction(joint))))
         turned = np.array(axes)
         start = np.concatenate(starts, axis=1)
-        angles = aiming.aim_all(turned, start, targets, np.full(len(turned), STIFF[finger[2:]]))
+        angles = bone_ik.aim_all(turned, start, targets, np.full(len(turned), STIFF[finger[2:]]))
         used = 0
         frame = above
         for joint, own_angles in zip(joints, starts, strict=True):
             count = own_angles.shape[1]
-            frame = frame @ aiming.product(turned[used : used + count], angles[:, used : used + count])
+            frame = frame @ bone_ik.product(turned[used : used + count], angles[:, used : used + count])
             self.wanted[joint] = frame
             used += count
 
     def _unit(self) -> float:
         """Metres of the body for one unit of the source."""
-        unit = rest.scale(self.motion, self.mapped, self.skeleton)
+        unit = rest_alignment.scale(self.motion, self.mapped, self.skeleton)
         if unit is None:
             text = (
                 "the source has neither whole legs nor whole arms: its unit is unknown; taken as centimetres"

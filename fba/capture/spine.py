@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body.skeleton import Skeleton
-from fba.capture import rotations
+from fba import rotations
 from fba.parameters import baps
 
 Float = npt.NDArray[np.float64]

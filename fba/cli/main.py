@@ -13,9 +13,9 @@ from typing import Any, NoReturn
 import click
 
 from fba import __version__
-from fba.cli.compiling import Notice
-from fba.cli.interruption import Interruptions
-from fba.cli.leaving import INTERRUPTED, TEXT
+from fba.cli.compile_notice import Notice
+from fba.cli.sigint import Interruptions
+from fba.cli.exit_quietly import INTERRUPTED, TEXT
 from fba.cli.options import Group, described, examples
 from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import hasten

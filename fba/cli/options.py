@@ -145,7 +145,7 @@ class RateType(click.ParamType[Fraction]):
     name = "rate"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
-        from fba.formats.rates import parse_rate
+        from fba.formats.text.frame_rates import parse_rate
 
         low, high = RATES
         try:
@@ -283,7 +283,7 @@ def deform_option(command: Decorated) -> Decorated:
 
 
 def _preferred(context: click.Context, option: click.Parameter, value: str) -> None:
-    from player.gpu.choice import prefer
+    from fba_player.gl.gpu.choice import prefer
 
     prefer(value)
 
@@ -296,7 +296,7 @@ class ShowType(click.ParamType[tuple[str, Any]]):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, Any]:
-        from player.switches import parse_switch
+        from fba_player.view.switches import parse_switch
 
         try:
             return parse_switch(str(value))

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fba.animation import Animation, Frame
-from fba.codec import plane, slots, syntax
+from fba.codec._plane import loops
+from fba.codec._plane import slots
+from fba.codec._plane import syntax
 from fba.codec.assembly import Assembly
-from fba.codec.bits import OutOfDataError
+from fba.codec._plane.bits import OutOfDataError
 from fba.codec.block import Block
 from fba.codec.buffer import Buffer
 from fba.codec.clock import StreamClock
-from fba.codec.plane_reader import PlaneReader, Planes
+from fba.codec._plane.reader import PlaneReader, Planes
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, but_recognised
@@ -203,8 +205,8 @@ class Decoder:
         end = 8 * buffer.length
         if buffer.length < self._retry_at and not final:
             return None
-        code, after = plane.find_start_code(buffer.data, self._bit, end, self._code_bit is not None)
-        if code == plane.UNDECIDED:
+        code, after = loops.find_start_code(buffer.data, self._bit, end, self._code_bit is not None)
+        if code == loops.UNDECIDED:
             if final and end - self._bit >= 32:
                 self._warn("the stream ends inside a start code; no plane is lost")
             if final:
@@ -212,7 +214,7 @@ class Decoder:
                 self._object_end = buffer.offset + buffer.length
                 self._step = self._find_object
             return None
-        if code != plane.NO_START_CODE:
+        if code != loops.NO_START_CODE:
             start, self._bit = self._bit, after
             self._doubtful.clear()
             if code not in syntax.PLANE_CODES:

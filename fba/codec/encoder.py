@@ -10,9 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack, Frame
-from fba.codec import planner, quantiser, slots
-from fba.codec.plane import SKIP_MAX
-from fba.codec.plane_writer import DoesNotFitError, PlaneWriter
+from fba.codec import planner
+from fba.codec._plane import quantiser
+from fba.codec._plane import slots
+from fba.codec._plane.loops import SKIP_MAX
+from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec.planner import EncoderOptions, Ranges
 from fba.codec.settings import PartSettings, PlaneSettings, RangeLists
 from fba.errors import RangeError

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.codec import slots
-from fba.codec.plane_writer import DoesNotFitError, PlaneWriter
+from fba.codec._plane import slots
+from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec.settings import PlaneSettings
 from fba.errors import RangeError
 

@@ -5,12 +5,12 @@ points = fba.face.FeaturePointFace()(shown)    # float32 (T, 84, 3): feature poi
 vertices = fba.face.Deformer(model)(shown)     # float32 (T, V, 3): a whole face, metres
 """
 
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names as feature_point_names
 from fba.face.feature_points import neutral_points
-from fba.face.interpolation_table import Function, InterpolationTable, Link, Term
+from fba.face.interpolation.table import Function, InterpolationTable, Link, Term
 from fba.face.model import FaceModel, Material, Part
 from fba.face.points import Eyeballs, FeaturePointFace
 from fba.face.resolve import Resolver, resolve

@@ -16,11 +16,11 @@ from fba.face.expressions import Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, row_of
 from fba.face.tables import HEAD, FaceDefTables
-from fba.mesh import Material, Meshes, mesh_arrays
+from fba.mesh.meshes import Material, Meshes, mesh_arrays
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
 if TYPE_CHECKING:
-    from fba.face.interpolation_table import InterpolationTable
+    from fba.face.interpolation.table import InterpolationTable
 
 __all__ = ["PART_KINDS", "FaceModel", "Material", "Part", "bind", "point_row"]
 

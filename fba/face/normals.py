@@ -1,5 +1,5 @@
 """Vertex normals of a triangulated surface."""
 
-from fba.mesh import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 __all__ = ["vertex_normals"]

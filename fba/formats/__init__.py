@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fba.errors import OptionError
-from fba.formats.join import merge
+from fba.formats.merge import merge
 from fba.formats.registry import Format, format_of, formats, probe, read, write, writer_for
 
 __all__ = ["Format", "OptionError", "format_of", "formats", "merge", "probe", "read", "write", "writer_for"]

@@ -150,7 +150,7 @@ def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
     """Read an animation from a file of any known format.
 
     format: its name where the content should not be asked. options: those of the format's reader, see
-    `formats()` and e.g. `fba.formats.fap.read_fap`. Raises FormatError, BitstreamError,
+    `formats()` and e.g. `fba.formats.text.fap.read_fap`. Raises FormatError, BitstreamError,
     UnsupportedError or OptionError.
     """
     found = format_of(path, format)

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from small_bodies import Float64, rod
 
 from fba.body import BapSolver
-from fba.body.heads import HeadOnBody, placement
-from fba.body.influences import strongest
+from fba.body.head_attachment import HeadOnBody, placement
+from fba.body.skin.skin_weights import strongest
 from fba.body.model import BodyModel
 from fba.errors import ModelError
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.parameters import baps
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fba.body import BapSolver
-from fba.body.heads import HeadOnBody
+from fba.body.head_attachment import HeadOnBody
 from fba.body.importers import import_makehuman
 from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
@@ -74,7 +74,7 @@ def test_a_hand_goes_where_its_wrist_goes(body: BodyModel) -> None:
 
 def test_its_own_head_continues_its_skin(folder: Path, body: BodyModel) -> None:
     """A head made of the same mesh ends where the body begins, and stays there in any pose."""
-    from fba.face.importers.makehuman import import_makehuman as import_head
+    from fba.face.importers.makehuman.makehuman import import_makehuman as import_head
     from fba.face.model import point_row
 
     model = import_head(folder)

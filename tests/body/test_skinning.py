@@ -13,7 +13,7 @@ from small_bodies import Float64, random_pose, rod, tube
 from fba.body import BapSolver
 from fba.body.model import BodyModel, BodyPart
 from fba.compiled import is_compiled
-from fba.mesh import vertex_normals
+from fba.mesh.meshes import vertex_normals
 from fba.parameters import baps
 
 METHODS = ("dual", "linear")

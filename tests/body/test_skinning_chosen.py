@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from fba.body import BapSolver
-from fba.body.heads import HeadOnBody
+from fba.body.head_attachment import HeadOnBody
 from fba.body.model import BodyModel
 from fba.face.model import FaceModel, point_row
 

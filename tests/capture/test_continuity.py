@@ -12,7 +12,7 @@ from test_from_skeleton import NAMES, REAL
 
 from fba.body import BapSolver, Skeleton
 from fba.capture import SkeletonMotion, from_skeleton, matching
-from fba.formats import bvh
+from fba.formats.bvh import reader
 
 HINGED = ("shoulder", "elbow", "hip", "knee")
 
@@ -69,7 +69,7 @@ def test_elbow_beyond_straight_and_back() -> None:
 @pytest.mark.parametrize("name", REAL)
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_real_limbs_do_not_jump(shared: Path, name: str) -> None:
-    captured = bvh.read_motion(shared / "data" / name)
+    captured = reader.read_motion(shared / "data" / name)
     _, mapped = matching.match(captured.names)
     found = joint_steps(captured)
     for side in "lr":

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from fba.body import BapSolver, Skeleton
 from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
 from fba.errors import FbaWarning, ModelError
-from fba.formats import bvh
+from fba.formats.bvh import reader
 from fba.parameters import bap_numbers, baps
 
 NUMBERS = bap_numbers()
@@ -276,7 +276,7 @@ def test_forward_kinematics_against_scipy() -> None:
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     family, rate, frames = REAL[name]
-    captured = bvh.read_motion(shared / "data" / name)
+    captured = reader.read_motion(shared / "data" / name)
     found, mapped = matching.match(captured.names)
     assert (found, captured.rate, len(captured)) == (family, rate, frames)
     animation = from_skeleton(captured)
@@ -306,7 +306,7 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_twist_of_nearly_straight_legs_does_not_jump(shared: Path) -> None:
     """A sad walk on knees that bend a few degrees in all directions: thighs do not spin about themselves."""
-    animation = from_skeleton(bvh.read_motion(shared / "data/greta/sad_walk_rd.bvh"))
+    animation = from_skeleton(reader.read_motion(shared / "data/greta/sad_walk_rd.bvh"))
     for name in ("l_hip_twisting", "r_hip_twisting", "l_knee_twisting", "r_knee_twisting"):
         steps = np.abs(np.diff(value(animation, name).astype(float)))
         assert steps.max() < 30_000, name  # 0.3 rad a frame at 120 frames/s

@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 from test_from_skeleton import NAMES
 
 from fba.body import BapSolver, Skeleton
-from fba.capture import SkeletonMotion, from_skeleton, ground, legs, retarget_report
+from fba.capture import SkeletonMotion, from_skeleton, retarget_report
+from fba.capture.limbs import ground
+from fba.capture.limbs import leg_ik
 
 THIGH, SHANK = 0.36, 0.54
 """Metres: a body of quite other proportions than the default's, whose thigh and shank are of one length."""
@@ -153,9 +155,9 @@ def test_leg_reaches_by_the_law_of_cosines() -> None:
     bend = np.radians(80)
     hip, knee = np.zeros((1, 3)), np.array([[0.0, -0.43, 0.0]])
     ankle = knee + 0.42 * np.array([[0.0, -np.cos(bend), -np.sin(bend)]])
-    leg = legs.Leg(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))
+    leg = leg_ik.Leg(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))
     move = np.array([[0.01, 0.015, -0.02]])
-    thigh, shank = legs.reach(leg, move)
+    thigh, shank = leg_ik.reach(leg, move)
     reached = (thigh @ knee[0]) + (shank @ (ankle - knee)[0])
     np.testing.assert_allclose(reached[0], (ankle + move)[0], atol=5e-4)
 
@@ -165,9 +167,9 @@ def test_straight_leg_is_not_broken_for_a_millimetre() -> None:
     bend = np.radians(np.array([1.0, 0.5, 0.0, -0.5, -1.0]))
     hip, knee = np.zeros((5, 3)), np.tile([0.0, -0.43, 0.0], (5, 1))
     ankle = knee + 0.42 * np.stack([0 * bend, -np.cos(bend), -np.sin(bend)], axis=1)
-    leg = legs.Leg(hip, knee, ankle, np.tile([1.0, 0.0, 0.0], (5, 1)))
-    thigh, shank = legs.reach(leg, np.tile([0.0, 0.005, 0.0], (5, 1)))
+    leg = leg_ik.Leg(hip, knee, ankle, np.tile([1.0, 0.0, 0.0], (5, 1)))
+    thigh, shank = leg_ik.reach(leg, np.tile([0.0, 0.005, 0.0], (5, 1)))
     turned = np.degrees(Rotation.from_matrix(shank).magnitude())
     assert turned.max() < 2.0
     assert np.degrees(Rotation.from_matrix(thigh).magnitude()).max() < 1.0
-    assert legs.pliancy(leg).max() < 0.05
+    assert leg_ik.pliancy(leg).max() < 0.05

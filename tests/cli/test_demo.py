@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import fba
-from fba.cli import demo
+from fba.cli.commands import demo
 from fba.cli.main import group
 
 SAMPLES = Path(fba.__file__).parent / "samples"

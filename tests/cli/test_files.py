@@ -264,7 +264,7 @@ def test_conformance(run: Run, tmp_path: Path) -> None:
     code, _, err = run("conformance", tmp_path)
     assert code == 1
     assert "index.json" in err
-    from conformance.runner import OWN
+    from fba_conformance.runner import OWN
 
     entries = [
         entry for entry in json.loads((OWN / "index.json").read_text()) if entry["stream"] == "skips.fba"

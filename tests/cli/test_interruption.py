@@ -9,7 +9,7 @@ import pytest
 
 IN_A_CALLBACK = """
 import ctypes, signal, sys, time
-import fba.cli.info
+import fba.cli.commands.info
 from fba.cli.main import group, main
 callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -77,7 +77,7 @@ def ran(code: str) -> tuple[int, str, str]:
 
 
 @pytest.mark.parametrize(
-    "module", ["fba.cli.main", "click", "inspect", "fba.cli.startup", "fba.cli.options", "fba.cli.info"]
+    "module", ["fba.cli.main", "click", "inspect", "fba.cli.startup", "fba.cli.options", "fba.cli.commands.info"]
 )
 def test_ctrl_c_while_the_program_is_imported_leaves_no_traceback(module: str) -> None:
     code, out, err = ran(IMPORTING.format(module=module, handler="default_int_handler"))

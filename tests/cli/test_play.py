@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import fba
-import player
+import fba_player
 from fba import Animation
-from player.compare import CompareScene
-from player.live import LiveAnimation
+from fba_player.scene.compare import CompareScene
+from fba_player.playback.live import LiveAnimation
 
 Run = Callable[..., Any]
 

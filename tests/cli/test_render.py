@@ -18,7 +18,7 @@ from PIL import Image
 
 import fba
 from fba import Animation
-from fba.cli.still import still
+from fba.cli.pose_options import still
 
 Run = Callable[..., tuple[int, str, str]]
 SMALL = ("--size", "96x72")

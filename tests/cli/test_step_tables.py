@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import fba
-import player
+import fba_player
 from fba import Animation
 from fba.body import gait
 
@@ -139,9 +139,9 @@ def test_the_window_is_told(run: Run, walk: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_picture_is_made_with_the_warning(
     run: Run, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from player import recording
+    from fba_player.export import render
 
-    monkeypatch.setattr(recording, "render", lambda *_, **__: "the picture")
+    monkeypatch.setattr(render, "render", lambda *_, **__: "the picture")
     done = run("render", walk, "-o", tmp_path / "walk.png")
     assert (done.code, WARNED in done.err) == (0, True)
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from hypothesis import strategies as st
 
-from conformance.textbook import FrequencyTable, encode_segment
+from fba_conformance.textbook import FrequencyTable, encode_segment
 from fba import Animation, BodyTrack, Decoder, FaceTrack, FbaError, FbaWarning, Frame
 from fba.parameters import bap_steps, fap_steps
 

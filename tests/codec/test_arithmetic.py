@@ -7,9 +7,9 @@ from random import Random
 import numpy as np
 import pytest
 
-from conformance import textbook
+from fba_conformance import textbook
 from fba import BitstreamError
-from fba.codec.arithmetic import (
+from fba.codec._plane.arithmetic import (
     BAD_FLUSH,
     BAD_GUARD,
     OK,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from codec_streams import OBJECT, content, decoded
 
-from conformance import motion
+from fba_conformance import motion
 from fba import (
     Animation,
     BitstreamError,

@@ -11,7 +11,7 @@ from codec_streams import BAP_GROUPS, FAP_GROUP_SIZES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from conformance.trace import trace
+from fba_conformance.trace import trace
 from fba import Animation, BodyTrack, Decoder, FaceTrack, FbaWarning
 from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode, encode_planes
 from fba.parameters import bap_groups, baps, fap_groups, faps

@@ -23,7 +23,7 @@ from codec_streams import (
     segment,
 )
 
-from conformance.textbook import FrequencyTable, encode_segment
+from fba_conformance.textbook import FrequencyTable, encode_segment
 from fba import BitstreamError, Decoder, FbaError, FbaWarning, UnsupportedError, decode
 from fba.codec import probe_stream
 from fba.parameters import bap_groups

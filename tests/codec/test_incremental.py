@@ -11,7 +11,7 @@ from codec_streams import END, OBJECT, content, decoded, jaw_intra, jaw_predicte
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conformance import motion
+from fba_conformance import motion
 from fba import (
     Animation,
     BitstreamError,

@@ -11,9 +11,9 @@ from codec_streams import animations, steps
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from conformance import motion
-from conformance.runner import plane_records
-from conformance.trace import decode_values
+from fba_conformance import motion
+from fba_conformance.runner import plane_records
+from fba_conformance.trace import decode_values
 from fba import Animation, BodyTrack, Decoder, EncoderOptions, FaceTrack, decode, encode
 
 QUANTS = st.one_of(st.sampled_from([0, 1, 2]), st.integers(0, 31))

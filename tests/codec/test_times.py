@@ -13,7 +13,7 @@ from codec_streams import OBJECT, RATES, decoded, jaw_intra, packed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conformance import motion
+from fba_conformance import motion
 from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, decode, encode
 from fba.codec import FrameRate, PlaneSettings, TimeCode, encode_planes
 

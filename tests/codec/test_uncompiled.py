@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from conformance import fuzz
+from fba_conformance import fuzz
 from fba import compiled
 
 SCRIPT = """

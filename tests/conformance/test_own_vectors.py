@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from conformance.cases import cases
-from conformance.generate import generate
-from conformance.runner import OWN, check, vectors
+from fba_conformance.cases import cases
+from fba_conformance.generate import generate
+from fba_conformance.runner import OWN, check, vectors
 
 
 def test_the_committed_vectors_are_those_that_the_generator_makes(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conformance.textbook import FrequencyTable, decode_segment, encode_segment
+from fba_conformance.textbook import FrequencyTable, decode_segment, encode_segment
 from fba import BitstreamError
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from conformance.trace import decode_values
+from fba_conformance.trace import decode_values
 from fba import FbaWarning
 
 FAMILIES = (

@@ -9,7 +9,7 @@ from grid_head import EYE_RADIUS, grid_head
 from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import check_faps
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps

@@ -362,7 +362,7 @@ def test_distances_that_are_none(small: FaceModel, distances: dict[str, float], 
 
 def test_the_real_files(head: FaceModel, shared: Path) -> None:
     """Candide's points, with all their mistakes, make a face; each mistake is told."""
-    from fba.face.importers.fdp import read_fdp
+    from fba.face.importers.points.fdp import read_fdp
 
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
@@ -462,7 +462,7 @@ def test_every_faps_of_a_fitted_head_keeps_the_standard(
 ) -> None:
     """Of alice.fdp, and of people two standard deviations off the mean in face width or height."""
     from fba.face.checks import check_faps, check_neutral
-    from fba.face.importers.fdp import load_fdp
+    from fba.face.importers.points.fdp import load_fdp
 
     if who == "alice":
         alice = request.getfixturevalue("shared") / "data/xface/alice.fdp"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fba.face import FeaturePointFace, feature_point_names, neutral_points
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part
 from fba.face.normals import vertex_normals
 from fba.face.points import shift_table

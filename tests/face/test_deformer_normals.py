@@ -17,7 +17,7 @@ import pytest
 
 from fba.errors import ModelError, RangeError
 from fba.face import neutral_points
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 

@@ -11,13 +11,13 @@ from small_head import small_head
 
 from fba.errors import FbaWarning, ModelError
 from fba.face.authoring import author, from_morphs
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import row_of
 from fba.face.gltf.morphs import displacements
 from fba.face.importers import import_model
-from fba.face.importers.landmarks import find_points
-from fba.face.importers.pieces import Piece
+from fba.face.importers.assembly.landmarks import find_points
+from fba.face.importers.assembly.pieces import Piece
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers, faps
 

@@ -10,11 +10,11 @@ import pytest
 
 from fba.errors import ModelError, OptionError
 from fba.face.checks import check_neutral
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
-from fba.face.importers.makehuman import makehuman_parts, read_makehuman
-from fba.face.importers.targets import expression_shapes, read_target, shape_of
+from fba.face.importers.makehuman.makehuman import makehuman_parts, read_makehuman
+from fba.face.importers.makehuman.targets import expression_shapes, read_target, shape_of
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 

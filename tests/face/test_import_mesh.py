@@ -10,11 +10,11 @@ from mesh_files import ply, write_obj, write_points
 from small_head import small_head
 
 from fba.errors import FbaWarning, ModelError, OptionError
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
-from fba.face.importers.kinds import kind_of
-from fba.face.importers.units import metres_per_unit
+from fba.face.importers.assembly.kinds import kind_of
+from fba.face.importers.assembly.units import metres_per_unit
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from fba.errors import ModelError
-from fba.face.importers import files, obj
-from fba.face.importers.obj import read_obj
-from fba.face.importers.polygons import make_part, triangulate
+from fba.mesh import text_files
+from fba.mesh import obj
+from fba.mesh.obj import read_obj
+from fba.mesh.polygons import make_part, triangulate
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -89,7 +90,7 @@ def test_colours_after_the_position(tmp_path: Path) -> None:
         ("# nothing\n", "", "0 vertices"),
         (SQUARE.encode("utf-16"), "", "UTF-16"),
         (b"v 0 0 0\nv 1\x000 0\n", ":2", "zero bytes"),
-        (b"v " + b"1" * (files.MAX_LINE + 5), ":1", "longer than"),
+        (b"v " + b"1" * (text_files.MAX_LINE + 5), ":1", "longer than"),
         (b"", "", "empty"),
     ],
 )

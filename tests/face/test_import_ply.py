@@ -9,7 +9,7 @@ import pytest
 from mesh_files import ply
 
 from fba.errors import ModelError
-from fba.face.importers.ply import read_ply
+from fba.mesh.ply import read_ply
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 2, 0.25]])
 MIXED = [[0, 1, 2], [0, 2, 3], [3, 2, 4, 0]]

@@ -11,8 +11,8 @@ import pytest
 from fba.errors import FbaWarning, ModelError
 from fba.face.fapu import Fapu
 from fba.face.feature_points import neutral_points, row_of
-from fba.face.importers.fdp import load_fdp, read_fdp
-from fba.face.importers.points_file import given_points, read_points
+from fba.face.importers.points.fdp import load_fdp, read_fdp
+from fba.face.importers.points.points_file import given_points, read_points
 
 XFACE = """<?xml version="1.0"?><xfdp><head><file version="0.2"/>
 <fapu ENS0="51" ES0="69" IRISD0="16" MNS0="30" MW0="50"/></head>

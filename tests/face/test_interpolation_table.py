@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fba.errors import ModelError
-from fba.face.interpolation_functions import evaluate
-from fba.face.interpolation_table import Function, InterpolationTable, Link, Term
+from fba.face.interpolation.evaluate import evaluate
+from fba.face.interpolation.table import Function, InterpolationTable, Link, Term
 from fba.parameters import fap_numbers, faps
 
 SURPRISE = 6

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fba.animation import FaceTrack
 from fba.face import Definitions, Resolver, resolve
-from fba.face.interpolation_table import Function, InterpolationTable, Link, Term
+from fba.face.interpolation.table import Function, InterpolationTable, Link, Term
 from fba.parameters import fap_numbers
 
 JOY = 1

@@ -11,7 +11,7 @@ from format_files import animations, file, mask
 from hypothesis import given, settings
 
 from fba.errors import FbaWarning, FormatError
-from fba.formats.bap import read_bap, write_bap
+from fba.formats.text.bap import read_bap, write_bap
 
 
 @pytest.mark.parametrize("width", [186, 187, 296, 297])

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import fba
 from fba.errors import FbaError, FbaWarning, FormatError
-from fba.formats import bvh
+from fba.formats.bvh import reader
 
 HEAD = """HIERARCHY
 ROOT Hips
@@ -39,7 +39,7 @@ def text(head: str = HEAD, rows: str = ROWS, frames: str = "2", time: str = "0.0
 
 
 def test_reads_hierarchy_and_motion() -> None:
-    motion = bvh.parse(text(), name="small")
+    motion = reader.parse(text(), name="small")
     assert motion.names == ("Hips", "Spine")
     assert motion.parents.tolist() == [-1, 0]
     assert motion.offsets.tolist() == [[0, 0, 0], [0, 10, 0]]
@@ -74,7 +74,7 @@ def test_reads_hierarchy_and_motion() -> None:
 def test_lenient_with_how_it_is_written(tmp_path: Path, change) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / "walk.bvh"
     path.write_bytes(change(text()).encode())
-    expected, found = bvh.parse(text()), bvh.read_motion(path)
+    expected, found = reader.parse(text()), reader.read_motion(path)
     np.testing.assert_allclose(found.rotations, expected.rotations)
     np.testing.assert_array_equal(found.positions, expected.positions)
     assert [n.lower() for n in found.names] == ["hips", "spine"]
@@ -93,31 +93,31 @@ def test_lenient_with_how_it_is_written(tmp_path: Path, change) -> None:  # type
     ],
 )  # fmt: skip
 def test_rates(written: str, rate: Fraction) -> None:
-    assert bvh.parse(text(time=written)).rate == rate
+    assert reader.parse(text(time=written)).rate == rate
 
 
 def test_wrong_frame_count_is_a_warning() -> None:
     with pytest.warns(FbaWarning, match="header says 3 frames, the file has 2"):
-        assert len(bvh.parse(text(frames="3"))) == 2
+        assert len(reader.parse(text(frames="3"))) == 2
 
 
 def test_claimed_frames_allocate_nothing() -> None:
     with pytest.warns(FbaWarning, match="10000000000"):
-        assert len(bvh.parse(text(frames="10000000000"))) == 2
+        assert len(reader.parse(text(frames="10000000000"))) == 2
 
 
 def test_truncated_last_line_is_left_out() -> None:
     with pytest.warns(FbaWarning, match=r"cut short \(4 of 9"), pytest.warns(FbaWarning, match="3 frames"):
-        motion = bvh.parse(text(rows=ROWS + "1 2 3 4", frames="3"))
+        motion = reader.parse(text(rows=ROWS + "1 2 3 4", frames="3"))
     assert len(motion) == 2
 
 
 def test_positions_of_inner_joints() -> None:
     head = HEAD.replace("CHANNELS 3 Y", "CHANNELS 6 Xposition Yposition Zposition Y")
     rows = "1 2 3 10 20 30 0 11 0 40 50 60\n0 0 0 0 0 0 0 11 0 0 0 0\n"
-    assert bvh.parse(text(head, rows)).offsets[1].tolist() == [0, 11, 0]
+    assert reader.parse(text(head, rows)).offsets[1].tolist() == [0, 11, 0]
     with pytest.warns(FbaWarning, match="Spine"):
-        bvh.parse(text(head, rows.replace("0 11 0 4", "0 19 0 4")))
+        reader.parse(text(head, rows.replace("0 11 0 4", "0 19 0 4")))
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_positions_of_inner_joints() -> None:
 )  # fmt: skip
 def test_errors_say_where(content: str, line: int | None, message: str) -> None:
     with pytest.raises(FormatError, match=message) as caught:
-        bvh.parse(content, path="walk.bvh")
+        reader.parse(content, path="walk.bvh")
     assert caught.value.path == "walk.bvh"
     if line is not None:
         assert caught.value.line == line
@@ -172,9 +172,9 @@ def test_deep_nesting() -> None:
             "1",
         )
 
-    assert len(bvh.parse(nested(3000)).names) == 3001
+    assert len(reader.parse(nested(3000)).names) == 3001
     with pytest.raises(FormatError, match="more than 4096 joints"):
-        bvh.parse(nested(100_000))
+        reader.parse(nested(100_000))
 
 
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")
@@ -192,7 +192,7 @@ def test_damage_anywhere_is_an_error_of_ours() -> None:
     read = 0
     for content in damaged:
         try:
-            motion = bvh.parse(content)
+            motion = reader.parse(content)
         except FbaError:
             continue
         read += 1
@@ -204,25 +204,25 @@ def test_skeleton_that_is_no_body(tmp_path: Path) -> None:
     path = tmp_path / "tail.bvh"
     path.write_text(text())
     with pytest.raises(FormatError, match=r"tail.bvh.*no known skeleton family"):
-        bvh.read(path)
+        reader.read(path)
     with pytest.raises(FormatError):
-        bvh.read(tmp_path)
+        reader.read(tmp_path)
     (tmp_path / "empty.bvh").touch()
     with pytest.raises(FormatError, match="empty"):
-        bvh.read(tmp_path / "empty.bvh")
+        reader.read(tmp_path / "empty.bvh")
 
 
 def test_sniffs_content_not_name() -> None:
-    assert bvh.sniff(text().encode(), ".txt")
-    assert bvh.sniff(b"\xef\xbb\xbf\r\n hierarchy\r\n root x", "")
-    assert not bvh.sniff(b"HIERARCHY", ".bvh")
-    assert not bvh.sniff(b"3.2 hierarchy root", ".bvh")
+    assert reader.sniff(text().encode(), ".txt")
+    assert reader.sniff(b"\xef\xbb\xbf\r\n hierarchy\r\n root x", "")
+    assert not reader.sniff(b"HIERARCHY", ".bvh")
+    assert not reader.sniff(b"3.2 hierarchy root", ".bvh")
 
 
 def test_real_files_read_quickly_and_whole(shared: Path) -> None:
     path = shared / "data" / "greta" / "Dance.bvh"
     start = time.perf_counter()
-    motion = bvh.read_motion(path)
+    motion = reader.read_motion(path)
     assert time.perf_counter() - start < 5  # about 0.1 s on one core; a guard against losing an order
     assert len(motion) == 961
     assert motion.names[:3] == ("Hips", "Chest", "Chest2")

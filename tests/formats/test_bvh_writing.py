@@ -13,7 +13,7 @@ import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.body import BapSolver, Skeleton
 from fba.errors import FormatError, OptionError
-from fba.formats import bvh
+from fba.formats.bvh import reader
 from fba.parameters import BAP_COUNT, bap_numbers, baps
 
 
@@ -89,7 +89,7 @@ def test_joints_channels_and_numbers(tmp_path: Path) -> None:
     assert lines[at + 1] == "Frames: 2"
     assert float(lines[at + 2].split()[-1]) == pytest.approx(1001 / 30000, rel=1e-11)
     assert len(lines[at + 3].split()) == 87 * 3 + 3
-    motion = bvh.read_motion(tmp_path / "a.bvh")
+    motion = reader.read_motion(tmp_path / "a.bvh")
     assert motion.rate == Fraction(30000, 1001)
     assert motion.positions[0] == pytest.approx([0, 97.23 + 25, -7.28])
     places = motion.world()[1]
@@ -102,7 +102,7 @@ def test_only_joints_that_move(tmp_path: Path) -> None:
     values = np.zeros((3, BAP_COUNT), dtype=np.int32)
     values[:, bap_numbers()["l_index1_flexion"] - 1] = 20000
     fba.write(tmp_path / "a.bvh", body(values), joints="moving")
-    names = bvh.read_motion(tmp_path / "a.bvh").names
+    names = reader.read_motion(tmp_path / "a.bvh").names
     assert "l_index1" in names
     assert not {"r_index1", "vl3"} & set(names)
     assert {"l_hip", "r_knee", "l_shoulder", "skullbase"} <= set(names)

@@ -12,7 +12,7 @@ from format_files import file
 import fba
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
 from fba.errors import FbaWarning, FormatError, UnsupportedError
-from fba.formats.epf import read_epf, write_epf
+from fba.formats.epf.epf import read_epf, write_epf
 
 FMT = "FMT 0 3 0 0 1 1 0 0 0 0 0 0 2 1 0 0 0 0"
 FIRST = ("FBM 1", "FFR 0", "ISI 1", FMT, "FQU 4")

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 
 from fba.animation import Animation, BodyTrack
 from fba.errors import FbaWarning, FormatError
-from fba.formats.fap import read_fap, write_fap
+from fba.formats.text.fap import read_fap, write_fap
 
 
 def test_reads_values_masks_and_numbers(tmp_path: Path) -> None:

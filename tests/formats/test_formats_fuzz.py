@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from fba.errors import FbaError, FbaWarning
 from fba.formats import read
-from fba.formats.bap import read_bap
-from fba.formats.epf import read_epf, write_epf
-from fba.formats.fap import read_fap, write_fap
+from fba.formats.text.bap import read_bap
+from fba.formats.epf.epf import read_epf, write_epf
+from fba.formats.text.fap import read_fap, write_fap
 
 WORDS = (
     b"", b" ", b"\n", b"\r", b"#", b"0", b"1", b"-1", b"2", b"1e308", b"-1e999", b"inf", b"nan", b".5",

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import fba
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.formats.gltf import read_motion
+from fba.formats.gltf.reader import read_motion
 from fba.gltf.writer import Builder
 
 OFFSETS = {

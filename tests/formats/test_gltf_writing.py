@@ -18,10 +18,10 @@ from scipy.spatial.transform import Rotation, Slerp
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.body import BapSolver, Skeleton
-from fba.body.heads import HeadOnBody
+from fba.body.head_attachment import HeadOnBody
 from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.gltf import Gltf, read_gltf
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_numbers, baps, fap_numbers

@@ -14,7 +14,7 @@ from gltf_edits import edited
 import fba
 from fba.animation import Animation, BodyTrack
 from fba.errors import FbaWarning, FormatError
-from fba.formats import bvh
+from fba.formats.bvh import reader
 from fba.parameters import BAP_COUNT, bap_numbers
 
 FRAMES = 5
@@ -33,37 +33,37 @@ def text(rows: list[str], offset: str = "0", time: str = "0.1") -> str:
 
 
 def test_more_frames_than_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bvh, "MOST_FRAMES", 3)
-    assert bvh.parse(text(["0 0 0"] * 3)).rotations.shape[0] == 3
+    monkeypatch.setattr(reader, "MOST_FRAMES", 3)
+    assert reader.parse(text(["0 0 0"] * 3)).rotations.shape[0] == 3
     with pytest.raises(FormatError, match="more than 3 frames; cut the motion into pieces") as caught:
-        bvh.parse(text(["0 0 0"] * 9))
+        reader.parse(text(["0 0 0"] * 9))
     assert caught.value.line == 11
-    monkeypatch.setattr(bvh, "MAX_LINES", 15)
+    monkeypatch.setattr(reader, "MAX_LINES", 15)
     with pytest.raises(FormatError, match="more than 15 lines"):
-        bvh.parse(text(["0 0 0"] * 9))
+        reader.parse(text(["0 0 0"] * 9))
 
 
 @pytest.mark.parametrize("word", ["nan", "-inf", "1e400", "1e13", "x"])
 @pytest.mark.parametrize("row", range(7))
 def test_a_wrong_number_anywhere(monkeypatch: pytest.MonkeyPatch, word: str, row: int) -> None:
     """Rows are read three at a time."""
-    monkeypatch.setattr(bvh, "BATCH_LINES", 3)
+    monkeypatch.setattr(reader, "BATCH_LINES", 3)
     rows = ["1 2 3"] * 7
     rows[row] = f"1 {word} 3"
     with pytest.raises(FormatError) as caught:
-        bvh.parse(text(rows))
+        reader.parse(text(rows))
     assert (caught.value.line, caught.value.token) == (8 + row, word)
 
 
 def test_lengths_beyond_all_measure() -> None:
     with pytest.raises(FormatError) as caught:
-        bvh.parse(text(["0 0 0"], offset="1e300"))
+        reader.parse(text(["0 0 0"], offset="1e300"))
     assert (caught.value.line, caught.value.token) == (3, "1e300")
 
 
 def test_a_frame_an_hour() -> None:
-    assert bvh.parse(text(["0 0 0"] * 2, time="3600")).rate == Fraction(1, 3600)
-    assert bvh.parse(text(["0 0 0"] * 2, time="2.5")).rate == Fraction(2, 5)
+    assert reader.parse(text(["0 0 0"] * 2, time="3600")).rate == Fraction(1, 3600)
+    assert reader.parse(text(["0 0 0"] * 2, time="2.5")).rate == Fraction(2, 5)
 
 
 @pytest.fixture(scope="module")

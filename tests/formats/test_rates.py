@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fba.errors import FormatError
-from fba.formats.rates import format_rate, parse_rate
+from fba.formats.text.frame_rates import format_rate, parse_rate
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from conformance import fuzz
+from fba_conformance import fuzz
 
 COUNT = 20_000
 CHECKED = 1_500
@@ -27,7 +27,7 @@ def checked_process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subpro
     """The fuzzer with every array access checked; it compiles and runs while the others are at work."""
     cache = tmp_path_factory.mktemp("numba")
     process = subprocess.Popen(
-        [sys.executable, "-m", "conformance.fuzz", "--count", str(CHECKED), "--seed", str(SEED + 1)],
+        [sys.executable, "-m", "fba_conformance.fuzz", "--count", str(CHECKED), "--seed", str(SEED + 1)],
         cwd=ROOT,
         env={**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(cache)},
         stdout=subprocess.PIPE,

@@ -8,12 +8,12 @@ from contextlib import contextmanager
 import numpy as np
 import numpy.typing as npt
 
-from player.body_light import LitPart
-from player.context import offscreen_context
-from player.face_light import LitFacePart
-from player.gpu.deformer import GpuDeformer
-from player.places import Places, Whole
-from player.shapes import FaceMesh
+from fba_player.figure.body_light import LitPart
+from fba_player.gl.context import offscreen_context
+from fba_player.figure.face_light import LitFacePart
+from fba_player.gl.gpu.deformer import GpuDeformer
+from fba_player.mesh.lazy_vertices import Places, Whole
+from fba_player.view.view import FaceMesh
 
 Float32 = npt.NDArray[np.float32]
 

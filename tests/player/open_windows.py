@@ -11,8 +11,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.errors import DisplayError
-from player.scene import Scene
-from player.window import Window
+from fba_player.scene.scene import Scene
+from fba_player.window.window import Window
 
 
 def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int, int] = (640, 480)) -> Window:

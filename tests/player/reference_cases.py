@@ -18,14 +18,14 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.body.model import BodyModel
-from fba.cli.still import still
+from fba.cli.pose_options import still
 from fba.face.model import FaceModel, point_row
 from fba.parameters import BAP_COUNT, bap_numbers
 from fba.tracks import BodyTrack
-from player import Camera, Offscreen, Scene
-from player.face import FaceFigure
-from player.person import Person
-from player.switches import parse_switch
+from fba_player import Camera, Offscreen, Scene
+from fba_player.figure.face import FaceFigure
+from fba_player.figure.person import Person
+from fba_player.view.switches import parse_switch
 
 FOLDER = Path(__file__).parent / "references"
 NEAR = {"eyes": "3.5", "mouth": "2.2"}

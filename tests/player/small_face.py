@@ -6,7 +6,7 @@ import numpy as np
 
 from fba.face.model import FaceModel, Part, point_row
 from fba.face.tables import FaceDefMesh, FaceDefTables
-from player.primitives import sphere_mesh
+from fba_player.mesh.primitives import sphere_mesh
 
 
 def small_face(*kinds: str, scale: float = 1.0) -> FaceModel:

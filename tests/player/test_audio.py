@@ -15,11 +15,11 @@ from player_tracks import face_track
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError
-from player.audio import Audio, beside, open_audio
-from player.sound_blocks import SoundBlocks
-from player.sound_file import SoundFile
-from player.timeline import Timeline
-from player.transport import Transport
+from fba_player.sound.player import Audio, beside, open_audio
+from fba_player.sound.read_ahead import SoundBlocks
+from fba_player.sound.audio_file import SoundFile
+from fba_player.playback.timeline import Timeline
+from fba_player.playback.transport import Transport
 
 av = pytest.importorskip("av")
 

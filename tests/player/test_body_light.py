@@ -9,7 +9,7 @@ import pytest
 from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.compiled import is_compiled
-from player.body_light import REACH, BodyLight
+from fba_player.figure.body_light import REACH, BodyLight
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 

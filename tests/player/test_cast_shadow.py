@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from fba.compiled import is_compiled
-from player.cast_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
-from player.coarse import Coarser
-from player.places import Places
-from player.primitives import sphere_mesh
-from player.shapes import FaceMesh, FaceShape
+from fba_player.gl.ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
+from fba_player.mesh.simplify import Coarser
+from fba_player.mesh.lazy_vertices import Places
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.view import FaceMesh, FaceShape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba there are blobs instead")
 LIGHT = np.array([0.70, 0.68, 0.80]) / np.linalg.norm([0.70, 0.68, 0.80])

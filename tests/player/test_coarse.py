@@ -9,12 +9,12 @@ import numpy.typing as npt
 import pytest
 
 from fba.compiled import is_compiled
-from fba.kept import kept
-from player.coarse import TOLERANCES, Coarser, coarser
-from player.detail import Details, distance, same
-from player.places import Places
-from player.primitives import sphere_mesh
-from player.shapes import FaceMesh, FaceShape
+from fba.cache import kept
+from fba_player.mesh.simplify import TOLERANCES, Coarser, coarser
+from fba_player.gl.lod import Details, distance, same
+from fba_player.mesh.lazy_vertices import Places
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.view import FaceMesh, FaceShape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba meshes are drawn as they are")
 Int32 = npt.NDArray[np.int32]

@@ -9,13 +9,13 @@ import pytest
 from player_tracks import body_track, face_track
 
 from fba.animation import Animation
-from player.compare import CompareScene
-from player.compare_times import CompareTimeline
-from player.differences import differences
-from player.offscreen import Offscreen
-from player.scene import Scene
-from player.timeline import Timeline
-from player.transport import Transport
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.compare_timeline import CompareTimeline
+from fba_player.scene.differences import differences
+from fba_player.export.offscreen import Offscreen
+from fba_player.scene.scene import Scene
+from fba_player.playback.timeline import Timeline
+from fba_player.playback.transport import Transport
 
 
 def talk(values: list[int], rate: int = 25, first: int = 0, name: str = "") -> Animation:

@@ -10,8 +10,8 @@ import pytest
 from fba.animation import Animation
 from fba.parameters import faps
 from fba.tracks import FaceTrack
-from player import Camera, Offscreen, Scene
-from player.contact_sheet import close_up, contact_sheet, tiles
+from fba_player import Camera, Offscreen, Scene
+from fba_player.export.contact_sheet import close_up, contact_sheet, tiles
 
 
 @pytest.fixture(scope="module")

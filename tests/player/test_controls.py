@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from player.camera import Camera, Subject
-from player.controls import Controls
-from player.scene import SWITCHES, Scene
-from player.ui.keys import by_name
-from player.ui.session import Session
-from player.viewpoint import GLIDE
+from fba_player.view.camera import Camera, Subject
+from fba_player.session.controls import Controls
+from fba_player.scene.scene import SWITCHES, Scene
+from fba_player.session.keys import by_name
+from fba_player.session.session import Session
+from fba_player.session.camera_controller import GLIDE
 
 
 @pytest.fixture

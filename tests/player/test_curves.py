@@ -12,11 +12,11 @@ from player_tracks import body_track, face_track
 
 from fba.animation import Animation, FaceTrack
 from fba.parameters import faps
-from player.timeline import Timeline
-from player.ui.chooser import found
-from player.ui.columns import BLOCK, Columns, amount
-from player.ui.envelope import envelope
-from player.ui.stretch import SHORTEST, Stretch
+from fba_player.playback.timeline import Timeline
+from fba_player.ui.panels.parameter_chooser import found
+from fba_player.ui.panels.curve_data import BLOCK, Columns, amount
+from fba_player.ui.panels.envelope import envelope
+from fba_player.ui.panels.time_zoom import SHORTEST, Stretch
 
 
 def complete(columns: Columns) -> Columns:

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from player.ui.docks import EDGE, GAP, LEAST_MIDDLE, MIDDLE, NARROWEST, TITLE, Dock, Docks, Wish, free_middle
+from fba_player.ui.docks import (
+    EDGE,
+    GAP,
+    LEAST_MIDDLE,
+    MIDDLE,
+    NARROWEST,
+    TITLE,
+    Dock,
+    Docks,
+    Wish,
+    free_middle,
+)
 
 TOP = 56.0
 

@@ -15,11 +15,11 @@ import pytest
 from player_tracks import body_track, face_track
 from small_face import small_face
 
-import player.context
+import fba_player.gl.context
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
-from player import Offscreen, Scene
-from player.scene import SWITCHES
+from fba_player import Offscreen, Scene
+from fba_player.scene.scene import SWITCHES
 
 TINY = (16, 12)
 MOST_GROWTH = 1_000_000

@@ -13,7 +13,7 @@ from player_tracks import face_track
 
 from fba.animation import Animation
 from fba.face.model import FaceModel, point_row
-from player import Camera, Offscreen, Scene
+from fba_player import Camera, Offscreen, Scene
 
 pytestmark = pytest.mark.usefixtures("opengl")
 UInt8 = npt.NDArray[np.uint8]

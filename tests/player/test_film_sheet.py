@@ -10,8 +10,8 @@ from player_tracks import face_track
 
 from fba.animation import Animation
 from fba.errors import RangeError
-from player import Offscreen, Scene
-from player.film_sheet import chosen, columns_of, film_sheet
+from fba_player import Offscreen, Scene
+from fba_player.export.film_sheet import chosen, columns_of, film_sheet
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,11 @@ from set_clock import Clock
 from test_films import click_time, sound, write_click
 
 from fba.animation import Animation
-from player.film_sound import FilmSound
-from player.scene import Scene
-from player.transport import Transport
-from player.ui.keeper import Keeper
-from player.ui.session import Session
+from fba_player.sound.recorded_sound import FilmSound
+from fba_player.scene.scene import Scene
+from fba_player.playback.transport import Transport
+from fba_player.session.captures import Keeper
+from fba_player.session.session import Session
 
 av = pytest.importorskip("av")
 

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from fba.errors import FormatError, UnsupportedError
-from player.recorder import Recorder
-from player.sound import Soundtrack, beside
+from fba_player.export.recorder import Recorder
+from fba_player.sound.soundtrack import Soundtrack, beside
 
 av = pytest.importorskip("av")
 

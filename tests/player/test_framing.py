@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from player.camera import Camera
-from player.framing import body_extent
+from fba_player.view.camera import Camera
+from fba_player.scene.framing import body_extent
 
 NAMES = ("HumanoidRoot", "l_knee", "r_knee", "l_ankle", "r_ankle", "skullbase", "l_wrist")
 STANDING = np.array([

@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel, Part
-from player.camera import Camera
-from player.extent import filled
-from player.eyeball import find_eyeball
-from player.face_parts import hairs
-from player.outline import TILE, Outliner
-from player.places import Places
-from player.primitives import sphere_mesh
-from player.shapes import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
+from fba_player.view.camera import Camera
+from fba_player.gl.antialias_region import filled
+from fba_player.figure.eyeball import find_eyeball
+from fba_player.figure.face_parts import hairs
+from fba_player.gl.silhouette import TILE, Outliner
+from fba_player.mesh.lazy_vertices import Places
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 2.0, 3.1, np.pi])

@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from fba.cli.main import group
-from player.gpu import choice
-from player.gpu.choice import Choice, is_software, prefer, wished
+from fba_player.gl.gpu import choice
+from fba_player.gl.gpu.choice import Choice, is_software, prefer, wished
 
 CARD = {"GL_VENDOR": "Someone", "GL_RENDERER": "Fast 9000", "GL_VERSION": "4.6 driver 1.2"}
 

@@ -17,19 +17,19 @@ from gpu_reading import Reader, off, reading
 from small_face import small_face
 
 from fba.body import BapSolver
-from fba.body.limits import Limits
+from fba.body.solve.limits import Limits
 from fba.body.model import BodyModel
-from fba.body.skinning import Skinner
+from fba.body.skin.skinning import Skinner
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel
-from player.body_light import LitPart
-from player.face import FaceFigure
-from player.face_light import LitFacePart
-from player.gpu.tables import BodyTables, CarriedBody
-from player.person import Person
-from player.places import Places, Whole
-from player.shapes import FaceMesh
-from player.usable import usable
+from fba_player.figure.body_light import LitPart
+from fba_player.figure.face import FaceFigure
+from fba_player.figure.face_light import LitFacePart
+from fba_player.gl.gpu.tables import BodyTables, CarriedBody
+from fba_player.figure.person import Person
+from fba_player.mesh.lazy_vertices import Places, Whole
+from fba_player.view.view import FaceMesh
+from fba_player.figure.model_units import usable
 
 pytestmark = pytest.mark.usefixtures("opengl")
 PLACE, NORMAL = 1e-6, 2e-3

@@ -18,10 +18,10 @@ from small_face import small_face
 
 from fba.animation import Animation
 from fba.errors import FbaWarning
-from player import Camera, CompareScene, Offscreen, Scene
-from player.gpu.deformer import GpuDeformer
-from player.gpu.way import Way
-from player.places import Places
+from fba_player import Camera, CompareScene, Offscreen, Scene
+from fba_player.gl.gpu.deformer import GpuDeformer
+from fba_player.gl.gpu.way import Way
+from fba_player.mesh.lazy_vertices import Places
 
 pytestmark = pytest.mark.usefixtures("opengl")
 UInt8 = npt.NDArray[np.uint8]
@@ -139,7 +139,7 @@ def test_software_is_left_to_the_processor(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_card_is_measured_by_real_pictures(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
     monkeypatch.delenv("FBA_DEFORM", raising=False)
-    monkeypatch.setattr("player.gpu.choice.is_software", lambda name: False)
+    monkeypatch.setattr("fba_player.gl.gpu.choice.is_software", lambda name: False)
     with Offscreen(small_scene(), (48, 36), deform="cpu") as view:
         wanted = view.frame(0.0)
     with Offscreen(small_scene(), (48, 36)) as view:
@@ -213,7 +213,7 @@ def test_tables_that_no_texture_holds(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_nothing_is_left_on_the_card() -> None:
-    from player.context import offscreen_context
+    from fba_player.gl.context import offscreen_context
 
     scene = small_scene(body=True)
     context = offscreen_context()

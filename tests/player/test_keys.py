@@ -7,8 +7,8 @@ from pathlib import Path
 
 import graphics
 
-from player.switches import SWITCHES
-from player.ui.keys import by_name, key_of, keys, mouse
+from fba_player.view.switches import SWITCHES
+from fba_player.session.keys import by_name, key_of, keys, mouse
 
 ROOT = Path(__file__).parents[2]
 
@@ -43,7 +43,7 @@ def test_keys_are_shown_as_people_write_them() -> None:
 
 def test_every_panel_has_a_key_and_every_key_its_panel() -> None:
     graphics.imported("imgui_bundle")
-    from player.ui.panels import make_panels
+    from fba_player.ui.panels.registry import make_panels
 
     panels = [panel.name for panel in make_panels()]
     opened = [row.action.removeprefix("panel ") for row in keys() if row.action.startswith("panel ")]

@@ -8,8 +8,8 @@ import pytest
 
 from fba.compiled import is_compiled
 from fba.face.normals import vertex_normals
-from player.primitives import sphere_mesh
-from player.visibility import Visibility, bake, harmonics
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.figure.occlusion import Visibility, bake, harmonics
 
 compiled = pytest.mark.skipif(not is_compiled(), reason="without numba everything counts as free")
 Float32 = npt.NDArray[np.float32]

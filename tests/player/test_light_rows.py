@@ -9,8 +9,8 @@ from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel
-from player.face import FaceFigure
-from player.person import Person
+from fba_player.figure.face import FaceFigure
+from fba_player.figure.person import Person
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 

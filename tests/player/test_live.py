@@ -17,11 +17,11 @@ import fba
 from fba.animation import Animation
 from fba.codec import Decoder, EncoderOptions
 from fba.errors import FbaError
-from player.growing import GrowingFrames
-from player.live import LiveAnimation, LiveTimeline
-from player.scene import Scene
-from player.timeline import Timeline
-from player.transport import BUFFER, Transport
+from fba_player.playback.frame_buffer import GrowingFrames
+from fba_player.playback.live import LiveAnimation, LiveTimeline
+from fba_player.scene.scene import Scene
+from fba_player.playback.timeline import Timeline
+from fba_player.playback.transport import BUFFER, Transport
 
 
 class Wire:

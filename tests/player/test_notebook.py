@@ -16,12 +16,12 @@ from PIL import Image
 from player_tracks import face_track
 from test_films import click_time, write_click
 
-import player.films
-import player.notebook
-import player.offscreen
+import fba_player.export.mp4
+import fba_player.export.notebook
+import fba_player.export.offscreen
 from fba.animation import Animation
 from fba.errors import DisplayError
-from player import Preview
+from fba_player import Preview
 
 av = pytest.importorskip("av")
 

@@ -13,12 +13,12 @@ from small_face import small_face
 
 from fba.animation import Animation
 from fba.errors import FbaWarning
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part, point_row
-from player import Offscreen, Scene
-from player.scene import SWITCHES
-from player.usable import resized, usable
+from fba_player import Offscreen, Scene
+from fba_player.scene.scene import SWITCHES
+from fba_player.figure.model_units import resized, usable
 
 NEEDED = ("3.1", "3.2", "3.3", "3.4", "3.5", "3.6", "9.15", "2.2", "8.3", "8.4")
 """Feature points without which a face has no units."""

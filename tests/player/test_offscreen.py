@@ -12,11 +12,11 @@ import numpy.typing as npt
 import pytest
 from player_tracks import body_track, face_track
 
-import player.context
+import fba_player.gl.context
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.face.model import point_row
-from player import Camera, Offscreen, Scene
+from fba_player import Camera, Offscreen, Scene
 
 UInt8 = npt.NDArray[np.uint8]
 

@@ -12,14 +12,14 @@ from set_clock import Clock
 
 import fba
 from fba.animation import Animation
-from player.scene import Scene
-from player.transport import Transport
-from player.ui.session import Session
-from player.ui.source import Source
+from fba_player.scene.scene import Scene
+from fba_player.playback.transport import Transport
+from fba_player.session.session import Session
+from fba_player.session.source import Source
 
 imgui = graphics.imported("imgui_bundle").imgui
 
-from player.ui.picture import Studio  # noqa: E402 - needs imgui
+from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (900, 600)
 
@@ -198,7 +198,7 @@ def test_bare_shows_the_picture_alone(studio: Studio) -> None:
     session = studio.session
     session.open |= {"file", "view"}
     session.bare = True
-    from player.offscreen import Offscreen
+    from fba_player.export.offscreen import Offscreen
 
     with Offscreen(session.scene, SIZE, session.viewpoint.camera) as plain:
         wanted = plain.frame(0.0)

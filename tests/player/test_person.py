@@ -14,9 +14,9 @@ from fba import Animation
 from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.face.model import FaceModel
-from player import Scene
-from player.face import FaceFigure
-from player.person import Person
+from fba_player import Scene
+from fba_player.figure.face import FaceFigure
+from fba_player.figure.person import Person
 
 STILL = np.zeros(68, dtype=np.float32)
 

@@ -13,12 +13,12 @@ from fba.animation import Animation
 from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.face import feature_point_names, resolve
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel
-from player import Offscreen, Scene
-from player.face import FaceFigure
-from player.point_view import PointView
-from player.skin_lines import skin_lines
+from fba_player import Offscreen, Scene
+from fba_player.figure.face import FaceFigure
+from fba_player.scene.feature_points_view import PointView
+from fba_player.scene.skin_lines import skin_lines
 
 ROW = {name: row for row, name in enumerate(feature_point_names())}
 FACES: list[dict[int, int]] = [

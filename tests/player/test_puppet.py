@@ -11,8 +11,8 @@ import pytest
 import fba
 from fba.errors import FormatError
 from fba.face import resolve
-from player.puppet import Expression, Puppet, Viseme
-from player.takes import LONGEST, TakeRecorder, Takes, take_rate
+from fba_player.session.puppet import Expression, Puppet, Viseme
+from fba_player.session.takes import LONGEST, TakeRecorder, Takes, take_rate
 
 
 def played() -> tuple[np.ndarray, np.ndarray]:

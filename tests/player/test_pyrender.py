@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from fba.animation import Animation
 from fba.errors import DisplayError
-from player import pyrender_bridge, to_pyrender
-from player.pyrender_bridge import _numpy_1, swayed
+from fba_player import to_pyrender
+from fba_player.export import pyrender_bridge
+from fba_player.export.pyrender_bridge import _numpy_1, swayed
 
 BOTH = """
 import json, sys

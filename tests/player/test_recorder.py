@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fba.errors import FormatError, UnsupportedError
-from player.recorder import WAITING, Recorder
+from fba_player.export.recorder import WAITING, Recorder
 
 pytest.importorskip("av")
 
@@ -161,7 +161,7 @@ def test_places_and_sizes_that_cannot_be(tmp_path: Path) -> None:
 FORGET = """
 import sys
 import numpy as np
-from player.recorder import Recorder
+from fba_player.export.recorder import Recorder
 recorder = Recorder(sys.argv[1], (16, 16))
 recorder.add(np.zeros((16, 16, 4), dtype=np.uint8))
 """
@@ -178,7 +178,7 @@ FILL = """
 import resource, signal, sys
 import numpy as np
 from fba.errors import FbaError
-from player.recorder import Recorder
+from fba_player.export.recorder import Recorder
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 noise = np.random.default_rng(1).integers(0, 256, (64, 64, 4), dtype=np.uint8)
 recorder = Recorder(sys.argv[1], (64, 64))

@@ -12,8 +12,8 @@ from player_tracks import face_track
 
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaError, FormatError, RangeError, UnsupportedError
-from player import Offscreen, Scene, render
-from player.recording import film_rate
+from fba_player import Offscreen, Scene, render
+from fba_player.export.render import film_rate
 
 av = pytest.importorskip("av")
 

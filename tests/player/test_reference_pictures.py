@@ -45,7 +45,7 @@ def test_the_references_are_those_of_the_table_and_small() -> None:
 
 
 def test_every_switch_and_look_has_a_reference() -> None:
-    from player.scene import LOOKS, SWITCHES
+    from fba_player.scene.scene import LOOKS, SWITCHES
 
     shown = {text.partition("=")[0] for case in cases().values() for text in case.switches}
     assert shown == set(SWITCHES)

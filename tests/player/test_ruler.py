@@ -8,8 +8,8 @@ import pytest
 from player_tracks import face_track
 
 from fba.animation import Animation, FaceTrack
-from player.ui.ruler import Ruler, label
-from player.ui.trace import INTRA, Trace, trace_of_motion, trace_picture
+from fba_player.ui.ruler import Ruler, label
+from fba_player.session.timeline_trace import INTRA, Trace, trace_of_motion, trace_picture
 
 
 def test_places_and_times() -> None:
@@ -88,6 +88,6 @@ def test_motion_is_added_up_over_parameters() -> None:
 )
 def test_the_slider_of_speed_holds_on_to_its_steps(slid: float, speed: float) -> None:
     graphics.imported("imgui_bundle")
-    from player.ui.transport_buttons import snapped
+    from fba_player.ui.transport_buttons import snapped
 
     assert snapped(slid) == speed

@@ -12,9 +12,9 @@ from player_tracks import body_track, face_track
 from fba.animation import Animation
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, point_row
-from player import Scene, default_camera
-from player.face import FaceFigure
-from player.face_parts import sway
+from fba_player import Scene, default_camera
+from fba_player.figure.face import FaceFigure
+from fba_player.figure.face_parts import sway
 
 STILL = np.zeros(68, dtype=np.float32)
 

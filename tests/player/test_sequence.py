@@ -10,8 +10,8 @@ from PIL import Image
 
 from fba.animation import Animation
 from fba.errors import FormatError, UnsupportedError
-from player import Scene, render
-from player.sequence import Numbered, Sequence, is_sequence
+from fba_player import Scene, render
+from fba_player.export.image_sequence import Numbered, Sequence, is_sequence
 
 SMALL = (24, 16)
 

@@ -9,10 +9,10 @@ import pytest
 from player_tracks import face_track
 
 from fba.animation import Animation
-from player.motion import Motion
-from player.sound_mixer import FADE, SoundMixer
-from player.timeline import Timeline
-from player.transport import Transport
+from fba_player.playback.playhead import Motion
+from fba_player.sound.mixer import FADE, SoundMixer
+from fba_player.playback.timeline import Timeline
+from fba_player.playback.transport import Transport
 
 RATE = 1000
 FADED = round(FADE * RATE)

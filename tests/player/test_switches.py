@@ -13,15 +13,15 @@ from player_tracks import body_track, face_track
 
 from fba.animation import Animation
 from fba.body.model import BodyModel
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
-from player import Camera, Offscreen, Scene
-from player.face import FaceFigure
-from player.influence import Influence
-from player.scene import SWITCHES
-from player.switches import Switches, parse_switch
-from player.wireframe import unique_edges
-from player.words import placed_names
+from fba_player import Camera, Offscreen, Scene
+from fba_player.figure.face import FaceFigure
+from fba_player.scene.fap_heatmap import Influence
+from fba_player.scene.scene import SWITCHES
+from fba_player.view.switches import Switches, parse_switch
+from fba_player.scene.wireframe import unique_edges
+from fba_player.gl.labels import placed_names
 
 FLAGS_ON = ("wireframe", "points", "grid", "normals")
 

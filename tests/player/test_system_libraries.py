@@ -11,8 +11,8 @@ import pytest
 
 from fba.animation import Animation
 from fba.errors import DisplayError
-from player import Offscreen
-from player.system_libraries import PACKAGES, cure, missing_libraries
+from fba_player import Offscreen
+from fba_player.gl.system_libraries import PACKAGES, cure, missing_libraries
 
 
 def take_away(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:

@@ -10,7 +10,7 @@ import pytest
 from player_tracks import body_track, face_track
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from player.timeline import BLOCK, Timeline
+from fba_player.playback.timeline import BLOCK, Timeline
 
 
 def face_animation(

@@ -10,9 +10,9 @@ from player_tracks import face_track
 from set_clock import Clock
 
 from fba.animation import Animation
-from player.timeline import Timeline
-from player.times import clock_text, timecode
-from player.transport import Transport
+from fba_player.playback.timeline import Timeline
+from fba_player.playback.timecode import clock_text, timecode
+from fba_player.playback.transport import Transport
 
 
 def transport(index: list[int] | None = None, rate: int = 10, loop: bool = True) -> tuple[Transport, Clock]:

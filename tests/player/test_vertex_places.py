@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from player.places import Places, Probe, Whole, spare
+from fba_player.mesh.lazy_vertices import Places, Probe, Whole, spare
 
 Float32 = npt.NDArray[np.float32]
 

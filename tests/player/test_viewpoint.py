@@ -7,9 +7,9 @@ import pytest
 from set_clock import Clock
 
 from fba.animation import Animation
-from player.camera import PRESETS, Camera
-from player.scene import Scene
-from player.viewpoint import GLIDE, Viewpoint
+from fba_player.view.camera import PRESETS, Camera
+from fba_player.scene.scene import Scene
+from fba_player.session.camera_controller import GLIDE, Viewpoint
 
 
 class Walking:

@@ -13,9 +13,9 @@ from open_windows import opened, settle, shown, until
 
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
-from player.playing import play
-from player.scene import Scene
-from player.window import Window
+from fba_player.window.play import play
+from fba_player.scene.scene import Scene
+from fba_player.window.window import Window
 
 glfw = graphics.imported("glfw")
 
@@ -174,7 +174,7 @@ def test_without_imgui_it_plays_and_says_so(
 ) -> None:
     (tmp_path / "imgui_bundle.py").write_text(f"raise ImportError({failure!r})", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    for name in [name for name in sys.modules if name.startswith(("imgui_bundle", "player.ui.gui"))]:
+    for name in [name for name in sys.modules if name.startswith(("imgui_bundle", "fba_player.ui.gui"))]:
         monkeypatch.delitem(sys.modules, name)
     try:
         with pytest.warns(FbaWarning, match=said):

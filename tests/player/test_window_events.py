@@ -13,7 +13,7 @@ import pytest
 from open_windows import opened, settle, shown, until
 
 from fba.animation import Animation
-from player.window import Window
+from fba_player.window.window import Window
 
 glfw = graphics.imported("glfw")
 graphics.imported("imgui_bundle")

@@ -16,11 +16,11 @@ from fba.animation import Animation
 from fba.body import gait
 from fba.codec import Decoder
 from fba.errors import DisplayError
-from player.compare import CompareScene
-from player.live import LiveAnimation, LiveTimeline
-from player.scene import Scene
-from player.showable import Showable
-from player.window import Window
+from fba_player.scene.compare import CompareScene
+from fba_player.playback.live import LiveAnimation, LiveTimeline
+from fba_player.scene.scene import Scene
+from fba_player.view.protocols import Showable
+from fba_player.window.window import Window
 
 graphics.imported("glfw")
 graphics.imported("imgui_bundle")

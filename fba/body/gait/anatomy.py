@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.body.conventions import convention
+from fba.body.solve.conventions import convention
 from fba.body.gait.limb import ELBOW, KNEE, Limb
 from fba.body.gait.rotations import Float
 from fba.body.skeleton import ROOT, Skeleton

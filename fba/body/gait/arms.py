@@ -9,7 +9,7 @@ from fba.body.gait.characters import Character
 from fba.body.gait.curves import periodic
 from fba.body.gait.plan import KNOTS, Plan
 from fba.body.gait.rotations import Float, limb_angles
-from fba.body.solver import BapSolver
+from fba.body.solve.solver import BapSolver
 
 _LATE = 0.02
 """Fraction of the cycle by which arms come after the legs."""

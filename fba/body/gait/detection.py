@@ -21,7 +21,7 @@ from fba.body.gait.anatomy import Anatomy
 from fba.body.gait.characters import POSES
 from fba.body.gait.signals import SHORTEST_SWING, STEP_SECONDS, Curves
 from fba.body.skeleton import Skeleton
-from fba.body.solver import BapSolver
+from fba.body.solve.solver import BapSolver
 
 UNEVEN = 2.2
 """How much longer one of the two steps of a cycle may take than the other."""

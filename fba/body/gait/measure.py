@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.body.conventions import convention
+from fba.body.solve.conventions import convention
 from fba.body.gait.anatomy import Anatomy
 from fba.body.gait.rotations import Float
 from fba.body.skeleton import Skeleton
-from fba.body.solver import BapSolver
+from fba.body.solve.solver import BapSolver
 
 ON_GROUND = 0.002
 """Metres above the ground at which a point still touches."""

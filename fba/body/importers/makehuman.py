@@ -19,14 +19,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body.importers.obj_mesh import ObjMesh, read_obj_mesh, read_text
-from fba.body.influences import strongest
+from fba.body.skin.skin_weights import strongest
 from fba.body.model import BodyModel, BodyPart, Material
-from fba.body.posture import bind_matrices, chain, shares, unposed, vertebrae
+from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
 from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
 from fba.gltf.document import MAX_ITEMS, parse_json
 from fba.gltf.values import Value
-from fba.mesh import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.authoring.eyes import Eye, eyes
-from fba.face.authoring.landmarks import Landmarks, landmarks, surface_of
-from fba.face.authoring.surface import Surface
+from fba.face.authoring.regions.eyes import Eye, eyes
+from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
+from fba.face.authoring.surface.surface import Surface
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.face.deformer import Deformer
+from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel
 from fba.parameters import FAP_COUNT, fap_numbers, faps
 

@@ -15,10 +15,10 @@ from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.feature_points import names, row_of
 from fba.face.gltf.extension import NAME, VERSION
 from fba.face.gltf.tables import read_tables
-from fba.face.interpolation_table import InterpolationTable
+from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Float32, Float64, Int32, Part
 from fba.gltf.document import Document
-from fba.gltf.looks import material_of
+from fba.gltf.part_materials import material_of
 from fba.gltf.reader import read_document
 from fba.gltf.scene import Gltf
 from fba.gltf.values import Budget, Value, located, optional

@@ -11,7 +11,7 @@ from fba.face.gltf.extension import NAME, extension
 from fba.face.gltf.morphs import displacements
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
-from fba.gltf.looks import Looks
+from fba.gltf.part_materials import Looks
 from fba.gltf.writer import Builder
 from fba.parameters import faps
 

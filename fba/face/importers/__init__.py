@@ -41,12 +41,12 @@ def import_model(
         raise OptionError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     named = name or Path(path).stem or "face"
     if chosen == "makehuman":
-        from fba.face.importers.makehuman import import_makehuman
+        from fba.face.importers.makehuman.makehuman import import_makehuman
 
         _no_more("MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=None if up == "y" else up)
         return import_makehuman(path, name=name or "MakeHuman")
     if chosen == "fdp":
-        from fba.face.importers.fdp_model import import_fdp
+        from fba.face.importers.points.fdp_model import import_fdp
 
         _no_more("an FDP file", points=points)
         return import_fdp(path, unit=unit, up=up, kinds=kinds, name=named)

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names
-from fba.face.importers.files import MAX_VERTICES
-from fba.face.importers.fitting import finished, turned
-from fba.face.importers.pieces import Piece, assembled
-from fba.face.importers.points_file import GivenPoints, given_points
+from fba.mesh.text_files import MAX_VERTICES
+from fba.face.importers.assembly.model import finished, turned
+from fba.face.importers.assembly.pieces import Piece, assembled
+from fba.face.importers.points.points_file import GivenPoints, given_points
 from fba.face.model import FaceModel, Material, Part
 
 Float64 = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ def import_gltf(
         return FaceModel.load(path)
     given = given_points(points) if points is not None else _beside(Path(path))
     if given is None:
-        from fba.face.importers.landmarks import find_points
+        from fba.face.importers.assembly.landmarks import find_points
 
         upright, _ = turned(pieces, np.full((len(names()), 3), np.nan), up)
         found = find_points(assembled(upright, kinds), os.fspath(path))

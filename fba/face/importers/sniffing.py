@@ -26,7 +26,7 @@ def sniff(path: str | os.PathLike[str]) -> str:
     """The kind of a source, one of `KINDS`; ModelError, listing them, for anything else."""
     place = Path(path)
     if place.is_dir():
-        from fba.face.importers.makehuman import base_file
+        from fba.face.importers.makehuman.makehuman import base_file
 
         base_file(place)
         return "makehuman"

@@ -1,0 +1,223 @@
+"""Every syntax element of an FBA stream in order, with its bit position, and the values it makes.
+
+An independent reading of ISO/IEC 14496-2, FBA object: it shares no code with `fba.codec` and is
+hundreds of times slower. `trace` for people who look for what is wrong with a stream, `decode_values`
+to compare a decoder with.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
+
+from fba_conformance.high_level import HighLevel
+from fba_conformance.listing import element_dict, format_trace
+from fba_conformance.part import Part
+from fba_conformance.reader import (
+    OBJECT_START_CODES,
+    PLANE_START_CODES,
+    TRAILING_BYTES_SHOWN,
+    Element,
+    Levels,
+    Reader,
+)
+from fba.errors import FbaError, FbaWarning
+from fba.parameters import BAP_STEP_TABLES
+from fba.recognition import HEAD_BYTES, but_recognised
+
+__all__ = ["Element", "Levels", "Walker", "decode_values", "element_dict", "format_trace", "planes", "trace"]
+
+FAP_BIT, BAP_BIT = 1, 2
+SKIP_MORE = 15
+"""A word of number_of_frames_to_skip that says that another one follows."""
+
+
+def trace(data: bytes, *, bap_steps: str = "iso") -> Iterator[Element]:
+    """Every syntax element of a stream, in order.
+
+    bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it changes values only.
+
+    After damage it yields the elements before it, and then raises BitstreamError(plane, bit), which
+    names the element; UnsupportedError for DCT segments; ValueError for another bap_steps.
+    """
+    walker = Walker(data, bap_steps=bap_steps)
+    more = True
+    while more:
+        try:
+            more = walker.step()
+        except FbaError:
+            yield from walker.reader.drain()
+            raise
+        yield from walker.reader.drain()
+
+
+def planes(data: bytes, *, bap_steps: str = "iso") -> Iterator[dict[str, Any]]:
+    """What each plane says, in order; raises like `trace`, behind the last good plane.
+
+    Keys: number; bit and bits (where it starts and its length, start code and stuffing before it
+    included); intra; parts (bit 0 FAPs, bit 1 BAPs); start_code (or None); rate (exact fraction or None
+    where no plane has said it); frame_rate (three numbers, or None); time_code (hours, minutes, marker,
+    seconds, or None); skip; time (seconds, exact, or None where a rate is missing); fap_quant and
+    bap_quant, fap_mask_types, fap_lists and bap_lists (which range lists the last I plane sent);
+    fap (value by number, 3..68), viseme (4 numbers or None), expression (6 or None), bap (value by
+    number), as far as the plane carries them.
+    """
+    walker = Walker(data, bap_steps=bap_steps)
+    more = True
+    while more:
+        done = walker.count
+        more = walker.step()
+        walker.reader.drain()
+        if walker.count > done:
+            yield walker.record
+
+
+def decode_values(data: bytes, *, bap_steps: str = "iso") -> list[dict[str, Any]]:
+    """All of `planes` as a list. Of a stream from a stranger take `planes`: six bits can code a plane."""
+    return list(planes(data, bap_steps=bap_steps))
+
+
+class Walker:
+    """Walks through one object, a plane a step. `record` describes the last plane (see `planes`)."""
+
+    def __init__(self, data: bytes, *, bap_steps: str = "iso") -> None:
+        if bap_steps not in BAP_STEP_TABLES:
+            raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
+        self.reader = Reader(bytes(data))
+        self.fap = Part("fap")
+        self.bap = Part("bap", bap_steps)
+        self.viseme = HighLevel("viseme")
+        self.expression = HighLevel("expression")
+        self.count = 0
+        self.record: dict[str, Any] = {}
+        self.rate: Fraction | None = None
+        self.clock: Fraction | None = Fraction(0)
+        self._started = False
+
+    def step(self) -> bool:
+        """Read the next plane, with what stands before it; False when the object is over."""
+        if not self._started:
+            self._read_object_start()
+            self._started = True
+        reader = self.reader
+        begin, start_code = reader.bit, None
+        reader.plane = None
+        while (
+            stuffing := reader.stuffing_before_start_code(behind_start_code=start_code is not None)
+        ) is not None:
+            code = reader.start_code(stuffing)
+            if code not in PLANE_START_CODES:
+                self._read_rest()
+                return False
+            start_code = code
+        if start_code is None and reader.only_stuffing_left():
+            if reader.bit < reader.size:
+                reader.flags("alignment stuffing", reader.size - reader.bit, "object")
+            return False
+        reader.plane = self.count
+        self.record = {"number": self.count, "bit": begin, "start_code": start_code}
+        self._read_plane()
+        self.record["bits"] = reader.bit - begin
+        self.count += 1
+        return True
+
+    def _read_object_start(self) -> None:
+        """The object's start code; visual object sequence and visual object headers may stand before it."""
+        reader = self.reader
+        found = min(
+            (at for code in OBJECT_START_CODES if (at := reader.data.find(code.to_bytes(4, "big"))) >= 0),
+            default=-1,
+        )
+        if found < 0 or not reader.data.startswith(b"\0\0\1"):
+            raise reader.error(
+                f"an FBA object starts with {' or '.join(f'{c:08x}' for c in OBJECT_START_CODES)}, "
+                f"found {reader.data[:4].hex() or 'nothing'}"
+                f"{but_recognised(reader.data[:HEAD_BYTES]) or '; is this an FBA stream?'}",
+                bit=0,
+            )
+        if found:
+            reader.stream.pos = 8 * found
+            shown = reader.data[: min(found, TRAILING_BYTES_SHOWN)].hex()
+            reader.note(0, "headers before the object", shown, "object")
+        reader.start_code(0)
+
+    def _read_rest(self) -> None:
+        reader = self.reader
+        left = reader.size - reader.bit
+        if left:
+            bit = reader.bit
+            reader.stream.pos = reader.size
+            reader.note(bit, "trailing data", reader.data[bit // 8 :][:TRAILING_BYTES_SHOWN].hex(), "object")
+
+    def _read_plane(self) -> None:
+        reader = self.reader
+        intra = bool(reader.number("is_intra", 1, "plane"))
+        parts = reader.number("fba_object_mask", 2, "plane")
+        if not parts:
+            raise reader.error("fba_object_mask is 0, expected 1 FAPs, 2 BAPs or 3 both", bit=reader.bit - 2)
+        for bit, part in ((FAP_BIT, self.fap), (BAP_BIT, self.bap)):
+            if parts & bit and not intra and part.quant is None:
+                raise reader.error(
+                    f"fba_object_mask says {part.kind.upper()}s in a predicted plane, "
+                    "but no I plane carried them before",
+                    bit=reader.bit - 2,
+                )
+        self.record.update(intra=intra, parts=parts)
+        self._read_time(intra)
+        self.record.update(fap={}, viseme=None, expression=None, bap={})
+        if parts & FAP_BIT:
+            self._read_faps(intra)
+        if parts & BAP_BIT:
+            if intra:
+                self.bap.read_header(reader)
+            self.record["bap"] = self.bap.read_values(reader, intra=intra)
+        for part in (self.fap, self.bap):
+            self.record[f"{part.kind}_quant"] = part.quant
+            self.record[f"{part.kind}_mask_types"] = tuple(part.mask_types)
+            self.record[f"{part.kind}_lists"] = part.lists_sent
+
+    def _read_time(self, intra: bool) -> None:
+        reader, record = self.reader, self.record
+        record.update(frame_rate=None, time_code=None)
+        if intra and reader.number("is_frame_rate", 1, "plane"):
+            whole = reader.number("frame_rate", 8, "plane")
+            sixteenths = reader.number("seconds", 4, "plane")
+            offset = reader.number("frequency_offset", 1, "plane")
+            record["frame_rate"] = (whole, sixteenths, offset)
+            self.rate = (whole + Fraction(sixteenths, 16)) * (Fraction(1000, 1001) if offset else 1)
+        if intra and reader.number("is_time_code", 1, "plane"):
+            hours = reader.number("time_code_hours", 5, "plane")
+            minutes = reader.number("time_code_minutes", 6, "plane")
+            marker = reader.number("marker_bit", 1, "plane")
+            seconds = reader.number("time_code_seconds", 6, "plane")
+            record["time_code"] = (hours, minutes, marker, seconds)
+            self.clock = Fraction((hours * 60 + minutes) * 60 + seconds)
+            if not marker:
+                warnings.warn(
+                    f"plane {reader.plane}, bit {reader.bit - 7}: the marker bit of the time code is 0, "
+                    "expected 1; the time code was read all the same",
+                    FbaWarning,
+                    stacklevel=2,
+                )
+        skip = 0
+        if reader.number("skip_frames", 1, "plane"):
+            word = SKIP_MORE
+            while word == SKIP_MORE:
+                word = reader.number("number_of_frames_to_skip", 4, "plane")
+                skip += word
+        record.update(rate=self.rate, skip=skip, time=self.clock)
+        if self.clock is not None:
+            self.clock = self.clock + (1 + skip) / self.rate if self.rate else None
+
+    def _read_faps(self, intra: bool) -> None:
+        reader, fap = self.reader, self.fap
+        if intra:
+            fap.read_header(reader)
+            for high in (self.viseme, self.expression):
+                high.begin(fap.quant or 0)
+        for number, high in ((1, self.viseme), (2, self.expression)):
+            if number in fap.mask:
+                self.record[high.name] = high.read(reader, intra=intra)
+        self.record["fap"] = fap.read_values(reader, intra=intra)

@@ -1,0 +1,167 @@
+"""A face on a body: its vertices carried by neck and skull, so that both are one skin."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.model import INFLUENCES, BodyModel, checked_weights
+from fba.body.neck_blending import carried_by_neck
+from fba.body.skin.skinning import Skinner
+from fba.errors import ModelError
+from fba.mesh.meshes import float_rows
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+SKULL = "skullbase"
+"""The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
+SAME_SIZE = 0.005
+"""Sizes that differ by less than this share are taken as the same."""
+
+
+class HeadOnBody:
+    """Carries a face with a body's joints.
+
+    body: a model with a place for pupils. vertices: (V, 3), the neutral face, in its own frame and unit.
+    eyes: (2, 3), its pupils, feature points 3.5 and 3.6. skull: (V,), vertices that go with the skull alone
+    wherever they are (eyes, teeth, tongue), none by default.
+
+    The face is set between the pupils of the body, sized by their distance. Its vertices near the body's
+    neck (its part of kind "neck", as modelled) take that neck's weights, others move with the skull.
+
+    Raises ModelError for a body without pupils or a face whose eyes are no two places.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        vertices: npt.ArrayLike,
+        eyes: npt.ArrayLike,
+        skull: npt.NDArray[np.bool_] | None = None,
+    ) -> None:
+        places = float_rows(vertices, (-1, 3), "a face on a body: vertices")
+        self._skull = skull_of(body)
+        self.place = placement(body, eyes)
+        """float64 (4, 4): the face's frame into the body's, as modelled."""
+        self.size = float(self.place[0, 0])
+        """How many times as large the face is on the body."""
+        placed = places.astype(np.float64) * self.size + self.place[:3, 3]
+        neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
+        joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
+        weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
+        joints[:, 0], weights[:, 0] = self._skull, 1.0
+        self.hidden: npt.NDArray[np.bool_] = np.zeros(len(places), dtype=bool)
+        """(V,): vertices beyond the lower edge of the body's neck, which its clothes hide."""
+        self.brings_neck = not neck
+        """Whether the face has a neck that meets the body, whose own then is not to be shown."""
+        if neck:
+            free = np.ones(len(places), dtype=bool) if skull is None else ~np.asarray(skull)
+            found = carried_by_neck(neck, len(body.skeleton), self._skull, placed, free)
+            self.place[:3, 3] += found.offset
+            placed += found.offset
+            joints[free], weights[free] = found.joints, found.weights
+            self.hidden, self.brings_neck = found.hidden, found.brings_neck
+        self.shift = self.place[:3, 3].astype(np.float32)
+        """float32 (3,): where its origin is put."""
+        self._from_place = np.linalg.inv(self.place)
+        self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(places))
+        self._below = _descendants(body, self._skull)
+        self._bind = body.bind
+        self._inverse = np.linalg.inv(body.bind)
+        self.skinner = Skinner(
+            placed.astype(np.float32),
+            np.tile(np.array([0, 0, 1], dtype=np.float32), (len(places), 1)),
+            self.joints,
+            self.weights,
+            body.bind,
+            body.skeleton,
+        )
+        self._placed = np.empty((len(places), 3), dtype=np.float32)
+
+    def matrices(self, matrices: npt.ArrayLike, turn: npt.ArrayLike) -> Float64:
+        """Joint matrices (J, 4, 4) of the body with the head turned on its skull base.
+
+        turn: (4, 4), as `fba.face.Deformer.head_matrices` gives it, in the face's frame. FAPs turn the head
+        relative to what BAPs do to the skull base.
+        """
+        turned: Float64 = np.array(matrices, dtype=np.float64)
+        within = self.place @ np.asarray(turn, dtype=np.float64) @ self._from_place
+        if np.array_equal(within, np.eye(4)):
+            return turned
+        skull = turned[self._skull]
+        motion = skull @ self._inverse[self._skull] @ within @ self._bind[self._skull] @ np.linalg.inv(skull)
+        turned[self._below] = motion @ turned[self._below]
+        return turned
+
+    def frame(self, matrices: npt.ArrayLike) -> Float64:
+        """(4, 4): the face's frame into the world, for what moves with the skull alone."""
+        skull = np.asarray(matrices, dtype=np.float64)[self._skull]
+        frame: Float64 = skull @ self._inverse[self._skull] @ self.place
+        return frame
+
+    def skin(
+        self,
+        local: Float32,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        *,
+        upright: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """The face on the body: float32 (V, 3), metres.
+
+        local: float32 (V, 3), the face moved by its FAPs in its own frame without the head's turn
+        (`Deformer.local`). matrices: (J, 4, 4), with the head's turn (`matrices`). out: written to and
+        returned. upright: float32 (V, 3), normals of the face in its own frame; normals: filled with those
+        on the body. method: as of `BodyModel.skin`.
+        """
+        from fba.body.skin.loops import sized
+
+        if local.shape != self._placed.shape:
+            raise ValueError(f"vertices must have shape {self._placed.shape}, not {local.shape}")
+        sized(local, self.size, self.shift, self._placed)
+        return self.skinner.carry(self._placed, upright, matrices, out, normals, method)
+
+    def chosen(self, rows: npt.NDArray[np.intp]) -> HeadOnBody:
+        """The same for some of the face's vertices, rows (N,), each once: `skin` takes and gives these."""
+        some = copy.copy(self)
+        some.skinner = self.skinner.chosen(rows)
+        some._placed = np.empty((len(rows), 3), dtype=np.float32)
+        return some
+
+
+def skull_of(body: BodyModel) -> int:
+    """Number of the joint that carries the head: the skull base, or the highest joint where there is none."""
+    if SKULL in body.skeleton:
+        return body.skeleton.number(SKULL)
+    return int(body.bind[:, 1, 3].argmax())
+
+
+def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
+    """float64 (4, 4): from a face's frame to the body's as modelled. eyes: (2, 3), the face's pupils."""
+    if body.eyes is None:
+        raise ModelError(f"the body {body.name!r} has no pupils, so there is no place for a face on it")
+    given = np.array(eyes, dtype=np.float64)
+    if given.shape != (2, 3) or not np.isfinite(given).all():
+        raise ModelError(f"a face on a body needs its two pupils (points 3.5 and 3.6), not {given.tolist()}")
+    apart = float(np.linalg.norm(given[1] - given[0]))
+    if not apart > 1e-9:
+        raise ModelError("both pupils of the face are in the same place")
+    size = float(np.linalg.norm(body.eyes[1] - body.eyes[0])) / apart
+    if abs(size - 1) < SAME_SIZE:
+        size = 1.0
+    place = np.diag([size, size, size, 1.0])
+    place[:3, 3] = body.eyes.mean(axis=0) - size * given.mean(axis=0)
+    return place
+
+
+def _descendants(body: BodyModel, joint: int) -> list[int]:
+    below = [joint]
+    for number, parent in enumerate(body.skeleton.parents.tolist()):
+        if parent in below:
+            below.append(number)
+    return below

@@ -1,0 +1,263 @@
+"""Vertices carried along with the joints of a skeleton."""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.skin.girdle import chosen_girdle, girdle
+from fba.body.skin.moving_normals import rings
+from fba.body.skeleton import Skeleton
+from fba.body.skin.twisting import chosen_twists, twists
+from fba.mesh.meshes import result_array
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+METHODS = ("dual", "linear")
+"""Ways to blend the motion of several joints."""
+BLOCK = 64
+"""Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
+
+
+class SkinTables(NamedTuple):
+    """The vertices of a `Skinner`, a row each."""
+
+    vertices: Float32
+    """(V, 3) as modelled."""
+    upright: Float32
+    """(V, 3) normals as modelled."""
+    joints: Int32
+    """(V, 4)"""
+    weights: Float32
+    """(V, 4), 0 where a joint does not carry it."""
+    wring: Float32
+    """(V, 4): the bone that it is turned about beforehand, -1 for none, its shares of both twists, and how
+    far matrices draw it straight (`fba.body.skin.girdle`)."""
+    around: Int32
+    """(V, 4), see `fba.body.skin.moving_normals`, -1 where the normal only turns."""
+    numbers: Float32
+    """(V, 3), likewise."""
+    axis: Float64
+    """(B, 3) directions of the bones, as modelled."""
+    centre: Float64
+    """(B, 3) their beginnings."""
+
+
+class JointMotion(NamedTuple):
+    """Joints in one pose: see `fba.body.skin.joint_motion.motion_of_joints`."""
+
+    duals: Float32
+    """(J, 8), from the root."""
+    angles: Float32
+    """(B, 2)"""
+    root: Float64
+    """(3,) where the root is."""
+
+
+class Skinner:
+    """Carries vertices with joints.
+
+    vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
+    sum to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32
+    (F, 3), by which normals follow the surface (`fba.body.skin.moving_normals`); without them they only turn.
+
+    Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
+    several threads, one after the other.
+    """
+
+    def __init__(
+        self,
+        vertices: Float32,
+        normals: Float32,
+        joints: Int32,
+        weights: Float32,
+        bind: Float64,
+        skeleton: Skeleton,
+        triangles: Int32 | None = None,
+    ) -> None:
+        # numba is imported here, with the first body that moves
+        from fba.body.skin import loops
+
+        self._loops = loops
+        order = np.argsort(-weights, axis=1, kind="stable")
+        self._joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
+        self._weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
+        self._counts = (self._weights > 0).sum(axis=1).astype(np.int32)
+        # copies: compiled code is made anew for arrays that may not be written to
+        self._modelled = np.array(vertices, dtype=np.float32, order="C")
+        self._upright_modelled = np.array(normals, dtype=np.float32, order="C")
+        self._vertices, self._upright = self._modelled.copy(), self._upright_modelled.copy()
+        self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
+        self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
+        self._twists = twists(skeleton, bind, self._modelled, self._joints, self._weights)
+        self._girdle = girdle(skeleton, bind, self._modelled, self._joints, self._weights)
+        self._wrung = self._vertices.copy()
+        self._wrung_modelled = True
+        faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
+        self._around, self._numbers = rings(self._modelled, self._upright_modelled, faces)
+        self._scratch = np.empty((len(bind), 12), dtype=np.float32)
+        self._lock = threading.Lock()
+
+    def skin(
+        self,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """Vertices for joint matrices: see `BodyModel.skin`."""
+        return self._run(self._modelled, self._upright_modelled, matrices, out, normals, method)
+
+    def carry(
+        self,
+        vertices: Float32,
+        upright: Float32 | None,
+        matrices: npt.ArrayLike,
+        out: Float32 | None = None,
+        normals: Float32 | None = None,
+        method: str = "dual",
+    ) -> Float32:
+        """The same for other places (V, 3) of the vertices, and their normals (V, 3) where wanted."""
+        if normals is not None and upright is None:
+            raise ValueError("normals are wanted, but not given as modelled")
+        for array in (vertices, upright):
+            if array is not None and array.shape != self._modelled.shape:
+                raise ValueError(
+                    f"vertices and normals must have shape {self._modelled.shape}, not {array.shape}"
+                )
+        return self._run(vertices, upright, matrices, out, normals, method)
+
+    def chosen(self, rows: npt.NDArray[np.intp]) -> Skinner:
+        """A skinner of some vertices, rows (N,), each once. Their normals follow the surface where all the
+        neighbours that they are taken from are among them (`with_neighbours`), else they only turn."""
+        some = Skinner.__new__(Skinner)
+        some.__dict__.update(self.__dict__)
+        for name in ("_joints", "_weights", "_counts", "_modelled", "_upright_modelled", "_numbers"):
+            setattr(some, name, np.ascontiguousarray(getattr(self, name)[rows]))
+        place = np.full(len(self._modelled), -1, dtype=np.int32)
+        place[rows] = np.arange(len(rows))
+        around = self._around[rows]
+        around = np.where(around < 0, -1, place[around])
+        some._around = np.where((around < 0).any(axis=1, keepdims=True), -1, around).astype(np.int32)
+        some._twists, some._girdle = chosen_twists(self._twists, place), chosen_girdle(self._girdle, place)
+        some._vertices, some._upright = some._modelled.copy(), some._upright_modelled.copy()
+        some._wrung, some._wrung_modelled = some._modelled.copy(), True
+        some._scratch = np.empty_like(self._scratch)
+        some._lock = threading.Lock()
+        return some
+
+    def with_neighbours(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+        """(N,) the rows and those that their normals are taken from, rising."""
+        around = self._around[rows]
+        return np.union1d(rows, np.where(around < 0, rows[:, None], around))
+
+    def tables(self) -> SkinTables:
+        """What it knows of its vertices, for those that carry them by other means."""
+        wring = np.zeros((len(self._modelled), 4), dtype=np.float32)
+        wring[:, 0] = -1
+        for bone in range(len(self._twists.joint)):
+            part = slice(self._twists.starts[bone], self._twists.starts[bone + 1])
+            wring[self._twists.rows[part], 0] = bone
+            wring[self._twists.rows[part], 1:3] = self._twists.shares[part]
+        wring[self._girdle.rows, 3] = self._girdle.shares
+        return SkinTables(
+            self._modelled,
+            self._upright_modelled,
+            self._joints,
+            self._weights,
+            wring,
+            self._around,
+            self._numbers,
+            self._twists.axis,
+            self._twists.centre,
+        )
+
+    def motion(self, matrices: npt.ArrayLike) -> JointMotion:
+        """What joint matrices (J, 4, 4) do to any vertices, with dual quaternions. Errors as of `skin`."""
+        from fba.body.skin.joint_motion import motion_of_joints
+
+        frames, _ = self._frames(matrices)
+        duals = np.empty((len(self._inverse), 8), dtype=np.float32)
+        angles = np.empty((len(self._twists.joint), 2), dtype=np.float32)
+        with np.errstate(all="ignore"):
+            motion_of_joints(
+                frames[0], self._inverse, self._parents, self._twists, self._girdle, duals, angles
+            )
+        return JointMotion(duals, angles, frames[0, 0, :3, 3].copy())
+
+    def _run(
+        self,
+        vertices: Float32,
+        upright: Float32 | None,
+        matrices: npt.ArrayLike,
+        out: Float32 | None,
+        normals: Float32 | None,
+        method: str,
+    ) -> Float32:
+        if method not in METHODS:
+            raise ValueError(f"no skinning method {method!r}; there are {', '.join(METHODS)}")
+        frames, single = self._frames(matrices)
+        shape = (*(() if single else (len(frames),)), len(vertices), 3)
+        out = result_array(shape, out, normals)
+        placed = out[None] if single else out
+        turned = placed[:0] if normals is None else normals[None] if single else normals
+        with self._lock, np.errstate(all="ignore"):
+            vertices = _usable(vertices, self._vertices)
+            upright = self._upright if upright is None else _usable(upright, self._upright)
+            mesh = (vertices, upright, self._joints, self._weights, self._counts, self._around, self._numbers)
+            wrung = vertices
+            if method == "dual" and len(self._twists.rows):
+                wrung = self._wrung
+                if not (self._wrung_modelled and vertices is self._modelled):  # else what is wrung is anew
+                    np.copyto(wrung, vertices)
+                self._wrung_modelled = vertices is self._modelled
+            for start in range(0, len(frames), BLOCK):
+                part = slice(start, start + BLOCK)
+                if method == "dual":
+                    self._loops.dual_frames(
+                        frames[part],
+                        self._inverse,
+                        self._parents,
+                        *mesh,
+                        self._scratch,
+                        self._twists,
+                        self._girdle,
+                        wrung,
+                        placed[part],
+                        turned[part],
+                    )
+                else:
+                    self._loops.linear_frames(
+                        frames[part], self._inverse, *mesh, self._scratch, placed[part], turned[part]
+                    )
+        return out
+
+    def _frames(self, matrices: npt.ArrayLike) -> tuple[Float64, bool]:
+        array = np.asarray(matrices)
+        count = len(self._inverse)
+        if array.ndim not in (3, 4) or array.shape[-3:] != (count, 4, 4):
+            raise ValueError(
+                f"joint matrices must have shape ({count}, 4, 4) or (T, {count}, 4, 4), not {array.shape}"
+            )
+        if array.dtype.kind not in "iuf":
+            raise ValueError(f"joint matrices must be real numbers, not {array.dtype}")
+        frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, count, 4, 4)
+        if not frames.flags.writeable:
+            frames = frames.copy()  # see above
+        if not np.isfinite(frames).all():
+            frame, joint = (int(place) for place in np.argwhere(~np.isfinite(frames))[0, :2])
+            raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")
+        return frames, array.ndim == 3
+
+
+def _usable(array: Float32, room: Float32) -> Float32:
+    """The array as compiled code takes it: itself, or a copy in `room`."""
+    if array.dtype == np.float32 and array.flags.c_contiguous and array.flags.writeable:
+        return array
+    np.copyto(room, array)
+    return room

@@ -1,0 +1,109 @@
+"""Twists of the arms, spread along them.
+
+BAPs turn a whole forearm about its axis at the elbow, and a hand at the wrist; skin that only took part in
+the joints' motion would be wrung there. In an arm the twist grows along the bone. Each vertex of an arm
+is therefore turned about its bone, before the joints carry it, by what it lacks of that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.skeleton import Skeleton
+from fba.body.skin.loops import Twisting
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+LIMB = ("shoulder", "elbow", "wrist")
+WRIST_FROM = 0.35
+"""From this share of the forearm on, it takes part in the twist of the wrist."""
+LEAST = 0.02
+"""Vertices that the arm carries by less are none of it."""
+SMALL = 1e-3
+
+
+def twists(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32) -> Twisting:
+    """What the compiled loop needs to wring a body's arms; nothing where the skeleton has no arms.
+
+    Of its fields, each bone has rows `starts[b]` to `starts[b + 1]`: the vertices (`rows`) along it, and by
+    how much of the twists of its joint and of the next one they are turned beforehand (`shares`, two
+    each). centre, axis: the line of the bone as modelled; child_axis: that of the next joint's twist.
+    """
+    rows, shares, bones, axes = [], [], [], []
+    for side in ("l_", "r_"):
+        names = [side + name for name in LIMB]
+        if not all(name in skeleton for name in names):
+            continue
+        shoulder, elbow, wrist = (skeleton.number(name) for name in names)
+        carried = [_carried(skeleton, number, joints, weights) for number in (shoulder, elbow, wrist)]
+        along = [_along(bind, pair, vertices) for pair in ((shoulder, elbow), (elbow, wrist))]
+        arm = carried[0] > LEAST
+        upper = arm & (along[0] < 1)
+        # What the shoulder twists is wide enough as it is, and some of it hangs on the trunk.
+        own, child = np.zeros(len(vertices)), -carried[1]
+        for bone in (upper, arm & ~upper):
+            turned = np.flatnonzero(bone & (np.maximum(np.abs(own), np.abs(child)) > SMALL))
+            rows.append(turned)
+            shares.append(np.stack([own[turned], child[turned]], axis=1))
+            place = np.clip(along[1], 0.0, 1.0)
+            own = place - carried[1]
+            child = _smooth((place - WRIST_FROM) / (1 - WRIST_FROM)) - carried[2]
+        bones += [(shoulder, elbow), (elbow, wrist)]
+        axes += [_axis(bind, shoulder, elbow), _axis(bind, elbow, wrist)]
+    pairs = np.array(bones, dtype=np.int64).reshape(-1, 2)
+    axis = np.array(axes).reshape(-1, 3)
+    return Twisting(
+        rows=np.concatenate([np.zeros(0, dtype=np.int64), *rows]),
+        shares=np.concatenate([np.zeros((0, 2)), *shares]),
+        starts=np.cumsum([0, *(len(each) for each in rows)]).astype(np.int64),
+        joint=pairs[:, 0].copy(),
+        child=pairs[:, 1].copy(),
+        centre=bind[pairs[:, 0], :3, 3].copy(),
+        axis=axis,
+        child_axis=axis[np.arange(len(axis)) // 2 * 2 + 1] if len(axis) else axis,  # the forearm's
+    )
+
+
+def chosen_twists(twisting: Twisting, place: Int32) -> Twisting:
+    """The same for some of the vertices. place (V,): the new number of each, -1 where it is left out."""
+    found = place[twisting.rows]
+    kept = np.flatnonzero(found >= 0)
+    return twisting._replace(
+        rows=found[kept].astype(np.int64),
+        shares=np.ascontiguousarray(twisting.shares[kept]),
+        starts=np.searchsorted(kept, twisting.starts).astype(np.int64),
+    )
+
+
+def _axis(bind: Float64, joint: int, child: int) -> Float64:
+    way = bind[child, :3, 3] - bind[joint, :3, 3]
+    unit: Float64 = way / max(float(np.linalg.norm(way)), 1e-12)
+    return unit
+
+
+def _carried(skeleton: Skeleton, joint: int, joints: Int32, weights: Float32) -> Float64:
+    """(V,) by how much a joint and those below it carry each vertex."""
+    below = np.zeros(len(skeleton), dtype=bool)
+    below[joint] = True
+    for number, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0 and below[parent]:
+            below[number] = True
+    total: Float64 = (weights * below[joints]).sum(axis=1, dtype=np.float64)
+    return total
+
+
+def _along(bind: Float64, pair: tuple[int, int], vertices: Float32) -> Float64:
+    """(V,) how far along a bone vertices are: 0 at its joint, 1 at the next."""
+    start, end = bind[pair[0], :3, 3], bind[pair[1], :3, 3]
+    way = end - start
+    place: Float64 = (vertices - start) @ way / max(float(way @ way), 1e-12)
+    return place
+
+
+def _smooth(value: Float64) -> Float64:
+    t = np.clip(value, 0.0, 1.0)
+    smooth: Float64 = t * t * (3 - 2 * t)
+    return smooth

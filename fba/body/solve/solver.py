@@ -1,0 +1,150 @@
+"""BAPs -> joint matrices, and joint matrices -> BAPs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.solve import pose_loops
+from fba.body.solve import solver_loops
+from fba.body.solve.conventions import NO_BAP, Convention, convention
+from fba.body.solve.limits import widest
+from fba.body.skeleton import Skeleton
+from fba.errors import ModelError
+from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT
+
+VALUE_LIMIT = 2**31 - 1
+
+
+class BapSolver:
+    """Poses a skeleton by BAPs, and finds the BAPs of a pose.
+
+    skeleton: the default body where None. axes: name of a convention (`fba.body.convention_names()`):
+    axes, signs and order of rotations. Angles are 1e-5 rad, BAPs 181..183 mm. BAPs of joints that the
+    skeleton lacks have no effect; `missing` lists those joints.
+    """
+
+    def __init__(self, skeleton: Skeleton | None = None, axes: str = "iso") -> None:
+        self.skeleton = skeleton if skeleton is not None else Skeleton.default()
+        self.convention: Convention = convention(axes)
+        rules = self.convention
+        count = len(self.skeleton)
+        self._bap = np.full((count, 3), NO_BAP, dtype=np.int64)
+        self._axis = np.tile(np.arange(3, dtype=np.int64), (count, 1))
+        self._sign = np.ones((count, 3))
+        for row, joint in enumerate(rules.joints):
+            if joint in self.skeleton:
+                number = self.skeleton.number(joint)
+                self._bap[number] = rules.bap[row]
+                self._axis[number] = rules.axis[row]
+                self._sign[number] = rules.sign[row]
+        self.missing = tuple(joint for joint in rules.joints if joint not in self.skeleton)
+
+        used = self._bap != NO_BAP
+        self._counts = used.sum(axis=1)
+        self._columns = self._bap[used]
+        self._radians = self._sign[used] * pose_loops.UNIT
+        self._turns = np.zeros((count, 3), dtype=np.int64)
+        self._turns[used] = np.arange(len(self._columns))
+        self._offsets = self.skeleton.offsets
+        self._metres = rules.translation_sign * pose_loops.MILLIMETRE
+        ranges = np.radians(widest())
+        self._limits = np.zeros((count, 3, 2))
+        self._limits[used] = ranges[self._columns]
+
+    def pose(
+        self, baps: npt.ArrayLike, out: npt.NDArray[np.float64] | None = None
+    ) -> npt.NDArray[np.float64]:
+        """Joint matrices of a pose: float64 (J, 4, 4) for baps (296,), (T, J, 4, 4) for (T, 296).
+
+        186 columns do too. A matrix takes points of the default posture's frame, relative to the
+        joint's centre, into the world: its translation is where the joint is, its rotation is the
+        identity in the default posture. out: a C-contiguous float64 array of the result's shape to write
+        into, which is then returned. ValueError on other shapes or values that are not finite.
+        """
+        values = np.asarray(baps)
+        if values.dtype == object or not np.issubdtype(values.dtype, np.number):
+            raise ValueError(f"BapSolver.pose: baps must be numbers, not {values.dtype}")
+        if values.ndim not in (1, 2) or values.shape[-1] not in (BAP_STANDARD_COUNT, BAP_COUNT):
+            raise ValueError(
+                f"BapSolver.pose: baps must have shape ({BAP_COUNT},) or (T, {BAP_COUNT}), "
+                f"or {BAP_STANDARD_COUNT} columns, not {values.shape}"
+            )
+        frames = values if values.ndim == 2 else values[None]
+        if frames.dtype != np.int32:
+            frames = np.asarray(frames, dtype=np.float64)
+            if not (np.abs(frames) <= VALUE_LIMIT).all():
+                raise ValueError("BapSolver.pose: baps must be finite, and fit 32 bits")
+        shape = (*values.shape[:-1], len(self.skeleton), 4, 4)
+        if out is None:
+            out = np.empty(shape)  # the loop below writes every number
+        elif not (
+            isinstance(out, np.ndarray)
+            and out.shape == shape
+            and out.dtype == np.float64
+            and out.flags.c_contiguous
+            and out.flags.writeable
+        ):
+            raise ValueError(f"BapSolver.pose: out must be a writeable, C-contiguous float64 array {shape}")
+        pose_loops.pose(
+            np.ascontiguousarray(frames), self.skeleton.parents, self._offsets, self._turns, self._axis,
+            self._radians, self._columns, self._counts, self.convention.translation, self._metres,
+            out.reshape(-1),
+        )  # fmt: skip
+        return out
+
+    def solve(
+        self,
+        matrices: npt.ArrayLike,
+        joints: Collection[str] | None = None,
+        previous: npt.ArrayLike | None = None,
+    ) -> npt.NDArray[np.int32]:
+        """BAPs that reach these joint matrices: int32 (296,) for (J, 4, 4), (T, 296) for (T, J, 4, 4).
+
+        Only the rotations count, and the root's translation. Where a joint lacks a freedom, it comes as
+        close as it can, and its children make up for the rest as far as they can. joints: the joints to
+        solve, by name; others stay unturned.
+
+        Of the angles that make a rotation, each frame takes those closest to the frame before, and the first
+        frame those closest to previous, (296,): a smooth motion has smooth angles, which may leave +-pi (see
+        `wrapped`). Without previous, the first frame keeps within human limits (`fba.body.Limits`) where it
+        can, and as close to 0. At gimbal lock the outermost angle stays as it was.
+
+        ValueError on a wrong shape or values that are not finite; ModelError where a value does not
+        fit 32 bits; KeyError for an unknown joint.
+        """
+        array = np.asarray(matrices, dtype=np.float64)
+        count = len(self.skeleton)
+        if array.ndim not in (3, 4) or array.shape[-3:] != (count, 4, 4):
+            raise ValueError(
+                f"BapSolver.solve: matrices must have shape ({count}, 4, 4) or "
+                f"(T, {count}, 4, 4), not {array.shape}"
+            )
+        if not np.isfinite(array).all():
+            raise ValueError("BapSolver.solve: matrices must be finite")
+        frames = np.ascontiguousarray(array if array.ndim == 4 else array[None])
+        wanted = np.ones(count, dtype=bool)
+        if joints is not None:
+            wanted[:] = False
+            wanted[[self.skeleton.number(name) for name in joints]] = True
+        values = np.zeros((len(frames), BAP_COUNT), dtype=np.int32)
+        fits = solver_loops.solve(
+            frames, self.skeleton.parents, self.skeleton.centres[0], self._counts, self._bap, self._axis,
+            self._sign, self.convention.translation, self._metres, wanted, self._angles(previous),
+            self._limits, previous is None, VALUE_LIMIT, values,
+        )  # fmt: skip
+        if not fits:
+            raise ModelError("BapSolver.solve: the pose lies beyond what 32 bits of mm or 1e-5 rad can say")
+        return values if array.ndim == 4 else values[0]
+
+    def _angles(self, baps: npt.ArrayLike | None) -> npt.NDArray[np.float64]:
+        angles = np.zeros(self._bap.shape)
+        if baps is not None:
+            values = np.asarray(baps, dtype=np.float64)
+            if values.shape != (BAP_COUNT,) or not np.isfinite(values).all():
+                raise ValueError(f"BapSolver.solve: previous must be {BAP_COUNT} finite BAPs")
+            used = self._bap >= 0
+            angles[used] = values[self._bap[used]] * pose_loops.UNIT
+        return angles

@@ -1,0 +1,305 @@
+"""The compiled loops from joint matrices to body animation parameters.
+
+A rotation taken apart into turns about three axes has two answers, and at gimbal lock a whole line of
+them; of these, the one closest to the frame before is taken, so a smooth motion has smooth angles.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.solve.fast_trig import arc_tangent, sine_cosine
+from fba.body.solve.pose_loops import UNIT
+from fba.compiled import compiled, inlined
+
+Float = npt.NDArray[np.float64]
+Int = npt.NDArray[np.int64]
+
+NEAR_LOCK = 1e-5
+"""Below this cosine of the middle angle, only sum or difference of the outer angles is determined."""
+WITHIN_REACH = 1e-8
+"""A joint of two freedoms reaches a rotation whose part about the third axis is smaller."""
+ALMOST = 1e-4
+"""Where that part is smaller than this, one step of the search squares it away."""
+SETTLED = 1e-8
+"""Radians by which two turns change in a last step of their search."""
+STEPS = 12
+BLOCK = 16
+"""Frames that are solved together, joint by joint."""
+TURN = 2.0 * math.pi
+
+
+@inlined
+def _nearest(angle: float, wanted: float) -> float:
+    """The angle plus the number of whole turns that bring it closest to the wanted one."""
+    return angle + TURN * math.floor((wanted - angle) / TURN + 0.5)
+
+
+@inlined
+def _excess(angle: float, low: float, high: float) -> float:
+    """By how much an angle leaves a range."""
+    return max(0.0, low - angle, angle - high)
+
+
+@inlined
+def _turn(m: Float, axis: int, sine: float, cosine: float) -> None:
+    """m := m . Rot(axis), in place."""
+    first = axis + 1 if axis < 2 else 0
+    second = axis - 1 if axis > 0 else 2
+    for row in range(3):
+        a = float(m[row, first])
+        b = float(m[row, second])
+        m[row, first] = cosine * a + sine * b
+        m[row, second] = cosine * b - sine * a
+
+
+@inlined
+def _turn_rows(m: Float, axis: int, sine: float, cosine: float) -> None:
+    """m := Rot(axis)^-1 . m, in place: takes an outermost turn off."""
+    first = axis + 1 if axis < 2 else 0
+    second = axis - 1 if axis > 0 else 2
+    for column in range(3):
+        a = float(m[first, column])
+        b = float(m[second, column])
+        m[first, column] = cosine * a + sine * b
+        m[second, column] = cosine * b - sine * a
+
+
+@inlined
+def _angle_about(m: Float, axis: int) -> float:
+    """The turn about one axis that comes closest to the rotation m (largest trace of their quotient)."""
+    a = axis + 1 if axis < 2 else 0
+    b = axis - 1 if axis > 0 else 2
+    return arc_tangent(m[b, a] - m[a, b], m[a, a] + m[b, b])
+
+
+@compiled
+def _closest_two(m: Float, f: int, a1: int, a2: int, start: Float, work: Float) -> None:
+    """Improves frame f of start (3, N): turns about two axes that come closest to rotations m (3, 3, N)."""
+    x = float(start[0, f])
+    y = float(start[1, f])
+    steps = STEPS if abs(m[a1, a2, f]) > ALMOST else 1
+    for _ in range(steps):  # each turn in its turn, climbing to the closest rotation
+        for i in range(3):
+            for k in range(3):
+                work[i, k] = m[i, k, f]
+        sine, cosine = sine_cosine(x)
+        _turn_rows(work, a1, sine, cosine)
+        y_new = _angle_about(work, a2)
+        for i in range(3):
+            for k in range(3):
+                work[i, k] = m[i, k, f]
+        sine, cosine = sine_cosine(-y_new)
+        _turn(work, a2, sine, cosine)
+        x_new = _angle_about(work, a1)
+        change = abs(x_new - x) + abs(y_new - y)
+        x = x_new
+        y = y_new
+        if change < SETTLED:
+            break
+    start[0, f] = x
+    start[1, f] = y
+
+
+@compiled
+def _locked(m: Float, f: int, a1: int, a2: int, a3: int, outer: float, middle: float, work: Float) -> float:
+    """The third turn where, at gimbal lock, the outer one is given."""
+    for i in range(3):
+        for k in range(3):
+            work[i, k] = m[i, k, f]
+    sine, cosine = sine_cosine(outer)
+    _turn_rows(work, a1, sine, cosine)
+    sine, cosine = sine_cosine(middle)
+    _turn_rows(work, a2, sine, cosine)
+    return _angle_about(work, a3)
+
+
+@compiled
+def _angles(
+    m: Float, frames: int, count: int, j: int, axis: Int, sign: Float, previous: Float, limits: Float,
+    bounded: bool, work: Float, cosines: Float, angles: Float,
+) -> None:  # fmt: skip
+    """Angles (3, N), outermost first, whose turns give the rotations m (3, 3, N), frame after frame.
+
+    count: number of freedoms of joint j, 1 to 3; with one or two, the closest rotation that they can make.
+    First what depends on no other frame, as vector code; then the choice of whole turns and of the triple.
+    """
+    a1 = int(axis[j, 0])
+    a2 = int(axis[j, 1])
+    a3 = int(axis[j, 2])
+    e = 1.0 if (a2 - a1) % 3 == 1 else -1.0
+    if count == 1:
+        b = a1 + 1 if a1 < 2 else 0
+        c = a1 - 1 if a1 > 0 else 2
+        for f in range(frames):
+            angles[0, f] = arc_tangent(m[c, b, f] - m[b, c, f], m[b, b, f] + m[c, c, f])
+    elif count == 2:
+        for f in range(frames):
+            angles[0, f] = arc_tangent(e * m[a3, a2, f], m[a2, a2, f])
+        for f in range(frames):
+            angles[1, f] = arc_tangent(e * m[a1, a3, f], m[a1, a1, f])
+        for f in range(frames):
+            if abs(m[a1, a2, f]) > WITHIN_REACH:
+                _closest_two(m, f, a1, a2, angles, work)
+    else:
+        for f in range(frames):
+            cosines[f] = math.sqrt(m[a1, a1, f] * m[a1, a1, f] + m[a1, a2, f] * m[a1, a2, f])
+        for f in range(frames):
+            angles[0, f] = arc_tangent(-e * m[a2, a3, f], m[a3, a3, f])
+        for f in range(frames):
+            angles[1, f] = arc_tangent(e * m[a1, a3, f], cosines[f])
+        for f in range(frames):
+            angles[2, f] = arc_tangent(-e * m[a1, a2, f], m[a1, a1, f])
+
+    first = float(previous[j, 0])
+    second = float(previous[j, 1])
+    third = float(previous[j, 2])
+    for f in range(frames):
+        x = _nearest(float(sign[j, 0]) * float(angles[0, f]), first)
+        y = _nearest(float(sign[j, 1]) * float(angles[1, f]), second) if count > 1 else 0.0
+        z = 0.0
+        if count == 3:
+            if cosines[f] < NEAR_LOCK:
+                x = first
+                turn = _locked(m, f, a1, a2, a3, sign[j, 0] * first, angles[1, f], work)
+                z = _nearest(float(sign[j, 2]) * turn, third)
+            else:
+                z = _nearest(float(sign[j, 2]) * float(angles[2, f]), third)
+                # the other triple of angles that makes the same rotation
+                u = x + math.pi if x < first else x - math.pi
+                v = _nearest(float(sign[j, 1]) * math.pi - y, second)
+                w = z + math.pi if z < third else z - math.pi
+                here = (x - first) ** 2 + (y - second) ** 2 + (z - third) ** 2
+                other = (u - first) ** 2 + (v - second) ** 2 + (w - third) ** 2
+                if bounded and f == 0:
+                    out = (
+                        _excess(x, limits[j, 0, 0], limits[j, 0, 1])
+                        + _excess(y, limits[j, 1, 0], limits[j, 1, 1])
+                        + _excess(z, limits[j, 2, 0], limits[j, 2, 1])
+                        - _excess(u, limits[j, 0, 0], limits[j, 0, 1])
+                        - _excess(v, limits[j, 1, 0], limits[j, 1, 1])
+                        - _excess(w, limits[j, 2, 0], limits[j, 2, 1])
+                    )
+                    if abs(out) > UNIT:  # one of them leaves the limits by more
+                        here = out
+                        other = 0.0
+                if other < here:
+                    x = u
+                    y = v
+                    z = w
+        first = x
+        second = y
+        third = z
+        angles[0, f] = x
+        angles[1, f] = y
+        angles[2, f] = z
+    previous[j, 0] = first
+    previous[j, 1] = second
+    previous[j, 2] = third
+
+
+@compiled
+def solve(
+    matrices: Float,
+    parents: Int,
+    centre: Float,
+    counts: Int,
+    bap: Int,
+    axis: Int,
+    sign: Float,
+    translation: Int,
+    metres: Float,
+    wanted: npt.NDArray[np.bool_],
+    previous: Float,
+    limits: Float,
+    bounded: bool,
+    largest: int,
+    values: npt.NDArray[np.int32],
+) -> bool:
+    """matrices float64 (T, J, 4, 4) -> values int32 (T, 296), given filled with 0.
+
+    centre: (3,) of the root. counts: int64 (J,), freedoms of each joint. wanted: bool (J,), joints to
+    solve; the others stay unturned. previous: float64 (J, 3), angles before the first frame, changed. limits:
+    float64 (J, 3, 2), which count in the first frame only, and only where bounded. largest: of all magnitudes
+    of a value. What a joint cannot do is left to its children: each is solved against what its
+    parent really does. Returns False where a value would exceed the largest.
+    """
+    joints = parents.shape[0]
+    reached = np.zeros((joints, 3, 3, BLOCK))  # frames innermost: vector code
+    local = np.zeros((3, 3, BLOCK))
+    work = np.zeros((3, 3))
+    angles = np.zeros((3, BLOCK))
+    sines = np.zeros(BLOCK)
+    cosines = np.zeros(BLOCK)
+    for begin in range(0, values.shape[0], BLOCK):
+        frames = min(BLOCK, values.shape[0] - begin)
+        for j in range(joints):
+            p = int(parents[j])
+            count = int(counts[j]) if wanted[j] else 0
+            for i in range(3):
+                for k in range(3):
+                    for f in range(frames):
+                        reached[j, i, k, f] = (1.0 if i == k else 0.0) if p < 0 else reached[p, i, k, f]
+            if p < 0:
+                for i in range(3):
+                    column = int(translation[i])
+                    if column < 0:
+                        continue
+                    for f in range(frames):
+                        place = matrices[begin + f, j, i, 3] - centre[i]
+                        value = math.floor(place / metres[i] + 0.5)
+                        if not abs(value) <= largest:
+                            return False
+                        values[begin + f, column] = int(value)
+            if count == 0:
+                continue
+            for k in range(3):
+                for f in range(frames):
+                    a = float(matrices[begin + f, j, 0, k])
+                    b = float(matrices[begin + f, j, 1, k])
+                    c = float(matrices[begin + f, j, 2, k])
+                    for i in range(3):
+                        local[i, k, f] = (
+                            a * reached[j, 0, i, f] + b * reached[j, 1, i, f] + c * reached[j, 2, i, f]
+                        )
+            first_frame = bounded and begin == 0
+            _angles(local, frames, count, j, axis, sign, previous, limits, first_frame, work, cosines, angles)
+            for d in range(count):
+                column = int(bap[j, d])
+                for f in range(frames):
+                    value = math.floor(angles[d, f] / UNIT + 0.5)
+                    if not abs(value) <= largest:
+                        return False
+                    values[begin + f, column] = int(value)
+                    angles[d, f] = float(sign[j, d]) * UNIT * value
+                for f in range(frames):
+                    sine, cosine = sine_cosine(float(angles[d, f]))
+                    sines[f] = sine
+                    cosines[f] = cosine
+                first = int(axis[j, d]) + 1 if axis[j, d] < 2 else 0
+                second = int(axis[j, d]) - 1 if axis[j, d] > 0 else 2
+                for i in range(3):
+                    for f in range(frames):
+                        a = float(reached[j, i, first, f])
+                        b = float(reached[j, i, second, f])
+                        reached[j, i, first, f] = cosines[f] * a + sines[f] * b
+                        reached[j, i, second, f] = cosines[f] * b - sines[f] * a
+    return True
+
+
+def joint_angles(local: Float, count: int, axis: Int, sign: Float, angles: Float) -> None:
+    """local float64 (3, 3, T) -> angles (3, T), each frame close to the one before.
+
+    count: number of freedoms, axis int64 (1, 3) and sign float64 (1, 3), see `Convention`.
+    """
+    frames = local.shape[2]
+    work = np.zeros((3, 3))
+    before = np.zeros((1, 3))
+    limits = np.zeros((1, 3, 2))
+    cosines = np.zeros(frames)
+    # as `solve` passes them, for the types that are compiled already
+    axis, sign = np.array(axis, dtype=np.int64), np.array(sign)
+    _angles(local, frames, count, 0, axis, sign, before, limits, False, work, cosines, angles)

@@ -1,0 +1,86 @@
+"""Joint angles that point bones in wanted directions, for joints that lack a freedom."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba import rotations
+
+Float = npt.NDArray[np.float64]
+
+STEPS = 8
+LEAP = 0.5
+"""Radians that an angle changes by at most in a step: no leaps where a bone is almost straight."""
+SETTLED = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A line that is to point somewhere.
+
+    pieces: bones, (3,) or (T, 3), that make up the line one after another, each with how many of the axes
+    turn it, counted from the outermost. wanted: unit (T, 3).
+    """
+
+    pieces: tuple[tuple[Float, int], ...]
+    wanted: Float
+
+
+def product(axes: Float, angles: Float) -> Float:
+    """Matrices (T, 3, 3): turns about axes (K, 3) by angles (T, K), outermost first."""
+    result = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    for number, axis in enumerate(axes):
+        result = result @ rotations.turn(axis, angles[:, number])
+    return result
+
+
+def aim(axes: Float, start: Float, bone: Float, wanted: Float, weights: Float) -> Float:
+    """Angles (T, K) whose turns about axes (K, 3) bring bone (3,) or (T, 3) to wanted (T, 3).
+
+    Of all that do, those closest to start (T, K), freedoms with small weights (K,) giving way first.
+    Start must not be far off. Directions are unit vectors.
+    """
+    return aim_all(axes, start, (Target(((bone, len(axes)),), wanted),), weights)
+
+
+def aim_all(axes: Float, start: Float, targets: Sequence[Target], weights: Float) -> Float:
+    """Angles (T, K) of turns about axes (K, 3), one inside the other, that meet several targets at once.
+
+    See `aim`. Where they cannot all be met, the sum of squares of what is missed is least. Gauss-Newton.
+    """
+    angles = np.array(start)
+    count = axes.shape[0]
+    square = weights * weights
+    for _ in range(STEPS):
+        frames = [np.broadcast_to(np.eye(3), (len(angles), 3, 3))]
+        for number, axis in enumerate(axes):
+            frames.append(frames[-1] @ rotations.turn(axis, angles[:, number]))
+        world = [frames[number] @ axis for number, axis in enumerate(axes)]
+        normal = np.zeros((len(angles), count, count)) + np.diag(square)
+        pull = square * (start - angles)
+        for target in targets:
+            turned = [(frames[used] @ bone[..., None])[:, :, 0] for bone, used in target.pieces]
+            line = np.sum(turned, axis=0)
+            length = np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-12)
+            line = line / length
+            slopes = np.zeros((len(angles), 3, count))
+            for number, axis in enumerate(world[: max(used for _, used in target.pieces)]):
+                moved = sum(
+                    (t for t, (_, used) in zip(turned, target.pieces, strict=True) if used > number),
+                    np.zeros(3),
+                )
+                slope = rotations.cross(axis, np.broadcast_to(moved, line.shape)) / length
+                slopes[:, :, number] = slope - line * np.einsum("ti,ti->t", slope, line)[:, None]
+            normal += np.swapaxes(slopes, 1, 2) @ slopes
+            pull += np.einsum("tik,ti->tk", slopes, target.wanted - line)
+        step = np.linalg.solve(normal, pull[:, :, None])[:, :, 0]
+        largest = np.abs(step).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, LEAP / np.maximum(largest, 1e-12))
+        angles += step
+        if np.abs(step).max(initial=0.0) < SETTLED:
+            break
+    return angles

@@ -1,0 +1,124 @@
+"""Elbows and knees: joints that flex and twist, but cannot abduct.
+
+Such a hinge swings its bone in one plane only. Where the source does more, the upper bone is turned
+about its own length until the plane is right, and the hinge's twist takes that turn back for what
+hangs below: both bones keep their directions, and the hand or foot keeps its own. Everything is an
+array over frames.
+
+With the twist tau - phi of the hinge, a turn phi leaves c0 + c1 cos phi + c2 sin phi of the lower bone's
+direction sideways, which is zero for two phi: one bends the hinge the natural way, one the other way. Where
+the limb is almost straight, all phi leave little. `fba.capture.limbs.hinge_path` finds the path that misses the
+direction by little, bends the natural way, and does not jump.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba import rotations
+from fba.capture.limbs.bone_ik import aim, product
+from fba.capture.limbs.hinge_path import follow
+
+Float = npt.NDArray[np.float64]
+
+STIFF = 0.3
+"""Weight of the twists that were found against the lower bone's direction, in the last step: a limb that is
+bent by much less than this (radians) keeps them, and so does not swing round where its plane does."""
+LOOSE = 2e-3
+"""The same for flexion."""
+CLEAR_BEND = 0.3
+"""From this angle on, a bend shows which way the hinge opens; less may be a little beyond straight."""
+ABRUPT = 10.0
+"""Radians a second: a source that turns faster may make the result turn faster, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """A hinge in the default posture.
+
+    upper, lower: unit (3,), directions of the bones. flexion, twist: unit (3,), signed axes of the hinge,
+    flexion outermost. natural: +1 where it bends by positive flexion, -1 by negative.
+    """
+
+    upper: Float
+    lower: Float
+    flexion: Float
+    twist: Float
+    natural: float
+
+
+def solve(hinge: Hinge, direction: Float, local: Float, rate: float) -> Float:
+    """Angles (T, 3): turn about the upper bone, flexion, twist.
+
+    direction: (T, 3), wanted for the lower bone, and local: (T, 3, 3), wanted rotation of the lower bone,
+    both in the frame of the upper bone before it is turned. Direction comes first.
+    """
+    total = turn_about(local, hinge.twist)
+    along = 1.0 if hinge.upper @ hinge.twist > 0 else -1.0
+    turn = _turn(hinge, direction, total, along, rate)
+
+    flexion = _flexion(hinge, direction, turn, total - along * turn)
+    remains = rotations.turn(hinge.flexion, -flexion) @ rotations.turn(hinge.upper, -turn) @ local
+    twist = total - along * turn
+    exact = turn_about(remains, hinge.twist)
+    twist = twist + np.angle(np.exp(1j * (exact - twist)))
+    start = np.stack([turn, flexion, twist], axis=1)
+    axes = np.stack([hinge.upper, hinge.flexion, hinge.twist])
+    return aim(axes, start, hinge.lower, direction, np.array([STIFF, LOOSE, STIFF]))
+
+
+def matrices(hinge: Hinge, angles: Float) -> tuple[Float, Float]:
+    """Rotations (T, 3, 3): the turn of the upper bone, and that of the hinge."""
+    return rotations.turn(hinge.upper, angles[:, 0]), product(
+        np.stack([hinge.flexion, hinge.twist]), angles[:, 1:]
+    )
+
+
+def turn_about(rotation: Float, axis: Float) -> Float:
+    """Angles (T,), without jumps, of the turn about an axis that comes closest to each rotation."""
+    m = rotation
+    vector = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
+    along = np.einsum("i,tij,j->t", axis, m, axis)
+    trace = np.trace(m, axis1=1, axis2=2)
+    return _centred(np.unwrap(np.arctan2(vector @ axis, trace - along)))
+
+
+def _centred(angle: Float) -> Float:
+    """Moved by whole turns as a whole, to lie around 0."""
+    return angle - 2 * np.pi * np.rint(np.median(angle) / (2 * np.pi)) if len(angle) else angle
+
+
+def _turn(hinge: Hinge, direction: Float, total: Float, along: float, rate: float) -> Float:
+    """Turns (T,) of the upper bone: the hinge's plane right where it means something, and no jumps."""
+    a, h, y, d = hinge.upper, hinge.flexion, hinge.twist, hinge.lower
+    # sideways part of the wanted direction, seen from the turned upper bone, less that of the lower bone
+    constant = direction @ a * (a @ h)
+    straight, across = d @ h, np.cross(y, d) @ h
+    cosine = direction @ (h - a * (a @ h)) - (np.cos(total) * straight + np.sin(total) * across)
+    sine = direction @ np.cross(a, h) - along * (np.sin(total) * straight - np.cos(total) * across)
+    sideways = np.stack([constant, cosine, sine], axis=1)
+    side = np.cross(h, d) * hinge.natural
+    flat = direction @ a * (a @ side)
+    natural = np.stack([flat, direction @ side - flat, direction @ np.cross(a, side)], axis=1)
+
+    # usually, the limb bends the natural way with nothing left sideways
+    reach = np.hypot(natural[:, 1], natural[:, 2])
+    sure = np.where(reach > CLEAR_BEND, natural[:, 1] + 1j * natural[:, 2], 0.0).sum()
+    swing = np.linalg.norm(np.diff(direction, axis=0, prepend=direction[:1]), axis=1) * rate
+    ease = 1 / (1 + (swing / ABRUPT) ** 2) ** 2
+    path = np.zeros(len(direction))
+    follow(sideways, natural, ease, float(np.angle(sure + 1e-9)), 1 / rate, path)
+    return _centred(path)
+
+
+def _flexion(hinge: Hinge, direction: Float, turn: Float, twist: Float) -> Float:
+    """Flexion (T,) that brings the twisted lower bone closest to its direction."""
+    wanted = (rotations.turn(hinge.upper, -turn) @ direction[:, :, None])[:, :, 0]
+    bone = rotations.turn(hinge.twist, twist) @ hinge.lower
+    sine = np.cross(bone, wanted) @ hinge.flexion
+    cosine = np.einsum("ti,ti->t", bone, wanted) - (bone @ hinge.flexion) * (wanted @ hinge.flexion)
+    result: Float = np.arctan2(sine, cosine)
+    return result

@@ -1,0 +1,47 @@
+"""`fba conformance`: this codec against test vectors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from fba.cli import options
+
+
+@click.command(
+    cls=options.Command,
+    epilog=options.examples(
+        "fba conformance                 # the vectors that come with fba",
+        "fba conformance ../vectors      # a folder with an index.json",
+    ),
+)
+@click.argument("folder", required=False, type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--verbose", "-v", is_flag=True, help="A line for every vector, not only for failures.")
+@options.json_option
+def command(folder: Path | None, verbose: bool, as_json: bool) -> None:
+    """Check this codec against test vectors: decoded values and encoded bytes, both exact.
+
+    Exits with 1 where a vector fails.
+    """
+    from fba_conformance.runner import check, vectors
+
+    chosen = vectors(folder)
+    results = []
+    with options.progress("checking", len(chosen)) as step:
+        for vector in chosen:
+            results.append(check(vector))
+            step(1)
+    failed = [result for result in results if not result.passed]
+    if as_json:
+        options.print_json([result.to_dict() for result in results])
+    else:
+        for result in results if verbose else failed:
+            click.echo(result.line())
+        encoded = sum(result.encoded is not None for result in results)
+        click.echo(
+            f"{len(results) - len(failed)} of {len(results)} vectors pass: {len(results)} decoded, "
+            f"{encoded} encoded again to the same bytes"
+        )
+    if failed:
+        raise click.exceptions.Exit(1)

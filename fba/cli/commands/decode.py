@@ -1,0 +1,232 @@
+"""`fba decode`: FBA streams to FAP, BAP and EPF files, and to files that other programs open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from fba.animation import Animation
+from fba.cli import options, step_tables, writer_options
+from fba.cli.outputs import (
+    STANDARD,
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    OutputType,
+    no_clobber_option,
+    shown,
+    to_option,
+    writer_of,
+)
+from fba.errors import BitstreamError
+
+if TYPE_CHECKING:
+    from fba.codec import PlaneSettings
+    from fba.formats.registry import Format
+
+_FOLDER_OR_FILE = OutputType(folders=True)
+
+
+@click.command(
+    cls=options.Command,
+    epilog=options.examples(
+        "fba decode talk.fba --fap decoded.fap",
+        "fba decode both.fba --fap face.fap --bap body.bap --bap-steps visage",
+        "fba decode talk.fba --fap decoded.fap --epf talk.epf    # encode --epf makes the same bytes again",
+        "fba decode both.fba -o person.glb --bap-steps visage",
+        "fba decode walk.fba -o walk.bvh --bap-steps visage --joints moving",
+        "fba decode talk.fba --fap - | less",
+        "fba decode archive/*.fba --fap decoded/",
+        "fba decode archive/*.fba -o decoded/ --to glb",
+    ),
+)
+@click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=options.EXISTING)
+@click.option(
+    "--fap", type=_FOLDER_OR_FILE, metavar="OUT.fap", help="Where the FAPs go; a folder for several inputs."
+)
+@click.option("--bap", type=_FOLDER_OR_FILE, metavar="OUT.bap", help="Where the BAPs go; likewise.")
+@click.option(
+    "--epf", type=_FOLDER_OR_FILE, metavar="OUT.epf", help="How it was coded, for fba encode --epf; likewise."
+)
+@click.option(
+    "-o",
+    "--output",
+    type=_FOLDER_OR_FILE,
+    metavar="OUT.bvh|OUT.glb",
+    help="A file for other programs, its suffix says which; likewise.",
+)
+@to_option
+@no_clobber_option
+@writer_options.writer_options
+@options.bap_steps_option
+@options.salvage_option
+@options.json_option
+def command(
+    inputs: tuple[Path, ...],
+    fap: Path | None,
+    bap: Path | None,
+    epf: Path | None,
+    output: Path | None,
+    to: str | None,
+    no_clobber: bool,
+    bap_steps: str,
+    salvage: bool,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Decode FBA streams: to ASCII FAP and BAP files, to EPF files that say how they were coded, and to BVH
+    and glTF for other programs.
+
+    One of the files can be -, standard output.
+    """
+    targets = _targets({"--fap": fap, "--bap": bap, "--epf": epf}, output, to, given)
+    several = len(inputs) > 1
+    for target in targets:
+        if several and not target.folder:
+            raise click.UsageError(
+                f"several inputs need a folder for {target.flag}, and {target.place} is none"
+            )
+    outputs = Outputs(
+        [target.output(path) for target in targets for path in inputs],
+        [*inputs, given["model"], given["body"]],
+        no_clobber=no_clobber,
+    )
+    written_as = targets[-1].writing
+    settings: dict[str, Any] = {}
+    if output is not None and written_as is not None:
+        settings = writer_options.settings(output, written_as, given)
+    reports = []
+    each = options.EachFile(inputs)
+    with options.progress("decoding", len(inputs)) as step:
+        for path in inputs:
+            with each.file(path):
+                reports.append(
+                    _decode(path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage)
+                )
+            step(1)
+    if as_json:
+        outputs.print_json(reports if several else reports[0])
+    else:
+        for report in reports:
+            written = ", ".join(shown(Path(name)) for name in report["written"])
+            outputs.say(f"{report['input']}: {report['frames']} frames to {written}")
+    each.finish()
+
+
+@dataclass(frozen=True)
+class _Target:
+    """flag: as given. place: a file, or a folder. suffix: of files in a folder. writing: None for EPF."""
+
+    flag: str
+    place: Path
+    suffix: str
+    writing: Format | None
+
+    @property
+    def folder(self) -> bool:
+        """Whether each stream becomes a file in the place."""
+        return self.place != STANDARD and self.place.is_dir()
+
+    def file(self, source: Path) -> Path:
+        """Where the content of a stream goes."""
+        return self.place / f"{_name(source)}{self.suffix}" if self.folder else self.place
+
+    def output(self, source: Path) -> Output:
+        """The same, to be checked."""
+        text = self.writing is None or self.writing.name in TEXT_FORMATS
+        return Output(self.flag, self.file(source), text, source if self.folder else None)
+
+
+def _targets(
+    by_flag: dict[str, Path | None], output: Path | None, to: str | None, given: dict[str, Any]
+) -> list[_Target]:
+    """All files to write; click.UsageError where there are none, or options that fit none."""
+    targets = []
+    for flag, place in by_flag.items():
+        if place is not None:
+            name = flag.removeprefix("--")
+            writing = None if name == "epf" else writer_of(place, name)
+            targets.append(_Target(flag, place, f".{name}", writing))
+    if output is not None:
+        if output != STANDARD and output.is_dir() and to is None:
+            raise click.UsageError(f"{output} is a folder; say with --to what to write there, as in --to bvh")
+        writing = writer_of(output, to)
+        if writing.name == "fba":
+            others = options.as_typed("fba convert and fba encode")
+            raise click.UsageError(f"{output}: streams are decoded here; {others} write them")
+        targets.append(_Target("--output", output, writing.suffixes[0], writing))
+    else:
+        lonely = [writer_options.FLAGS.get(name, "--to") for name in given if given[name] is not None]
+        if to is not None or lonely:
+            raise click.UsageError(f"{', '.join(lonely) or '--to'} says how to write --output; give that too")
+    if not targets:
+        raise click.UsageError("say what to write: --fap, --bap, --epf, --output")
+    return targets
+
+
+def _name(source: Path) -> str:
+    """What the content of a stream is called."""
+    return "stdin" if source == STANDARD else source.stem
+
+
+def _decode(
+    path: Path,
+    targets: list[_Target],
+    outputs: Outputs,
+    settings: dict[str, Any],
+    *,
+    bap_steps: str,
+    salvage: bool,
+) -> dict[str, Any]:
+    """settings: for the writer of `--output`."""
+    from fba.formats import write
+    from fba.formats.epf.epf import write_epf
+
+    with options.input_file(path) as file:
+        data = file.read_bytes()
+    animation, planes = _read(data, _name(path), any(t.writing is None for t in targets), bap_steps, salvage)
+    step_tables.warn_of_doubt(path, animation, bap_steps)
+    parts = {"face": "FAPs", "body": "BAPs"}
+    for target in targets:
+        held = parts if target.writing is None else target.writing.carries
+        if all(getattr(animation, part) is None for part in held):
+            lacking = " or ".join(parts[part] for part in held)
+            raise click.UsageError(f"{path} carries no {lacking}; leave {target.flag} out")
+    written = []
+    for target in targets:
+        place = target.file(path)
+        with outputs.file(place) as file:
+            if target.writing is None:
+                write_epf(file, planes)
+            else:
+                # --fap and --bap name what they want of the stream; only --output may lose something unawares
+                free = target.flag == "--output"
+                wanted = animation if free else _only(animation, target.writing.carries)
+                write(file, wanted, format=target.writing.name, **(settings if free else {}))
+        written.append(str(place))
+    return {"input": str(path), "frames": len(animation), "rate": str(animation.rate), "written": written}
+
+
+def _only(animation: Animation, parts: tuple[str, ...]) -> Animation:
+    face, body = animation.face if "face" in parts else None, animation.body if "body" in parts else None
+    return replace(animation, face=face, body=body)
+
+
+def _read(
+    data: bytes, name: str, with_settings: bool, bap_steps: str, salvage: bool
+) -> tuple[Animation, list[PlaneSettings]]:
+    """The animation, and where wanted how each plane was coded."""
+    from fba.codec import Decoder, decode
+
+    on_error: Literal["raise", "salvage"] = "salvage" if salvage else "raise"
+    if not with_settings:
+        return replace(decode(data, bap_steps=bap_steps, on_error=on_error), name=name), []
+    decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
+    frames = decoder.push(data) + decoder.finish()
+    if not frames:
+        raise BitstreamError("the stream holds no plane that can be decoded", plane=0)
+    settings = [frame.plane.settings for frame in frames if frame.plane is not None]
+    return Animation.from_frames(frames, name=name), settings

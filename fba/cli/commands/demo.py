@@ -1,0 +1,102 @@
+"""`fba demo`: the main job, from BVH and FAP files to a picture, on the samples that come with fba.
+
+A script made the samples (examples/make_samples.py); nobody was captured for them.
+"""
+
+from __future__ import annotations
+
+import shlex
+import tempfile
+from importlib.resources import files
+from pathlib import Path
+from threading import Timer
+
+import click
+
+from fba.animation import Animation
+from fba.cli import options
+from fba.cli.outputs import Output, Outputs, no_clobber_option
+from fba.errors import DisplayError
+
+BAP_STEPS = "visage"
+"""The standard's own table moves a root in steps of 64 mm, which shows."""
+SAMPLES = ("hello.bvh", "hello.fap")
+"""A body and a face, which come with fba."""
+PATIENCE = 4.0
+"""Seconds after which it says why nothing is to be seen yet."""
+COMPILING = "compiling for this machine, on the first run only: about a minute in all"
+
+
+@click.command(cls=options.Command, epilog=options.examples("fba demo", "fba demo --no-play --out demo/"))
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the samples and what is made of them; default: a new temporary one.",
+)
+@no_clobber_option
+@click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
+def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
+    """Encode the sample animation, say how small it became, and play it.
+
+    A script made the sample; it is not motion capture. Without a display, make a video and a picture of it
+    instead. The folder gets the sample files as well, hello.bvh and hello.fap.
+    """
+    import fba_player
+    from fba.codec import EncoderOptions, encode, probe_stream
+    from fba.formats import merge, read
+
+    folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    stream, video, picture = (folder / f"hello{suffix}" for suffix in (".fba", ".mp4", ".png"))
+    sources = [folder / name for name in SAMPLES]
+    outputs = Outputs(
+        [Output("--out", path) for path in (*sources, stream, video, picture)], no_clobber=no_clobber
+    )
+    compiling = Timer(PATIENCE, click.echo, [COMPILING], {"err": True})
+    compiling.daemon = True
+    compiling.start()
+    for source in sources:
+        outputs.write(source, (files("fba") / "samples" / source.name).read_bytes())
+    body, face = (read(source) for source in sources)
+    source_bytes = sum(source.stat().st_size for source in sources)
+    animation = merge(face, body.resample(face.rate))
+    compiling.cancel()
+    click.echo(f"samples: {' and '.join(map(str, sources))}")
+    click.echo(
+        f"animation: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and "
+        f"face at {options.rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
+    )
+    data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
+    outputs.write(stream, data)
+    info = probe_stream(data, bap_steps=BAP_STEPS)
+    click.echo(
+        f"encoded: {stream}: {len(data)} bytes, {info.bits_per_second / 1000:.2f} kbit/s, "
+        f"{source_bytes / len(data):.0f} times smaller"
+    )
+    decoded = read(stream, bap_steps=BAP_STEPS)
+    click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")
+    again = options.as_typed(f"fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
+    click.echo(f"to see it again: {again}")
+    if play is not False and _played(player, decoded, asked=play is True):
+        return
+    _render(player, decoded, video, picture)
+
+
+def _played(player: object, animation: Animation, *, asked: bool) -> bool:
+    try:
+        player.check_display()  # type: ignore[attr-defined]
+        click.echo("opening a window; Esc closes it")
+        player.play(animation, loop=True, title="fba demo")  # type: ignore[attr-defined]
+    except DisplayError as error:
+        if asked:
+            raise
+        click.echo(f"{str(error).splitlines()[0].partition('. ')[0]}; making a film instead")
+        return False
+    return True
+
+
+def _render(player: object, animation: Animation, video: Path, picture: Path) -> None:
+    with options.progress("rendering", None) as step:
+        player.render(animation, video, size=(640, 360), progress=step.of)  # type: ignore[attr-defined]
+    player.render(animation, picture, time=float(animation.times[0]) + 2.0)  # type: ignore[attr-defined]
+    click.echo(f"rendered: {video} and {picture}")

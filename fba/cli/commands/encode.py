@@ -1,0 +1,282 @@
+"""`fba encode`: FAP, BAP and motion-capture files to an FBA stream."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+
+from fba.animation import Animation
+from fba.cli import capture_report, options, step_tables
+from fba.cli.outputs import Output, Outputs, OutputType, no_clobber_option, shown
+from fba.errors import FormatError
+
+CAPTURE = ("spine", "ground", "plant", "origin")
+"""Options that say how motion capture becomes BAPs."""
+
+
+@click.command(
+    cls=options.Command,
+    epilog=options.examples(
+        "fba encode walk.bvh -o walk.fba --bap-steps visage",
+        "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
+        "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
+        "fba encode talk.fap -o again.fba --epf talk.epf",
+        "fba encode walk.bvh -o walk.fba --bap-steps visage --report --limits report",
+    ),
+)
+@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=options.EXISTING)
+@click.option(
+    "-o", "--output", metavar="OUT.fba", required=True, type=OutputType(), help="- for standard output."
+)
+@no_clobber_option
+@options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
+@options.from_option
+@click.option("--name", help="Name of the sequence, for input without a header.")
+@click.option(
+    "--quant",
+    "fap_quant",
+    type=click.IntRange(0, 31),
+    default=1,
+    show_default=True,
+    help="fap_quant; 0: unquantised.",
+)
+@click.option(
+    "--bap-quant", type=click.IntRange(0, 31), default=1, show_default=True, help="bap_quant; 0: unquantised."
+)
+@click.option(
+    "--intra-period", type=options.PeriodType(), metavar="SECONDS", help="An I plane at least this often."
+)
+@click.option(
+    "--start-codes", is_flag=True, help="Start codes before I planes: points to seek to and resume at."
+)
+@options.bap_steps_option
+@click.option("--preset", type=click.Choice(["reference"]), default="reference", show_default=True)
+@click.option(
+    "--unsent",
+    type=click.Choice(["keep", "interpolate"]),
+    default="keep",
+    show_default=True,
+    help="What a player shows for FAPs that are not sent.",
+)
+@click.option(
+    "--gender",
+    type=click.Choice(["female", "male"]),
+    default="female",
+    show_default=True,
+    callback=lambda _, __, gender: int(gender == "male"),
+    help="suggested_gender.",
+)
+@click.option(
+    "--clamp/--no-clamp",
+    default=None,
+    help="Bring values that cannot be coded as near as can be instead of failing; default: for motion "
+    "capture only.",
+)
+@click.option(
+    "--epf", type=options.EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says."
+)
+@click.option(
+    "--spine",
+    type=click.Choice(["spread", "full", "simple", "joints"]),
+    default="spread",
+    show_default=True,
+    help="Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
+)
+@click.option(
+    "--ground",
+    type=click.Choice(["floor", "source", "none"]),
+    default="floor",
+    show_default=True,
+    help="Motion capture: feet stand at height 0, at the height of the source's ground, or uncorrected.",
+)
+@click.option(
+    "--plant/--no-plant",
+    default=True,
+    show_default=True,
+    help="Motion capture: bend legs a little where feet would else miss the ground, or slip on it.",
+)
+@click.option(
+    "--origin",
+    type=click.Choice(["source", "start", "middle"]),
+    default="source",
+    show_default=True,
+    help="Motion capture: what stands at the default place.",
+)
+@click.option(
+    "--limits",
+    type=click.Choice(["off", "report", "clamp"]),
+    default="off",
+    show_default=True,
+    help="Say where joints go beyond normal human motion, or hold them within it.",
+)
+@click.option("--report", is_flag=True, help="Motion capture: how close each bone comes to the source's.")
+@options.salvage_option
+@options.json_option
+def command(
+    inputs: tuple[Path, ...],
+    output: Path,
+    no_clobber: bool,
+    fps: Fraction | None,
+    format: str | None,
+    name: str | None,
+    epf: Path | None,
+    limits: str,
+    report: bool,
+    salvage: bool,
+    as_json: bool,
+    **settings: Any,
+) -> None:
+    """Encode FAP, BAP or motion-capture files as an FBA stream.
+
+    A face file and a body file together become one stream. Ranges fit the data. A value that no range
+    can carry is an error, or with --clamp comes as near as it can.
+    """
+    if epf is not None:
+        _refuse_beside_epf()
+    outputs = Outputs([Output("--output", output)], [*inputs, epf], no_clobber=no_clobber)
+    capture = {option: settings.pop(option) for option in CAPTURE}
+    with options.progress("reading", len(inputs)) as step:
+        animation = _joined(
+            inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
+            capture=capture, format=format,
+        )  # fmt: skip
+    captures = [path for path in inputs if _captured(path, format)]
+    animation, said = capture_report.limited(animation, limits)
+    if report:
+        if animation.body is None:
+            raise click.UsageError("--report compares bones of motion capture, and there is no body")
+        said = capture_report.compared(captures, animation, format) | said
+    if settings["clamp"] is None:
+        settings["clamp"] = bool(captures)
+    table = settings["bap_steps"]
+    with options.progress("encoding", None):
+        coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, table)
+    step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
+    outputs.write(output, coded.data)
+    if as_json:
+        used = {"bap_steps": table if animation.body is not None else None}
+        outputs.print_json({"output": str(output), **_figures(coded, animation), **used, **said})
+        return
+    for line in (_summary(output, coded, animation), *capture_report.lines(said)):
+        outputs.say(line)
+    step_tables.remind(output, animation, table, coded.bap_quant)
+
+
+class _Coded(NamedTuple):
+    """bap_quant: the largest that is used; 0 where BAPs go unquantised."""
+
+    data: bytes
+    planes: int
+    intra_planes: int
+    clamped: int
+    bap_quant: int
+
+
+def _coded(animation: Animation, settings: Mapping[str, Any]) -> _Coded:
+    """settings: fields of EncoderOptions."""
+    from fba.codec import EncoderOptions, encode_with_statistics
+
+    data, statistics = encode_with_statistics(animation, EncoderOptions(**settings))
+    return _Coded(data, statistics.planes, statistics.intra_planes, statistics.clamped, settings["bap_quant"])
+
+
+def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
+    """Plane by plane as an EPF file says."""
+    from fba.codec import encode_planes
+    from fba.formats.epf.epf import read_epf
+
+    with options.input_file(epf) as file:
+        planes = read_epf(file)
+    data = encode_planes(animation, planes, bap_steps=bap_steps)
+    quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
+    return _Coded(data, len(planes), sum(plane.intra for plane in planes), 0, quant)
+
+
+def _refuse_beside_epf() -> None:
+    """click.UsageError for an option that says what the EPF file says already."""
+    context = click.get_current_context()
+    said = ("fap_quant", "bap_quant", "intra_period", "start_codes", "preset", "unsent", "gender", "clamp")
+    for parameter in context.command.params:
+        given = context.get_parameter_source(parameter.name or "")
+        if parameter.name in said and given is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"{parameter.opts[0]} and --epf contradict each other: the EPF file says how planes are coded"
+            )
+
+
+def _bits_per_second(coded: _Coded, animation: Animation) -> float:
+    return 8 * len(coded.data) / float(animation.duration)
+
+
+def _figures(coded: _Coded, animation: Animation) -> dict[str, Any]:
+    return {
+        "size": len(coded.data),
+        "frames": coded.planes,
+        "intra_planes": coded.intra_planes,
+        "rate": str(animation.rate),
+        "duration": float(animation.duration),
+        "bits_per_second": round(_bits_per_second(coded, animation), 3),
+        "clamped": coded.clamped,
+    }
+
+
+def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
+    text = (
+        f"{shown(output)}: {coded.planes} frames, {options.seconds(animation.duration)} at "
+        f"{options.rate_text(animation.rate)} frames/s, {len(coded.data)} bytes, "
+        f"{_bits_per_second(coded, animation) / 1000:.2f} kbit/s, "
+        f"{coded.intra_planes} I plane{'s' if coded.intra_planes != 1 else ''}"
+    )
+    return f"{text}; {coded.clamped} values clamped" if coded.clamped else text
+
+
+def _captured(path: Path, format: str | None) -> bool:
+    from fba.formats import format_of
+
+    return str(path) != "-" and format_of(path, format).captured
+
+
+def _joined(
+    inputs: tuple[Path, ...],
+    *,
+    fps: Fraction | None,
+    name: str | None,
+    bap_steps: str,
+    salvage: bool,
+    step: options.Progress,
+    capture: Mapping[str, object],
+    format: str | None,
+) -> Animation:
+    """Face and body of all inputs as one animation."""
+    from fba.formats import merge
+
+    result: Animation | None = None
+    for path in inputs:
+        animation = options.read_input(
+            path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format
+        )
+        step(1)
+        if not len(animation):
+            raise FormatError("the file holds no frames; there is nothing to encode", path=path)
+        if result is None:
+            result = animation
+            continue
+        if (result.face is not None and animation.face is not None) or (
+            result.body is not None and animation.body is not None
+        ):
+            raise click.UsageError(
+                f"{path} is a second {'face' if animation.face is not None else 'body'} file; "
+                "encode one face and one body file at most"
+            )
+        if animation.rate != result.rate:
+            raise click.UsageError(
+                f"{path} has {options.rate_text(animation.rate)} frames/s, the file before it "
+                f"{options.rate_text(result.rate)}; bring them to one rate with --fps"
+            )
+        result = merge(result, animation) if result.face is not None else merge(animation, result)
+    assert result is not None
+    return result

@@ -1,0 +1,122 @@
+"""`fba info`: what a file holds."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import click
+
+from fba.cli import options, step_tables
+from fba.codec.stream_info import PartInfo, StreamInfo
+
+
+@click.command(
+    cls=options.Command,
+    epilog=options.examples(
+        "fba info talk.fba",
+        "fba info --json *.fba | jq .[].bits_per_second",
+        "fba info --trace talk.fba | less",
+    ),
+)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.EXISTING)
+@options.bap_steps_option
+@options.json_option
+@click.option(
+    "--trace", is_flag=True, help="List every syntax element of an FBA stream with its bit position."
+)
+@options.fps_option("Frame rate of a file without a header.")
+@options.from_option
+@options.salvage_option
+@click.option("--values", is_flag=True, help="With --trace: the decoded symbols of every segment as well.")
+def command(
+    files: tuple[Path, ...],
+    bap_steps: str,
+    as_json: bool,
+    trace: bool,
+    values: bool,
+    fps: Fraction | None,
+    format: str | None,
+    salvage: bool,
+) -> None:
+    """What a file holds: frames, rate, parameters, bits. Reads any format, by content.
+
+    --trace reads the stream a second time, bit by bit, with a decoder of its own: slow, and independent.
+    """
+    each = options.EachFile(files)
+    if trace:
+        for path in files:
+            with each.file(path):
+                _trace(path, bap_steps=bap_steps, as_json=as_json, values=values)
+        each.finish()
+        return
+    found = []
+    for path in files:
+        with each.file(path), options.input_file(path) as file:
+            info = options.probed(file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage)
+            if info.format == "fba" and info.body is not None:
+                step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
+            found.append({"file": str(path), **info.to_dict()})
+            if not as_json:
+                _print(path, info)
+    if as_json:
+        options.print_json(found if len(files) > 1 else found[0])
+    each.finish()
+
+
+def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
+    import json
+
+    from fba_conformance.listing import element_dict, format_trace
+    from fba_conformance.trace import trace
+
+    with options.input_file(path) as file:
+        elements = trace(file.read_bytes(), bap_steps=bap_steps)
+    if as_json:
+        for element in elements:
+            click.echo(json.dumps(element_dict(element)))
+        return
+    for line in format_trace(elements, values=values):
+        click.echo(line)
+
+
+def _print(path: Path, info: StreamInfo) -> None:
+    click.echo(f"{path}: {info.format.upper()}, {info.size} bytes")
+    skipped = f", {info.skipped} skipped" if info.skipped else ""
+    start = f", starts at {options.seconds(info.start)}" if info.start else ""
+    click.echo(
+        f"  time     {info.frames} frames, {options.seconds(info.duration)} at "
+        f"{options.rate_text(info.rate)} frames/s{skipped}{start}"
+    )
+    if info.intra_planes is not None:
+        codes = f", {info.start_codes} with start codes" if info.start_codes else ""
+        click.echo(
+            f"  planes   {info.intra_planes} I, {info.frames - info.intra_planes} P{codes}; "
+            f"{info.bits_per_second / 1000:.2f} kbit/s"
+        )
+    for name, part in (("face", info.face), ("body", info.body)):
+        if part is not None:
+            click.echo(f"  {name}     {_part(part, 'FAP' if name == 'face' else 'BAP', info.frames)}")
+    for damage in info.damage:
+        click.echo(f"  damage   bytes {damage.start}..{damage.stop}: {damage.error}")
+
+
+def _part(part: PartInfo, kind: str, frames: int) -> str:
+    count = len(part.parameters)
+    text = f"{count} {kind}{'s' if count != 1 else ''}: {_spans(part.parameters)}" if count else f"no {kind}s"
+    if part.frames != frames:
+        text += f"; in {part.frames} frames"
+    if part.quants:
+        text += f"; quantiser {', '.join(map(str, part.quants))}"
+    return text
+
+
+def _spans(numbers: tuple[int, ...]) -> str:
+    """1..3, 5, 7..9"""
+    spans: list[list[int]] = []
+    for number in numbers:
+        if spans and number == spans[-1][1] + 1:
+            spans[-1][1] = number
+        else:
+            spans.append([number, number])
+    return ", ".join(str(a) if a == b else f"{a}..{b}" for a, b in spans)

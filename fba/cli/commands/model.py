@@ -1,0 +1,292 @@
+"""`fba model`: look at face models, check them, import them, fit them to a person."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_option, shown
+from fba.errors import FbaWarning
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from fba.face.checks import Finding
+    from fba.face.model import FaceModel
+
+SOURCE = click.Path(exists=True, path_type=Path)
+GLB = OutputType()
+KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
+POINT_FILES = "FDP, CSV or JSON file"
+
+
+@click.group(
+    "model",
+    cls=options.Group,
+    epilog=options.examples(
+        "fba model info --default",
+        "fba model validate head.glb",
+        "fba model import scan.obj --points scan.points.csv -o head.glb",
+        "fba model fit person.fdp -o person.glb",
+    ),
+)
+def command() -> None:
+    """Face models: look at one, check it, import one, fit one to a person."""
+
+
+def _one_of(file: Path | None, default: bool) -> FaceModel:
+    if (file is None) != default:
+        raise click.UsageError("give either the FILE of a face model, or --default for the built-in head")
+    return _read(file)
+
+
+def _read(file: Path | None) -> FaceModel:
+    from fba.face.model import FaceModel
+
+    if file is None:
+        return FaceModel.default()
+    from fba.face.importers import import_model
+
+    return import_model(file)
+
+
+@command.command(
+    short_help="What a face model holds.",
+    epilog=options.examples("fba model info --default", "fba model info --json head.glb"),
+)
+@click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
+@click.option("--default", is_flag=True, help="The built-in head.")
+@options.json_option
+def info(file: Path | None, default: bool, as_json: bool) -> None:
+    """What a face model holds: its parts, units, feature points and FAPs.
+
+    FILE: a .glb of this project, or anything that `fba model import` reads.
+    """
+    from fba.cli import model_text
+
+    model = _one_of(file, default)
+    if as_json:
+        options.print_json(model_text.described(model))
+    else:
+        model_text.print_model(model)
+
+
+@command.command(
+    short_help="Check a face model against the standard.",
+    epilog=options.examples("fba model validate head.glb", "fba model validate --json --default"),
+)
+@click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
+@click.option("--default", is_flag=True, help="The built-in head.")
+@click.option(
+    "--only", type=click.Choice(["neutral", "faps"]), help="Check only the rest position, or only the FAPs."
+)
+@options.json_option
+def validate(file: Path | None, default: bool, only: str | None, as_json: bool) -> None:
+    """Check a face model against the standard: is it a neutral face, does every FAP do what it must.
+
+    Every finding gives what was measured and what is expected. Exit code 1 if one of them is an error:
+    then streams would play wrongly; warnings are about looks, or what could not be checked.
+    """
+    from fba.cli import model_text
+    from fba.face import checks
+
+    model = _one_of(file, default)
+    findings: list[Finding] = []
+    if only != "faps":
+        findings += checks.check_neutral(model)
+    if only != "neutral":
+        findings += checks.check_faps(model)
+    errors = sum(finding.severity == "error" for finding in findings)
+    if as_json:
+        options.print_json(model_text.findings_as_json(findings))
+    else:
+        model_text.print_findings(str(file or "built-in head"), findings)
+    if errors:
+        raise click.exceptions.Exit(1)
+
+
+@command.command(
+    "import",
+    short_help="Make a face model of a mesh.",
+    epilog=options.examples(
+        "fba model import makehuman/base.obj -o head.glb",
+        "fba model import scan.ply --points scan.points.csv --unit 0.001 -o scan.glb",
+        "fba model import face.obj --points face.fdp --part eyeL=eye --part cap=none -o face.glb",
+    ),
+)
+@click.argument("source", metavar="IN", type=SOURCE)
+@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
+@no_clobber_option
+@click.option(
+    "--points",
+    metavar="FILE",
+    type=SOURCE,
+    help=f"Where the feature points are: {POINT_FILES}. Default: one of the mesh's name beside it.",
+)
+@click.option("--kind", type=click.Choice(KINDS), help="What IN is; found from its content where not given.")
+@click.option(
+    "--unit", type=float, metavar="METRES", help="Metres per unit of IN. Default: judged by the pupils."
+)
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
+@click.option(
+    "--part",
+    "kinds",
+    multiple=True,
+    metavar="NAME=KIND",
+    help="What a group, object, mesh or material is: skin, eye, teeth, tongue, ..., or none; again for more.",
+)
+@click.option("--name", help="Name of the model. Default: that of the file.")
+def import_(
+    source: Path,
+    output: Path,
+    no_clobber: bool,
+    points: Path | None,
+    kind: str | None,
+    unit: float | None,
+    up: str,
+    kinds: tuple[str, ...],
+    name: str | None,
+) -> None:
+    """Make a face model of a mesh that knows nothing of FAPs, and write it as glTF.
+
+    Reads MakeHuman's base mesh (its folder, or base.obj), glTF heads with ARKit's shapes, OBJ, PLY and
+    Candide meshes with feature points, FDP files with their mesh. Every FAP that it can serve gets its
+    tables; which cannot, and why, is told.
+    """
+    from fba.face.importers import import_model
+
+    outputs = _outputs(output, [source, points], no_clobber=no_clobber)
+    chosen = _kinds(kinds) or None
+    with options.progress("importing", None):
+        model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=chosen, name=name)
+    _write(model, output, outputs)
+
+
+@command.command(
+    short_help="Fit a face to a person.",
+    epilog=options.examples(
+        "fba model fit person.fdp -o person.glb",
+        "fba model fit points.csv --unit cm --model head.glb --name Ada -o ada.glb",
+    ),
+)
+@click.argument("points", metavar="POINTS", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
+@no_clobber_option
+@click.option(
+    "--model", "base", metavar="FILE", type=SOURCE, help="The face to fit. Default: the built-in head."
+)
+@click.option(
+    "--unit",
+    metavar="mm|cm|m|in",
+    help="Unit of POINTS, or metres for one unit. Default: found from the size.",
+)
+@click.option(
+    "--tables",
+    type=click.Choice(["auto", "carry", "author"]),
+    default="auto",
+    show_default=True,
+    help="How FAPs follow: bent with the surface, made anew, or whichever keeps the standard better.",
+)
+@click.option("--name", help="Name of the fitted model. Default: that of the file.")
+def fit(
+    points: Path,
+    output: Path,
+    no_clobber: bool,
+    base: Path | None,
+    unit: str | None,
+    tables: Any,
+    name: str | None,
+) -> None:
+    """Fit a face to a person of whom feature points are known, and write it as glTF.
+
+    POINTS is an FDP, CSV or JSON file in any unit and pose; points that it lacks are mirrored from the
+    other side, or follow their surroundings. Of an Xface file without its mesh, the distances are used.
+    """
+    from fba.face.calibration import fit as fitted
+
+    outputs = _outputs(output, [points, base], no_clobber=no_clobber)
+    scale = _unit(unit)
+    with options.progress("fitting", None):
+        model = _read(base)
+        wanted = _points(points, model)
+        face = fitted(model, wanted, unit=scale, tables=tables, name=name or points.stem)
+    _write(face, output, outputs)
+
+
+def _points(path: Path, model: FaceModel) -> npt.NDArray[np.float64]:
+    """Feature points of a file; of an Xface file without its mesh those that its distances tell."""
+    from fba.face.importers.points.fdp import load_fdp
+    from fba.mesh.text_files import beside
+    from fba.face.importers.points.points_file import read_points
+    from fba.face.importers.points.xface import xface_points
+
+    if path.suffix.lower() in (".json", ".csv"):
+        return read_points(path).points
+    fdp = load_fdp(path)
+    if fdp.format != "xface":
+        return fdp.points
+    meshes = sorted({mesh.rpartition("_")[0] for mesh, _ in fdp.vertices.values()})
+    absent = [name for name in meshes if beside(path, name) is None]
+    if not (absent and fdp.distances):
+        return xface_points(fdp)
+    from fba.face.calibration import points_of_distances
+
+    warnings.warn(
+        f"{path}: {', '.join(absent)}, whose vertices the file names, is not beside it: "
+        f"only the distances {', '.join(fdp.distances)} are used",
+        FbaWarning,
+        stacklevel=2,
+    )
+    return points_of_distances(model, fdp.distances)
+
+
+def _unit(text: str | None) -> str | float | None:
+    from fba.face.calibration import UNITS
+
+    if text is None or text in UNITS:
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise click.UsageError(
+            f"--unit {text}: write one of {', '.join(UNITS)}, or metres for one unit, as in 0.01"
+        ) from None
+
+
+def _kinds(texts: tuple[str, ...]) -> Mapping[str, str]:
+    from fba.face.model import PART_KINDS
+
+    found = {}
+    for text in texts:
+        name, equals, kind = text.rpartition("=")
+        if not equals or not name or kind not in (*PART_KINDS, "none"):
+            raise click.UsageError(
+                f"--part {text}: write NAME=KIND, with a kind of {', '.join(PART_KINDS)} or none"
+            )
+        found[name] = kind
+    return found
+
+
+def _outputs(output: Path, inputs: list[Path | None], *, no_clobber: bool) -> Outputs:
+    """Raises click.UsageError also for a suffix that would hide that it is a .glb."""
+    outputs = Outputs([Output("--output", output)], inputs, no_clobber=no_clobber)
+    if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
+        name = output.with_suffix(".glb").name
+        raise click.UsageError(f"--output {output}: face models are written as glTF; name it {name}")
+    return outputs
+
+
+def _write(model: FaceModel, output: Path, outputs: Outputs) -> None:
+    from fba.cli import model_text
+
+    with outputs.file(output) as file:
+        model.save(file)
+    outputs.say(f"{shown(output)}: {model_text.summary(model)}")
+    for line in model_text.lost(model):
+        outputs.say(f"  {line}")

@@ -1,0 +1,168 @@
+"""`fba play`: a window that shows files, or a stream while it arrives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options, scene_options
+from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
+
+if TYPE_CHECKING:
+    from fba_player.view.protocols import Showable
+
+
+@click.command(
+    cls=options.Command,
+    epilog=options.examples(
+        "fba play talk.fba",
+        "fba play talk.fba --audio voice.mp3",
+        "fba play walk.fba --bap-steps visage",
+        "fba play walk.bvh --loop --speed 0.5",
+        "fba play original.fap decoded.fba --compare",
+        "nc host 7000 | fba play -",
+        "fba play --model face.glb",
+    ),
+)
+@scene_options.files_argument
+@click.option(
+    "--compare",
+    is_flag=True,
+    help="Two files or more: the others as drawings over the first, and by how much each parameter differs.",
+)
+@scene_options.sound_options()
+@click.option(
+    "--speed", type=click.FloatRange(0.1, 4.0), default=1.0, show_default=True, help="1: as recorded."
+)
+@click.option("--loop", is_flag=True, help="Start again at the end.")
+@click.option(
+    "--start", type=options.MomentType(), metavar="SECONDS", help="From when, in the file's own times."
+)
+@click.option("--paused", is_flag=True, help="Wait for the space key.")
+@click.option(
+    "--interpolate/--no-interpolate",
+    default=True,
+    show_default=True,
+    help="Smooth motion between frames, or frame by frame.",
+)
+@click.option("--size", type=options.SizeType(), default="1280x720", show_default=True, metavar="WxH")
+@scene_options.scene_options(
+    fps="Frame rate of a file without a header.",
+    arrange="Several files: side by side (default), or over each other (default with --compare).",
+)
+def command(
+    files: tuple[Path, ...],
+    compare: bool,
+    sound: SoundOptions,
+    speed: float,
+    loop: bool,
+    start: float | None,
+    paused: bool,
+    interpolate: bool,
+    size: tuple[int, int],
+    how: SceneOptions,
+) -> None:
+    """Play files in a window: space plays and pauses, arrows step, F1 shows all keys.
+
+    - is standard input: an FBA stream is shown while it arrives, as it is from a FIFO. Several files are
+    shown together. Without a file, --model or --body opens a neutral figure with sliders to move it by hand.
+    Without a display, use `fba render`.
+    """
+    if len(files) < 2 and compare:
+        one = f"; {files[0]} is one" if files else ""
+        raise click.UsageError(f"--compare needs two files or more{one}")
+    check_files(files, how, sound, "window")
+    if [str(file) for file in files].count("-") > 1:
+        raise click.UsageError("standard input (-) can be shown once")
+    if not files and sound.audio is not None:
+        raise click.UsageError("--audio goes with a file to play")
+    if not files and how.model is None and how.body is None:
+        raise click.UsageError("give a file to play, or a --model or --body to move by hand")
+    import fba_player
+
+    player.check_display()  # before anything that takes long
+    if not files:
+        dropped = _puppet(how, size)
+    else:
+        dropped = _play(
+            files, how, sound, compare=compare, start=start, paused=paused, size=size, loop=loop, speed=speed,
+            interpolate=interpolate,
+        )  # fmt: skip
+    while dropped:
+        beside = SoundOptions(None, sound.no_audio, 0.0)
+        dropped = _play(
+            dropped[:MOST], replace(how, arrange=None), beside, size=size, loop=loop, speed=speed,
+            interpolate=interpolate,
+        )  # fmt: skip
+
+
+def _play(
+    files: tuple[Path, ...],
+    how: SceneOptions,
+    sound: SoundOptions,
+    *,
+    compare: bool = False,
+    start: float | None = None,
+    **window: Any,
+) -> tuple[Path, ...]:
+    """Play files in a window; those that were dropped onto it."""
+    import fba_player
+    from fba.cli import scene_loading
+
+    voice = scene_loading.voice(files, sound, "played without sound")
+    streams = []
+    try:
+        opened, said = [], list[str]()
+        for file in files:
+            opened.append(scene_loading.opened(file, how, said))
+            if opened[-1][1]:
+                streams.append(opened[-1][0])
+        names = [
+            animation.name if name == "-" else name
+            for name, (animation, _) in zip(scene_loading.names_of(files), opened, strict=True)
+        ]
+        scene = scene_loading.scene(opened, names, how, over=compare)
+        _check_start(scene, start, growing=bool(streams))
+        single = len(files) == 1 and not streams and str(files[0]) != "-" and not scene_loading.is_pipe(files[0])
+        return player.play(
+            scene,
+            title=" | ".join(names),
+            camera=how.camera,
+            start=start,
+            audio=voice,
+            audio_offset=sound.audio_offset,
+            file=files[0] if single else None,
+            bap_steps=how.bap_steps,
+            warnings=tuple(said),
+            panels=("differences",) if compare else (),
+            **window,
+        )
+    finally:
+        for stream in streams:
+            for text in filter(None, (stream.details, stream.doubt)):  # type: ignore[union-attr]
+                click.echo(f"fba: warning: {stream.name}: {text}", err=True)
+            stream.close()  # type: ignore[union-attr]
+
+
+def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
+    """A window with a neutral figure and the sliders that move it."""
+    import fba_player
+    from fba.cli import scene_loading
+    from fba_player.session.performer import neutral
+
+    title = " ".join(file.name for file in (how.model, how.body) if file is not None)
+    scene = scene_loading.scene([(neutral(body=how.body is not None), False)], [title], how)
+    return player.play(
+        scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",)
+    )
+
+
+def _check_start(scene: Showable, start: float | None, *, growing: bool) -> None:
+    if start is None or growing:
+        return
+    first, last = float(scene.timeline.start), float(scene.timeline.end)
+    if not first <= start < last:
+        raise click.UsageError(f"--start {start:g}: the performance goes from {first:g} s to {last:g} s")

@@ -1,0 +1,294 @@
+"""`fba render`: pictures and films without a window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fba.cli import options, scene_options
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_option, shown
+from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
+
+if TYPE_CHECKING:
+    from fba_player.export.image_sequence import Numbered
+    from fba_player.view.protocols import Showable
+
+KINDS = ("png", "jpg", "mp4", "gif")
+SHEETS = ("faps", "visemes", "expressions", "all")
+
+
+class SheetType(click.ParamType[str | int]):
+    """What is on a contact sheet: one of the kinds, or how many frames of a file."""
+
+    name = "sheet"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str | int:
+        if value in SHEETS:
+            return str(value)
+        if not str(value).isdecimal() or not 0 < int(str(value)[:9]) <= 10_000:
+            kinds = ", ".join(f"{kind!r}" for kind in SHEETS)
+            self.fail(f"{value!r} is neither a number of frames nor one of {kinds}", param, ctx)
+        return int(value)
+
+
+@click.command(
+    cls=options.Command,
+    epilog=options.examples(
+        "fba render talk.fba -o talk.mp4",
+        "fba render talk.fba -o talk.mp4 --audio voice.wav",
+        "fba render walk.fba -o walk.png --bap-steps visage --frame 40 --size 800x600",
+        "fba render walk.bvh -o part.gif --start 2 --end 5 --camera front",
+        "fba render walk.bvh -o frames/%05d.png --transparent",
+        "fba render walk.bvh -o sheet.png --contact-sheet 12",
+        "fba render original.fap decoded.fba -o both.mp4",
+        "fba render --fap open_jaw=800 --viseme 4 --expression joy=50 -o face.png",
+        "fba render --contact-sheet expressions -o expressions.png",
+        "fba render talk.fba -o - --to gif > talk.gif",
+    ),
+)
+@scene_options.files_argument
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="OUT.png|.jpg|.mp4|.gif|FOLDER/%05d.png",
+    help="A picture, a film, or numbered pictures (also: a folder with a slash at its end). - for standard "
+    "output.",
+)
+@click.option(
+    "--to", type=click.Choice(KINDS), help="What to write, where OUT is - or has no suffix that says it."
+)
+@no_clobber_option
+@click.option(
+    "--fap",
+    "faps",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Without a file: a FAP of the face, by name or number; again for more. A left or right one alone "
+    "moves both sides, as in a stream: give its mate as well.",
+)
+@click.option(
+    "--viseme",
+    "visemes",
+    multiple=True,
+    metavar="NAME[=BLEND]",
+    help="Without a file: a viseme by number, name or sound; of two, BLEND (0..63) is the share.",
+)
+@click.option(
+    "--expression",
+    "expressions",
+    multiple=True,
+    metavar="NAME[=INTENSITY]",
+    help="Without a file: an expression, 0..63; up to two.",
+)
+@click.option(
+    "--contact-sheet",
+    "sheet",
+    type=SheetType(),
+    metavar="N|" + "|".join(SHEETS),
+    help="With a file: N of its frames, at even distances, on one sheet. Without: all FAPs, visemes or "
+    "expressions. --size is that of one picture.",
+)
+@click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
+@click.option("--frame", type=int, help="For a picture: which frame; -1 is the last.")
+@click.option("--time", type=options.MomentType(), metavar="SECONDS", help="For a picture: at what time.")
+@click.option(
+    "--start", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: from when."
+)
+@click.option(
+    "--end", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: until when."
+)
+@scene_options.sound_options("Sound of an MP4,")
+@click.option("--transparent", is_flag=True, help="PNG without a background.")
+@click.option("--replace", is_flag=True, help="Numbered pictures that exist are overwritten.")
+@scene_options.scene_options(
+    fps="Frame rate of the film; default: the input's own, or a part of it.",
+    arrange="Several files: side by side (default), or the others as drawings over the first.",
+)
+def command(
+    files: tuple[Path, ...],
+    output: str,
+    to: str | None,
+    no_clobber: bool,
+    faps: tuple[str, ...],
+    visemes: tuple[str, ...],
+    expressions: tuple[str, ...],
+    sheet: str | int | None,
+    size: tuple[int, int] | None,
+    frame: int | None,
+    time: float | None,
+    start: float | None,
+    end: float | None,
+    sound: SoundOptions,
+    transparent: bool,
+    replace: bool,
+    how: SceneOptions,
+) -> None:
+    """Render files, or a face in a given pose, to a picture, numbered pictures, or a film (MP4 or GIF).
+
+    Needs OpenGL through EGL, but no display.
+    """
+    given = [name for name, value in (("--fap", faps), ("--viseme", visemes), ("--expression", expressions),
+                                      ("--contact-sheet", isinstance(sheet, str))) if value]  # fmt: skip
+    if files and given:
+        what = f"{given[0]} {sheet}" if given == ["--contact-sheet"] else given[0]
+        raise click.UsageError(f"{what} makes a picture without a file; leave out {files[0]}")
+    if not files and isinstance(sheet, int):
+        raise click.UsageError(f"--contact-sheet {sheet} shows frames of a file: give one")
+    if not files and not given:
+        raise click.UsageError("give a file, or a face by --fap, --viseme, --expression or --contact-sheet")
+    moments = {"--frame": frame, "--time": time, "--start": start, "--end": end, "--fps": how.fps}
+    for name, value in (*moments.items(), ("--audio", sound.audio)):
+        if not files and value is not None:
+            raise click.UsageError(f"{name} goes with a file; {given[0]} makes a single picture")
+    check_files(files, how, sound, "picture")
+    target = _Target.of(output, to)
+    film, mp4 = target.film, target.suffix == ".mp4"
+    if no_clobber and replace:
+        raise click.UsageError("--no-clobber and --replace contradict each other")
+    if not mp4 and (sound.audio is not None or sound.audio_offset):
+        name = "--audio" if sound.audio is not None else "--audio-offset"
+        raise click.UsageError(f"{name} goes into an .mp4 alone")
+    if isinstance(sheet, str):
+        if given != ["--contact-sheet"] or how.camera is not None or how.view != "figure" or how.shows:
+            raise click.UsageError("--contact-sheet has poses and cameras of its own; leave the others out")
+        if film:
+            raise click.UsageError(f"--contact-sheet {sheet} makes one picture, .png or .jpg")
+        outputs = target.outputs([how.model], no_clobber=no_clobber, replace=replace)
+        with target.file(outputs) as name:
+            made = _kinds_sheet(sheet, Path(name), how.model, size)
+        outputs.say(f"{shown(target.path)}: {made}")
+        return
+    if sheet is not None and (film or transparent or frame is not None or time is not None):
+        raise click.UsageError(
+            f"--contact-sheet {sheet} makes one picture, .png or .jpg, of frames between --start and --end"
+        )
+    if not files and film:
+        raise click.UsageError("a face in one pose is a picture: write it to a .png")
+    from fba.cli import scene_loading
+    from fba.cli.pose_options import still
+    from fba_player.export.render import render
+
+    audio = scene_loading.voice(files, sound, "the film has no sound") if mp4 else None
+    outputs = target.outputs([*files, how.model, how.body, audio], no_clobber=no_clobber, replace=replace)
+    with options.progress("preparing", None):
+        animations = [
+            options.read_input(
+                file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage, format=how.format
+            )
+            for file in files
+        ] or [still(faps, visemes, expressions)]
+        names = scene_loading.names_of(files) or [""]
+        scene = scene_loading.scene([(animation, False) for animation in animations], names, how)
+    heard = f", with the sound of {audio}" if audio is not None else ""
+    with target.file(outputs) as name:
+        if sheet is not None:
+            made = _frames_sheet(scene, sheet, Path(name), tile=size, camera=how.camera, start=start, end=end)
+        else:
+            made = _size(size, name)
+            with options.progress("rendering", None) as step, options.usage_errors():
+                render(
+                    scene,
+                    name,
+                    size=size,
+                    fps=how.fps if film else None,
+                    camera=how.camera,
+                    frame=frame,
+                    time=time,
+                    start=start,
+                    end=end,
+                    audio=audio,
+                    audio_offset=sound.audio_offset,
+                    transparent=transparent,
+                    replace=replace,
+                    progress=step.of,
+                )
+    outputs.say(f"{shown(target.path)}: {made}{heard}")
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Where a picture, a film or numbered pictures go.
+
+    given: on the command line. path: the file, or the folder of numbered pictures. suffix: in lower case, of
+    what is written; "" for numbered pictures, whose names say it themselves.
+    """
+
+    given: str
+    path: Path
+    suffix: str
+    pictures: Numbered | None = None
+
+    @staticmethod
+    def of(output: str, to: str | None) -> _Target:
+        """What `--output` and `--to` say together."""
+        from fba_player.export.image_sequence import Numbered, is_sequence
+
+        if is_sequence(output):
+            if to is not None:
+                raise click.UsageError(f"--to {to} is for one file; {output} means numbered pictures")
+            pictures = Numbered(output)
+            return _Target(output, pictures.folder, "", pictures)
+        path = OutputType().convert(output, None, None)
+        if path == STANDARD and to is None:
+            raise click.UsageError(f"say with --to what to write to standard output: {', '.join(KINDS)}")
+        return _Target(output, path, f".{to}" if to is not None else path.suffix.lower())
+
+    @property
+    def film(self) -> bool:
+        """Whether it is many pictures."""
+        from fba_player.export.image_sequence import is_film
+
+        return self.pictures is not None or is_film(f"film{self.suffix}")
+
+    def outputs(self, inputs: Iterable[Path | None], *, no_clobber: bool, replace: bool) -> Outputs:
+        """The files that are written; of numbered pictures, those that are replaced."""
+        if self.pictures is None:
+            return Outputs([Output("--output", self.path)], inputs, no_clobber=no_clobber)
+        numbers = self.pictures.there() if replace else []
+        return Outputs([Output("--output", self.pictures.path(number)) for number in numbers], inputs)
+
+    @contextmanager
+    def file(self, outputs: Outputs) -> Iterator[str]:
+        """The name to write to, for a `with` statement."""
+        if self.pictures is not None:
+            yield self.given
+            return
+        with outputs.file(self.path, self.suffix) as file:
+            yield str(file)
+
+
+def _size(size: tuple[int, int] | None, output: str) -> str:
+    from fba_player.export.render import picture_size
+
+    width, height = picture_size(size, output)
+    return f"{width}x{height}"
+
+
+def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> str:
+    """Draw and write it; its size."""
+    from fba_player.export.contact_sheet import contact_sheet
+    from fba_player.export.image_files import check_picture, write_picture
+
+    check_picture(output, transparent=False)
+    with options.progress("rendering", None), options.usage_errors():
+        pixels = contact_sheet(what, options.read_model(model), tile=size)
+    write_picture(output, pixels)
+    return f"{pixels.shape[1]}x{pixels.shape[0]}"
+
+
+def _frames_sheet(scene: Showable, count: int, output: Path, **how: Any) -> str:
+    """Likewise."""
+    from fba_player.export.film_sheet import film_sheet
+    from fba_player.export.image_files import check_picture, write_picture
+
+    check_picture(output, transparent=False)
+    with options.progress("rendering", None) as step, options.usage_errors():
+        pixels = film_sheet(scene, count, progress=step.of, **how)
+    write_picture(output, pixels)
+    return f"{pixels.shape[1]}x{pixels.shape[0]}"

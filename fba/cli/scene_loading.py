@@ -1,0 +1,181 @@
+"""What `fba play` and `fba render` show: files, and streams that are still arriving."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import click
+
+from fba.animation import Animation
+from fba.cli import options
+from fba.cli.scene_options import SceneOptions, SoundOptions
+from fba.errors import FbaWarning, FormatError
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyModel
+    from fba.face.model import FaceModel
+    from fba_player.playback.live import LiveAnimation
+    from fba_player.scene.scene import Scene
+
+STREAMS = (b"\0\0\1\xba", b"\0\0\1\x01", b"\0\0\1\xb0", b"\0\0\1\xb5")
+"""How an FBA stream begins: the object, or the layers around it."""
+
+
+Shown = tuple["Animation | LiveAnimation", bool]
+"""What a file holds, and whether it is a stream that grows."""
+
+
+def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Shown:
+    """A file's animation; of an FBA stream on standard input or in a FIFO, one that grows. And whether it is.
+
+    What arrives in another format is read to its end first. said: see `options.read_input`.
+    Raises click.UsageError where standard input is a
+    terminal, what `options.read_input` raises, and what `LiveAnimation.wait` raises.
+    """
+    bap_steps, fps, salvage = how.bap_steps, how.fps, how.salvage
+    name = "standard input" if str(file) == "-" else file.name
+    if str(file) == "-" and sys.stdin.isatty():
+        raise click.UsageError("- is standard input, which is the keyboard here: pipe a stream into it")
+    if str(file) != "-" and not is_pipe(file):
+        animation = options.read_input(
+            file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, said=said, format=how.format
+        )
+        return animation, False
+    with contextlib.ExitStack() as stack:
+        source: BinaryIO = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
+        head = b""
+        while len(head) < 4 and (more := source.read1(1 << 16)):  # type: ignore[attr-defined]
+            head += more
+        if not head:
+            raise FormatError("is empty: it ended before its first byte", path=name)
+        if not head.startswith(STREAMS):
+            return _spooled(head, source, name, how), False
+        from fba_player.playback.live import LiveAnimation, wait_for
+
+        close = stack.pop_all().close
+        live = LiveAnimation(source, head=head, name=name, bap_steps=bap_steps, at_end=close)  # type: ignore[arg-type]
+    wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
+    return live, True
+
+
+def is_pipe(file: Path) -> bool:
+    """Whether it is a FIFO, or a device that is read once, such as /dev/stdin."""
+    try:
+        mode = os.stat(file).st_mode
+    except OSError:
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+
+
+def scene(shown: list[Shown], names: list[str], how: SceneOptions, *, over: bool = False) -> Any:
+    """One scene of what `opened` gave, or several in one. over: over each other, but for `--arrange`."""
+    face, figure = options.read_model(how.model), _body(how.body)
+    scenes = [_scene_of(animation, growing, face, figure, how) for animation, growing in shown]
+    found: Any = scenes[0]
+    if len(scenes) > 1:
+        from fba_player.scene.compare import CompareScene
+
+        found = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
+    for switch, state in how.shows:
+        found.show(switch, state)
+    return found
+
+
+def names_of(files: tuple[Path, ...]) -> list[str]:
+    """What files are called where they are shown together: with their folder, where that tells them apart."""
+    given = [file.name for file in files]
+    return [
+        f"{file.absolute().parent.name}/{name}" if given.count(name) > 1 and name != "-" else name
+        for file, name in zip(files, given, strict=True)
+    ]
+
+
+def voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+    """The sound that is asked for, or that lies beside the first of the files that has one which can be read.
+
+    without: what is said of those that cannot. Raises FormatError where what was asked for cannot be read,
+    click.UsageError for an offset of no sound.
+    """
+    found = _voice(files, sound, without)
+    if found is None and sound.audio_offset:
+        raise click.UsageError("--audio-offset moves a sound, and there is none: give one with --audio")
+    return found
+
+
+def _voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+    from fba_player.sound.soundtrack import beside, check
+
+    if sound.audio is not None:
+        check(sound.audio)
+        return sound.audio
+    if sound.no_audio:
+        return None
+    for file in files:
+        found = None if str(file) == "-" or is_pipe(file) else beside(file)
+        if found is None:
+            continue
+        try:
+            check(found)
+        except FormatError as error:
+            warnings.warn(f"{without}: {error}", FbaWarning, stacklevel=3)
+            continue
+        return found
+    return None
+
+
+def _scene_of(
+    animation: Animation | LiveAnimation,
+    growing: bool,
+    model: FaceModel | None,
+    body: BodyModel | None,
+    how: SceneOptions,
+) -> Scene:
+    from fba_player.scene.scene import Scene
+
+    given: dict[str, Any] = {"body": body, "axes": how.axes, "view": how.view}
+    if not growing:
+        return Scene(animation, model, **given)  # type: ignore[arg-type]
+    from fba.face.model import FaceModel
+    from fba_player.playback.live import LiveTimeline
+
+    face = model or FaceModel.default()
+    timeline = LiveTimeline(animation, face)  # type: ignore[arg-type]
+    return Scene(animation, face, timeline=timeline, **given)  # type: ignore[arg-type]
+
+
+def _body(path: Path | None) -> BodyModel | None:
+    """The body of `--body`, or None for the built-in one."""
+    if path is None:
+        return None
+    from fba.body.model import BodyModel
+
+    return BodyModel.load(path)
+
+
+def _fifo(file: Path) -> BinaryIO:
+    click.echo(f"fba: waiting for a sender to open {file}", err=True)
+    return open(file, "rb")
+
+
+def _spooled(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> Animation:
+    with tempfile.TemporaryDirectory(prefix="fba-") as folder:
+        path = Path(folder) / "stdin"
+        with path.open("wb") as file:
+            file.write(head)
+            while chunk := source.read(1 << 20):
+                file.write(chunk)
+        with options.renamed(path, name):
+            animation = options.read_input(
+                path, bap_steps=how.bap_steps, header_fps=how.fps, name=name, salvage=how.salvage,
+                format=how.format,
+            )  # fmt: skip
+    if animation.name != path.name:
+        return animation
+    return Animation(animation.rate, animation.index, animation.face, animation.body, name)

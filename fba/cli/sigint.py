@@ -1,0 +1,89 @@
+"""Ctrl-C, kept from the moments at which Python cannot take it.
+
+Compiled loops are loaded by LLVM, which calls Python back while it does so. An error raised in there is
+printed ("Exception ignored in") and lost, or leaves LLVM with half a function: the program then crashes.
+moderngl's C code crashes, too, where what it calls back fails. In such a moment, and in any other callback or
+finalizer, an interruption waits, and comes again soon.
+"""
+
+from __future__ import annotations
+
+import _thread
+import contextlib
+import signal
+import sys
+import time
+from types import FrameType, TracebackType
+from typing import Any, Protocol
+
+from fba.cli.exit_quietly import leave
+
+AGAIN_AFTER = 0.05
+"""Seconds until it comes again."""
+TOUCHY = (
+    "llvmlite.",
+    "numba.core.caching",
+    "numba.core.codegen",
+    "numba.core.runtime",
+    "moderngl",
+    "_moderngl",
+)
+"""Beginnings of the names of modules that must not be left halfway; none of their calls takes long."""
+
+
+class _Unraisable(Protocol):
+    exc_type: type[BaseException]
+    exc_value: BaseException | None
+    exc_traceback: TracebackType | None
+    err_msg: str | None
+    object: object
+
+
+class Interruptions:
+    """While it lasts, Ctrl-C is neither lost nor harmful; for the main thread, which alone gets signals."""
+
+    def __init__(self) -> None:
+        self._lost = False
+        self._handler: Any = None
+
+    def __enter__(self) -> Interruptions:
+        self._hook = sys.unraisablehook
+        sys.unraisablehook = self._unraisable
+        if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave):
+            with contextlib.suppress(ValueError):  # not the main thread
+                self._handler = signal.signal(signal.SIGINT, self._interrupt)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.unraisablehook = self._hook
+        if self._handler is not None:
+            signal.signal(signal.SIGINT, self._handler)
+
+    def made(self, error: BaseException) -> bool:
+        """Whether it is for an interruption that there is this error: by its causes, or by what was lost."""
+        cause: BaseException | None = error
+        while cause is not None:
+            if isinstance(cause, KeyboardInterrupt):
+                return True
+            cause = cause.__cause__ or cause.__context__
+        return self._lost
+
+    def _interrupt(self, _number: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            if str(frame.f_globals.get("__name__", "")).startswith(TOUCHY):
+                _thread.start_new_thread(_again, ())
+                return
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
+    def _unraisable(self, unraisable: _Unraisable) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            self._hook(unraisable)
+            return
+        self._lost = True
+        _thread.start_new_thread(_again, ())
+
+
+def _again() -> None:
+    time.sleep(AGAIN_AFTER)
+    _thread.interrupt_main()

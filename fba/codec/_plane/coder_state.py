@@ -1,0 +1,124 @@
+"""State of the coder between planes: ranges in force, quantiser steps, adaptive models, last values."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.codec._plane import quantiser
+from fba.codec._plane import slots
+from fba.codec._plane.arithmetic import STRIDE, Counts
+from fba.codec._plane.loops import Coding
+from fba.codec.settings import RANGE_UNIT, PartSettings
+from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, baps, faps
+
+Int64 = npt.NDArray[np.int64]
+
+UNDEFINED = -1
+"""Limit of a parameter that has neither a default range nor a sent one."""
+
+_SELECTS = (0, 1, 3, 5)
+_SELECT_LIMITS = np.array(
+    [VISEME_SELECT_MAX] * 2 + [0] + [EXPRESSION_SELECT_MAX, 0, EXPRESSION_SELECT_MAX, 0]
+)
+_INT32 = np.iinfo(np.int32)
+
+
+class Models:
+    """What encoder and decoder must agree on, as arrays over the 372 slots (see `slots`).
+
+    `i_minimum`, `i_size`, `minimum`, `size`: smallest level and number of symbols, for I and P planes.
+    `step`, `last`: quantiser step and last value. `usual`, `total`, `below_usual`, `added`, `tree`:
+    the adaptive models of P planes (see `arithmetic`). `lowest`, `highest`: what a value may be.
+    `intra` and `predicted` bundle them for the compiled loops.
+    """
+
+    def __init__(self, bap_table: str = "iso") -> None:
+        self.bap_table = bap_table
+        count = slots.SLOTS
+        self.limits = default_limits().copy()
+        self.i_minimum = np.zeros(count, dtype=np.int64)
+        self.i_size = np.ones(count, dtype=np.int64)
+        self.minimum = np.zeros(count, dtype=np.int64)
+        self.size = np.ones(count, dtype=np.int64)
+        self.step = np.ones(count, dtype=np.int64)
+        self.last = np.zeros(count, dtype=np.int64)
+        self.usual = np.zeros(count, dtype=np.int64)
+        self.total = np.ones(count, dtype=np.int64)
+        self.below_usual = np.zeros(count, dtype=np.int64)
+        self.added = np.zeros((count, STRIDE), dtype=np.uint16)
+        self.tree = np.zeros((count, STRIDE), dtype=np.uint16)
+        self.lowest = np.full(count, _INT32.min, dtype=np.int64)
+        self.highest = np.full(count, _INT32.max, dtype=np.int64)
+        self.lowest[slots.AMOUNTS] = -2 * INTENSITY_MAX  # the quantiser may round them past 0..63
+        self.highest[slots.AMOUNTS] = 2 * INTENSITY_MAX
+        self.lowest[list(_SELECTS)] = 0
+        self.highest[list(_SELECTS)] = _SELECT_LIMITS[list(_SELECTS)]
+
+        shared = (self.usual, self.total, self.below_usual, self.added, self.tree)
+        value = (self.step, self.lowest, self.highest, self.last)
+        self.intra = Coding(self.i_minimum, *value, Counts(self.i_size, *shared))
+        self.predicted = Coding(self.minimum, *value, Counts(self.size, *shared))
+
+    def begin_intra(self, part: int, settings: PartSettings) -> None:
+        """Put the settings of an I plane in force for a part: new ranges, steps and fresh models."""
+        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        coded = settings.mask[2:] if part == slots.FACE_BIT else settings.mask
+        for limits, codes in zip(self.limits, settings.ranges, strict=True):
+            if codes is not None:
+                sent = codes[2:] if part == slots.FACE_BIT else codes
+                limits[place][coded] = RANGE_UNIT * sent[coded].astype(np.int64)
+        scale = quantiser.scale(part, settings.quant)
+        span = slice(0 if part == slots.FACE_BIT else place.start, place.stop)
+        self._forget(span)
+        self.step[span] = quantiser.steps(part, settings.quant, self.bap_table)
+        i_max, i_min, p_max, p_min = np.maximum(self.limits[:, place], 0) // scale
+        self.i_minimum[place], self.i_size[place] = -i_min, i_max + i_min + 1
+        self.minimum[place], self.size[place] = -p_min, p_max + p_min + 1
+        if part == slots.FACE_BIT:
+            amount = (INTENSITY_MAX + settings.quant // 2) // scale if settings.quant else INTENSITY_MAX
+            limit = _SELECT_LIMITS.copy()
+            limit[slots.AMOUNTS] = amount
+            self.i_size[: place.start] = limit + 1  # I: 0..limit
+            self.minimum[: place.start], self.size[: place.start] = -limit, 2 * limit + 1
+        self.total[span] = self.size[span]
+        self.usual[span] = self.below_usual[span] = -self.minimum[span]
+
+    def _forget(self, span: slice) -> None:
+        """Take back to 0 what was added to the counts of these slots."""
+        used = np.flatnonzero(self.total[span] != self.size[span]) + span.start
+        self.added[used] = 0
+        self.tree[used] = 0
+
+    def undefined(self, settings: PartSettings, part: int) -> int | None:
+        """A slot that the settings code although nothing ever said its range, or None."""
+        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        coded = settings.mask[2:] if part == slots.FACE_BIT else settings.mask
+        missing = np.flatnonzero((self.limits[:, place] == UNDEFINED).any(axis=0) & coded)
+        return int(missing[0]) + place.start if len(missing) else None
+
+
+@cache
+def default_limits() -> Int64:
+    """Ranges where none were sent, int64 (4, 372): I max, I min, P max, P min, as sizes, unscaled.
+
+    FAPs: symmetric, the largest limit of the standard's table rounded up to a multiple of 60; FAP 47 as
+    the reference decoder has it. BAPs: the table's. Extension BAPs have none: UNDEFINED.
+    """
+    limits = np.zeros((4, slots.SLOTS), dtype=np.int64)
+    for fap in faps()[2:]:
+        assert fap.i_limits is not None
+        assert fap.p_limits is not None
+        i_limit, p_limit = (1080, 420) if fap.number == 47 else (max(fap.i_limits), max(fap.p_limits))
+        rounded = [-(-limit // RANGE_UNIT) * RANGE_UNIT for limit in (i_limit, i_limit, p_limit, p_limit)]
+        limits[:, slots.fap_slot(fap.number)] = rounded
+    for bap in baps():
+        if bap.i_limits is None or bap.p_limits is None:
+            limits[:, slots.bap_slot(bap.number)] = UNDEFINED
+        else:
+            limits[:, slots.bap_slot(bap.number)] = (
+                bap.i_limits[1], -bap.i_limits[0], bap.p_limits[1], -bap.p_limits[0],
+            )  # fmt: skip
+    return limits

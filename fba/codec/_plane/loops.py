@@ -1,0 +1,398 @@
+"""Runs of planes, compiled: from bits to rows of values and back (ISO/IEC 14496-2, FBA object plane).
+
+P planes have a header of a few bits and repeat the settings of the I plane before them, so that whole
+runs of them are coded without returning to Python. I planes bring new settings: their headers are
+`fba.codec._plane.syntax`, their values `decode_values` and `encode_values` here.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.codec._plane import arithmetic
+from fba.codec._plane import slots
+from fba.codec._plane.arithmetic import OK, OUT_OF_DATA, Counts, decode_segment, encode_segment, learn
+from fba.compiled import compiled
+
+# Why a run of planes ended; the first four are those of the arithmetic coder.
+INTRA = 4
+"""An I plane comes next."""
+OTHER_MASK = 5
+"""A P plane with another fba_object_mask comes next."""
+START_CODE = 6
+BAD_MASK = 7
+"""fba_object_mask 0."""
+SKIP_TOO_LONG = 8
+OUT_OF_RANGE = 9
+"""A value beyond what its parameter can hold (decoding) or its range can carry (encoding)."""
+
+SKIP_MAX = 15 << 20
+"""Most frames that one plane may skip: a week at 25 Hz. More is damage."""
+
+FIRST_FLAG = slots.FLAGS.start
+
+# Results of `find_start_code` where there is none.
+NO_START_CODE = -1
+UNDECIDED = -2
+
+_INT32_MAX = 2147483647
+
+UInt8 = npt.NDArray[np.uint8]
+UInt16 = npt.NDArray[np.uint16]
+Int32 = npt.NDArray[np.int32]
+Int64 = npt.NDArray[np.int64]
+
+
+class Layout(NamedTuple):
+    """What a plane codes, and in which order: see `slots.coding_order`."""
+
+    order: Int64
+    segments: Int64
+
+
+class Coding(NamedTuple):
+    """How values become symbols, int64 (slots,) each: smallest level, quantiser step, what a parameter can
+    hold, its last value; and the models of the symbols."""
+
+    minimum: Int64
+    step: Int64
+    lowest: Int64
+    highest: Int64
+    last: Int64
+    models: Counts
+
+
+@compiled
+def read_bit(data: UInt8, bit: int) -> int:
+    return (int(data[bit >> 3]) >> (7 - (bit & 7))) & 1
+
+
+@compiled
+def read_skip(data: UInt8, bit: int, end: int) -> tuple[int, int, int]:
+    """number_of_frames_to_skip at `bit`: (status, skip, bit after it or of the word that is too much)."""
+    skip = 0
+    word = 15
+    while word == 15:
+        if bit + 4 > end:
+            return OUT_OF_DATA, skip, end
+        word = 0
+        for _ in range(4):
+            word = 2 * word + read_bit(data, bit)
+            bit += 1
+        skip += word
+        if skip > SKIP_MAX:
+            return SKIP_TOO_LONG, skip, bit - 4
+    return OK, skip, bit
+
+
+@compiled
+def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[int, int]:
+    """Look for alignment and a start code between planes: (last byte of the code, bit after it).
+
+    The alignment is a 0 and then 1s up to the byte border (a whole byte where already there), or zeros;
+    behind a start code (after_code) there is none. NO_START_CODE: a plane begins here. UNDECIDED: all
+    of the bits up to `end` fit a start code, but it is not complete.
+    """
+    here = bit & 7
+    if here == 0:
+        if bit + 8 > end:
+            return UNDECIDED, bit
+        aligned = bit + 8 if data[bit >> 3] == 0x7F and not after_code else bit
+    else:
+        aligned = bit + 8 - here
+        if aligned > end:  # `end` is a byte border
+            return UNDECIDED, bit
+        rest = int(data[bit >> 3]) & (255 >> here)
+        if rest != 0 and rest != (255 >> here) >> 1:
+            return NO_START_CODE, bit
+    for position in range(4):
+        if aligned + 8 * position + 8 > end:
+            return UNDECIDED, bit
+        value = int(data[(aligned >> 3) + position])
+        if position == 3:
+            return value, aligned + 32
+        if value != (1 if position == 2 else 0):
+            return NO_START_CODE, bit
+    return NO_START_CODE, bit
+
+
+@compiled
+def imitates_start_code(data: UInt8, bit: int, end: int) -> bool:
+    """Whether a P plane at bit..end would be taken for alignment and a start code.
+
+    Its first bits can look like alignment, and the inserted 1 after 22 zeros completes 00 00 01: the
+    guard watches over segments, not over the header before them.
+    """
+    code, _ = find_start_code(data, bit, end, False)
+    prefix = bit + (8 - (bit & 7) if bit & 7 or data[bit >> 3] == 0x7F else 0) + 24
+    return code != NO_START_CODE and prefix <= end
+
+
+@compiled
+def decode_values(
+    data: UInt8,
+    bit: int,
+    end: int,
+    layout: Layout,
+    coding: Coding,
+    adaptive: bool,
+    symbols: Int64,
+    values: Int64,
+    flags: Int64,
+) -> tuple[int, int]:
+    """Decode one plane's segments from `bit` on: (status, bit after them or of the damage).
+
+    adaptive: a P plane, else an I plane. Writes symbols[k] and values[k] for slot layout.order[k], and
+    flags[0:3] (viseme_def, init_face, expression_def); changes neither models nor last values.
+    OUT_OF_RANGE returns the slot instead of a bit.
+    """
+    flags[:] = 0
+    flag = 0
+    order = layout.order
+    for segment in range(len(layout.segments)):
+        first = int(layout.segments[segment, 0])
+        stop = int(layout.segments[segment, 1])
+        flag_count = int(layout.segments[segment, 2])
+        status, bit = decode_segment(
+            data, bit, end, order[first:stop], coding.models, adaptive, symbols[first:stop]
+        )
+        if status != OK:
+            return status, bit
+        if flag_count > 0:
+            if bit + flag_count > end:
+                return OUT_OF_DATA, end
+            flag = 0 if flag_count == 1 else 1
+            for _ in range(flag_count):
+                flags[flag] = read_bit(data, bit)
+                flag += 1
+                bit += 1
+    for position in range(len(order)):
+        slot = int(order[position])
+        value = (int(symbols[position]) + int(coding.minimum[slot])) * int(coding.step[slot])
+        if adaptive:
+            value += int(coding.last[slot])
+        if value < coding.lowest[slot] or value > coding.highest[slot]:
+            return OUT_OF_RANGE, slot
+        values[position] = value
+    return OK, bit
+
+
+@compiled
+def decode_run(
+    data: UInt8,
+    bit: int,
+    end: int,
+    after_code: bool,
+    object_mask: int,
+    layout: Layout,
+    coding: Coding,
+    rows: Int32,
+    skips: Int64,
+    borders: Int64,
+) -> tuple[int, int, int, int]:
+    """Decode P planes from `bit` on, until something else comes: (planes, status, bit, place).
+
+    after_code: a start code ends at `bit`.
+
+    Fills rows[t] (columns: see `slots`; only those coded are written), skips[t], borders[t] (first
+    bit) and borders[t + 1]. `bit`: after the last whole plane. status: OK where rows are full, else why
+    it ended; place: the bit (or slot) that a failed plane failed at. A plane that fails leaves models
+    and `last` as they were.
+    """
+    order = layout.order
+    symbols = np.zeros(len(order), np.int64)
+    values = np.zeros(len(order), np.int64)
+    flags = np.zeros(3, np.int64)
+    count = 0
+    borders[0] = bit
+    while count < len(rows):
+        code, _ = find_start_code(data, bit, end, after_code and count == 0)
+        if code != NO_START_CODE:
+            return count, OUT_OF_DATA if code == UNDECIDED else START_CODE, bit, bit
+        if bit + 4 > end:
+            return count, OUT_OF_DATA, bit, end
+        if read_bit(data, bit):
+            return count, INTRA, bit, bit
+        mask = 2 * read_bit(data, bit + 1) + read_bit(data, bit + 2)
+        if mask == 0:
+            return count, BAD_MASK, bit, bit + 1
+        if mask != object_mask:
+            return count, OTHER_MASK, bit, bit
+        place = bit + 4
+        skip = 0
+        if read_bit(data, bit + 3):
+            status, skip, place = read_skip(data, place, end)
+            if status != OK:
+                return count, status, bit, place
+        status, place = decode_values(data, place, end, layout, coding, True, symbols, values, flags)
+        if status != OK:
+            return count, status, bit, place
+        learn(order, symbols, coding.models)
+        for position in range(len(order)):
+            slot = int(order[position])
+            coding.last[slot] = values[position]
+            rows[count, slot] = values[position]
+        for flag in range(3):
+            rows[count, FIRST_FLAG + flag] = flags[flag]
+        skips[count] = skip
+        bit = place
+        count += 1
+        borders[count] = bit
+    return count, OK, bit, bit
+
+
+@compiled
+def quantise(value: int, step: int) -> int:
+    """Level of a value: the nearest multiple of the step, halves away from zero, but 0 up to step // 2."""
+    if value < 0:
+        return -quantise_size(-value, step)
+    return quantise_size(value, step)
+
+
+@compiled
+def quantise_size(size: int, step: int) -> int:
+    half = step // 2
+    return 0 if size <= half else (size + half) // step
+
+
+@compiled
+def encode_values(
+    data: UInt8,
+    bit: int,
+    layout: Layout,
+    coding: Coding,
+    adaptive: bool,
+    symbols: Int64,
+    flags: Int64,
+) -> int:
+    """Encode one plane's segments (symbols[k] for slot layout.order[k]; flags as decoded) at `bit`; the bit
+    after them.
+
+    data: zeroed from `bit` on, with room for 16 bits a symbol and 20 a segment.
+    """
+    for segment in range(len(layout.segments)):
+        first = int(layout.segments[segment, 0])
+        stop = int(layout.segments[segment, 1])
+        flag_count = int(layout.segments[segment, 2])
+        bit = encode_segment(
+            data, bit, layout.order[first:stop], coding.models, adaptive, symbols[first:stop]
+        )
+        flag = 0 if flag_count == 1 else 1
+        for _ in range(flag_count):
+            if flags[flag]:
+                data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+            flag += 1
+            bit += 1
+    return bit
+
+
+@compiled
+def _write_nibble(data: UInt8, bit: int, value: int) -> int:
+    for shift in range(3, -1, -1):
+        if (value >> shift) & 1:
+            data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+        bit += 1
+    return bit
+
+
+@compiled
+def room_for(skip: int, layout: Layout) -> int:
+    """More bits than a P plane can take, with a start code before it."""
+    return 112 + 4 * (skip // 15) + 20 * len(layout.segments) + 17 * len(layout.order)
+
+
+@compiled
+def _write_start_code(data: UInt8, bit: int) -> int:
+    """Alignment and fba_object_plane_start_code; the bit after them."""
+    bit += 1
+    while bit & 7:
+        data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+        bit += 1
+    data[(bit >> 3) + 2] = 0x01
+    data[(bit >> 3) + 3] = 0xBB
+    return bit + 32
+
+
+@compiled
+def _write_plane(
+    data: UInt8,
+    bit: int,
+    object_mask: int,
+    skip: int,
+    layout: Layout,
+    coding: Coding,
+    symbols: Int64,
+    flags: Int64,
+) -> int:
+    """One P plane; the bit after it."""
+    header = 2 * object_mask + (1 if skip > 0 else 0)  # is_intra 0, fba_object_mask, skip_frames
+    bit = _write_nibble(data, bit, header)
+    while skip >= 0 and header & 1:
+        word = min(skip, 15)
+        bit = _write_nibble(data, bit, word)
+        skip = skip - 15 if word == 15 else -1
+    return encode_values(data, bit, layout, coding, True, symbols, flags)
+
+
+@compiled
+def encode_run(
+    data: UInt8,
+    bit: int,
+    after_code: bool,
+    object_mask: int,
+    layout: Layout,
+    coding: Coding,
+    rows: Int32,
+    skips: Int64,
+    borders: Int64,
+) -> tuple[int, int, int, int]:
+    """Encode rows[t] as P planes at `bit`: (planes, status, bit, slot).
+
+    after_code: a start code ends at `bit`. A plane that a reader would take for a start code gets one.
+    OUT_OF_RANGE: a difference in the next plane, that of `slot`, does not fit its range; nothing of that
+    plane was written. OUT_OF_DATA: `data` has no room for another. borders: first bit of each, and the
+    bit after the last.
+    """
+    order, minimum, step, last = layout.order, coding.minimum, coding.step, coding.last
+    symbols = np.zeros(len(order), np.int64)
+    flags = np.zeros(3, np.int64)
+    room = 8 * len(data)
+    borders[0] = bit
+    for count in range(len(rows)):
+        skip = int(skips[count])
+        if bit + room_for(skip, layout) > room:
+            return count, OUT_OF_DATA, bit, -1
+        for position in range(len(order)):
+            slot = int(order[position])
+            symbol = quantise(int(rows[count, slot]) - int(last[slot]), int(step[slot])) - int(minimum[slot])
+            if symbol < 0 or symbol >= coding.models.size[slot]:
+                return count, OUT_OF_RANGE, bit, slot
+            symbols[position] = symbol
+        for flag in range(3):
+            flags[flag] = rows[count, FIRST_FLAG + flag]
+        start = bit
+        bit = _write_plane(data, start, object_mask, skip, layout, coding, symbols, flags)
+        if not (after_code and count == 0) and imitates_start_code(data, start, bit):
+            data[(start >> 3) + 1 : (bit >> 3) + 1] = 0
+            data[start >> 3] &= np.uint8(0xFF00 >> (start & 7) & 0xFF)
+            bit = _write_start_code(data, start)
+            bit = _write_plane(data, bit, object_mask, skip, layout, coding, symbols, flags)
+        learn(order, symbols, coding.models)
+        for position in range(len(order)):
+            slot = int(order[position])
+            last[slot] += (int(symbols[position]) + int(minimum[slot])) * int(step[slot])
+        borders[count + 1] = bit
+    return len(rows), OK, bit, -1
+
+
+STATUS_TEXT = {
+    arithmetic.BAD_GUARD: "22 zero bits are followed by another 0, where a 1 must be inserted; "
+    "the stream is damaged here or before",
+    arithmetic.BAD_FLUSH: "the arithmetic segment does not end with bits that close it; "
+    "the stream is damaged here or before",
+    BAD_MASK: "fba_object_mask is 0, expected 1 (FAPs), 2 (BAPs) or 3 (both)",
+    SKIP_TOO_LONG: f"number_of_frames_to_skip exceeds {SKIP_MAX}",
+}

@@ -1,0 +1,40 @@
+"""Quantiser steps: table step times fap_quant, or times the predictive scale of bap_quant."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.codec._plane import slots
+from fba.parameters import bap_steps, fap_steps
+
+BAP_PREDICTIVE_SCALE = (
+    0, 1, 2, 3, 5, 7, 9, 11, 14, 17, 20, 23, 27, 31, 35, 39, 43, 47, 52, 57, 62, 67, 72, 77, 82, 88, 94, 100,
+    106, 113, 120, 127,
+)  # fmt: skip
+"""bap_pred_scale by bap_quant; 0: not quantised."""
+
+
+def scale(part: int, quant: int) -> int:
+    """What range limits are divided by and table steps multiplied with; 1 where values go unquantised."""
+    return max(quant if part == slots.FACE_BIT else BAP_PREDICTIVE_SCALE[quant], 1)
+
+
+def steps(part: int, quant: int, bap_table: str) -> npt.NDArray[np.int64]:
+    """Step of every slot of a part, int64 (73,) or (296,) in slot order; 1 where values go unquantised."""
+    factor = scale(part, quant)
+    if part == slots.BODY_BIT:
+        table = bap_steps(bap_table)
+        return table * factor if quant else np.ones_like(table)
+    result = np.ones(slots.FAPS.stop, dtype=np.int64)
+    if quant:
+        result[slots.FAPS] = fap_steps()[2:] * quant
+        result[slots.AMOUNTS] = quant  # blend and intensities; selects are never quantised
+    return result
+
+
+def levels(values: npt.NDArray[np.integer], step: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Levels of values: the nearest multiple of the step, halves away from zero, but 0 up to step // 2."""
+    size, half = np.abs(values.astype(np.int64)), step // 2
+    quantised: npt.NDArray[np.int64] = np.sign(values) * np.where(size <= half, 0, (size + half) // step)
+    return quantised

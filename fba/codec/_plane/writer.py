@@ -1,0 +1,173 @@
+"""Writes planes bit by bit as it is told: the half of the encoder that decides nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.codec._plane import loops
+from fba.codec._plane import quantiser
+from fba.codec._plane import slots
+from fba.codec._plane import syntax
+from fba.codec._plane.arithmetic import OUT_OF_DATA
+from fba.codec._plane.bits import BitWriter
+from fba.codec._plane.coder_state import Models
+from fba.codec._plane.loops import Layout
+from fba.codec.settings import PartSettings, PlaneSettings
+
+Int64 = npt.NDArray[np.int64]
+
+_SEGMENT_BITS = 20
+
+
+class DoesNotFitError(Exception):
+    """A level that its range cannot carry. Never leaves the codec.
+
+    slot: the parameter. level: the level wanted. position: which of the rows.
+    """
+
+    def __init__(self, slot: int, level: int, position: int = 0) -> None:
+        super().__init__(slot, level)
+        self.slot = slot
+        self.level = level
+        self.position = position
+
+
+class PlaneWriter:
+    """An FBA object in the making. `bits` counts what was written; whole bytes leave by `take_bytes`."""
+
+    def __init__(self, bap_table: str = "iso") -> None:
+        self.models = Models(bap_table)
+        self.planes = 0
+        self._writer = BitWriter()
+        self._taken = 0
+        self._settings: dict[int, PartSettings] = {}
+        self._layouts: dict[int, Layout] = {}
+
+    @property
+    def bits(self) -> int:
+        return 8 * self._taken + self._writer.bit
+
+    def take_bytes(self) -> bytes:
+        done = self._writer.take_bytes()
+        self._taken += len(done)
+        return done
+
+    def begin_object(self) -> None:
+        self._start_code(syntax.OBJECT_CODES[0])
+
+    def end_object(self) -> None:
+        self._writer.align()
+        self._start_code(syntax.END_CODE)
+
+    def mask_in_force(self, part: int) -> slots.Bool | None:
+        """What the last I plane with this part sends of it."""
+        settings = self._settings.get(part)
+        return settings.mask if settings is not None else None
+
+    def types_in_force(self, part: int) -> tuple[int, ...] | None:
+        """The mask types of the last I plane with this part."""
+        settings = self._settings.get(part)
+        return settings.mask_types if settings is not None else None
+
+    def nearest(self, slot: int, level: int) -> int:
+        """The value that a P plane can come to which wants a difference of this level in a slot."""
+        models = self.models
+        low = int(models.minimum[slot])
+        reached = min(max(level, low), low + int(models.size[slot]) - 1)
+        return int(models.last[slot]) + reached * int(models.step[slot])
+
+    def intra(self, settings: PlaneSettings, row: slots.Int32, *, clamp: bool = False) -> int:
+        """Write an I plane with the values of row (columns,); how many values were clamped to their range.
+
+        Raises DoesNotFitError before anything was written, unless `clamp`.
+        """
+        models = self.models
+        parts = [
+            (part, one)
+            for part, one in ((slots.FACE_BIT, settings.face), (slots.BODY_BIT, settings.body))
+            if one is not None
+        ]
+        plan = []
+        clamped = 0
+        for part, one in parts:
+            models.begin_intra(part, one)
+            order, segments = slots.coding_order(
+                one.mask if part == slots.FACE_BIT else None, one.mask if part == slots.BODY_BIT else None
+            )
+            levels = quantiser.levels(row[order], models.step[order])
+            low = models.i_minimum[order]
+            fitting = np.clip(levels, low, low + models.i_size[order] - 1)
+            wrong = np.flatnonzero(fitting != levels)
+            if len(wrong) and not clamp:
+                raise DoesNotFitError(int(order[wrong[0]]), int(levels[wrong[0]]))
+            clamped += len(wrong)
+            plan.append((part, one, order, segments, fitting))
+        writer = self._writer
+        if settings.start_code:
+            writer.align()
+            self._start_code(syntax.PLANE_CODES[0])
+        writer.write(1, 1)
+        writer.write(sum(part for part, _ in parts), 2)
+        writer.write(int(settings.frame_rate is not None), 1)
+        if settings.frame_rate is not None:
+            syntax.write_frame_rate(writer, settings.frame_rate)
+        writer.write(int(settings.time_code is not None), 1)
+        if settings.time_code is not None:
+            syntax.write_time_code(writer, settings.time_code)
+        syntax.write_skip(writer, settings.skip)
+        flags = row[slots.FLAGS].astype(np.int64)
+        for part, one, order, segments, levels in plan:
+            syntax.write_part(writer, part, one)
+            writer.reserve(17 * len(order) + _SEGMENT_BITS * len(segments))
+            symbols = levels - models.i_minimum[order]
+            writer.bit = loops.encode_values(
+                writer.data, writer.bit, Layout(order, segments), models.intra, False, symbols, flags
+            )
+            models.last[order] = levels * models.step[order]
+            self._settings[part] = one
+        self._layouts.clear()
+        self.planes += 1
+        return clamped
+
+    def predicted(self, mask: int, rows: slots.Int32, skips: Int64, *, start_code: bool = False) -> None:
+        """Write P planes with fba_object_mask `mask` and the values of rows (T, columns).
+
+        start_code: with a plane start code before the first. Raises DoesNotFitError at the first that
+        does not fit its ranges, with those before it written and nothing of it.
+        """
+        if mask not in self._layouts:
+            face = self._settings[slots.FACE_BIT].mask if mask & slots.FACE_BIT else None
+            body = self._settings[slots.BODY_BIT].mask if mask & slots.BODY_BIT else None
+            self._layouts[mask] = Layout(*slots.coding_order(face, body))
+        layout = self._layouts[mask]
+        models, writer = self.models, self._writer
+        borders = np.zeros(len(rows) + 1, dtype=np.int64)
+        if start_code:
+            writer.align()
+            self._start_code(syntax.PLANE_CODES[0])
+        done = 0
+        while done < len(rows):
+            count, status, bit, slot = loops.encode_run(
+                writer.data,
+                writer.bit,
+                start_code and done == 0,
+                mask,
+                layout,
+                models.predicted,
+                rows[done:],
+                skips[done:],
+                borders[done:],
+            )
+            writer.bit = bit
+            done += count
+            self.planes += count
+            if status == loops.OUT_OF_RANGE:
+                difference = int(rows[done, slot]) - int(models.last[slot])
+                raise DoesNotFitError(slot, loops.quantise(difference, int(models.step[slot])), done)
+            if status == OUT_OF_DATA:
+                need = loops.room_for(int(skips[done]), layout)
+                writer.reserve(max(need, 8 * len(writer.data)))
+
+    def _start_code(self, code: int) -> None:
+        self._writer.write(int.from_bytes(syntax.START_CODE_PREFIX, "big") << 8 | code, 32)

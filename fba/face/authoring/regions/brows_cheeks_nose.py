@@ -1,0 +1,166 @@
+"""Brows, cheeks, chin and nose: FAPs whose feature points pull at the skin around them.
+
+Which points share a region, what bounds it and what a FAP takes along is in `regions.csv` and
+`handles.csv`; the right side mirrors the left.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.motion import Motion
+from fba.face.authoring.surface.motion_limits import linear
+from fba.face.authoring.surface.weights import region, smoothed, spread, through, without_hem
+from fba.face.feature_points import MIRRORED
+from fba.face.points import DIRECTIONS
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+
+SMOOTHINGS = 5
+HEM = 0.006
+
+
+@dataclass(frozen=True)
+class Region:
+    """Points that pull at the same skin.
+
+    reach, in ES0. share: of the way to what stays that moves. slack: over longer distances, in ES0, the
+    skin does not spring back. through: in ES0, over what depth skin takes along what is behind it, or 0.
+    behind: what that is, the inside of the "mouth" or "all".
+    """
+
+    name: str
+    points: tuple[str, ...]
+    still: tuple[str, ...]
+    contours: tuple[str, ...]
+    reach: float
+    share: float
+    slack: float
+    through: float
+    behind: str
+
+
+@dataclass(frozen=True)
+class Handle:
+    """What one FAP does to the points of its region. bulge: how far the skin beside swells outwards."""
+
+    fap: int
+    region: str
+    values: dict[str, float]
+    bulge: float
+
+
+@cache
+def regions() -> dict[str, Region]:
+    """The regions by name."""
+    return {
+        row["region"]: Region(
+            row["region"],
+            tuple(row["points"].split()),
+            tuple(row["still"].split()),
+            tuple(c for c in row["contours"].split("|") if c),
+            float(row["reach"]),
+            float(row["share"]),
+            float(row["slack"]),
+            float(row["through"]),
+            row["behind"],
+        )
+        for row in _rows("regions.csv")
+    }
+
+
+@cache
+def handles() -> tuple[Handle, ...]:
+    """What each FAP pulls at, right mates included."""
+    found = []
+    mirror = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
+    for row in _rows("handles.csv"):
+        pairs = (pair.split("=") for pair in row["values"].split())
+        left = {name: float(value) for name, value in pairs}
+        found.append(Handle(int(row["fap"]), row["region"], left, float(row["bulge"])))
+        mate = faps()[int(row["fap"]) - 1].left_right_mate
+        if mate is not None:
+            right = {mirror.get(name, name): value for name, value in left.items()}
+            found.append(Handle(mate, row["region"], right, float(row["bulge"])))
+    return tuple(found)
+
+
+def spot_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
+    """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
+    found: dict[int, Motion] = {}
+    lost: dict[int, str] = {}
+    for area in regions().values():
+        own = []
+        for handle in handles():
+            if handle.region != area.name:
+                continue
+            point = _point(handle.fap)
+            if marks.has(point):
+                own.append(handle)
+            else:
+                lost[handle.fap] = f"feature point {point} is not on the skin"
+        if own:
+            fields, fixed = _fields(marks, area, own)
+            for k, handle in enumerate(own):
+                found[handle.fap] = _motion(marks, limiter, handle, fields[:, k], fixed)
+    return found, lost
+
+
+def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64, Bool]:
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    points = [name for name in area.points if marks.has(name)]
+    held = np.unique(np.concatenate([np.zeros(0, np.intp), *(marks.contour(name) for name in area.contours)]))
+    pulled = np.array([marks.vertex[name] for name in points])
+    still = [marks.vertex[name] for name in area.still if marks.has(name)]
+    stays = np.setdiff1d(np.union1d(held, np.array(still, dtype=np.intp)), pulled)
+    reach = area.reach * es
+    near = surface.distances(pulled, reach)
+    far = surface.distances(stays, 4 * reach)
+    free = region(near, far, reach, area.share) & ~marks.inside_mouth
+    pulled, first = np.unique(pulled, return_index=True)
+    given = np.array([[handle.values.get(points[k], 0.0) for handle in own] for k in first])
+    fixed = np.concatenate([pulled, stays])
+    values = np.concatenate([given, np.zeros((len(stays), len(own)))])
+    pinned = np.zeros(len(surface), dtype=bool)
+    pinned[fixed] = True
+    solved = spread(surface, free, fixed, values, slack=area.slack * es)
+    if area.through:
+        behind = surface.distances(pulled, 1.6 * reach) < np.inf
+        behind &= marks.inside_mouth if area.behind == "mouth" else ~marks.lips & ~marks.on_inner_lips
+        behind[stays] = False
+        for k, handle in enumerate(own):
+            targets = np.setdiff1d(np.flatnonzero(behind), marks.vertex[_point(handle.fap)])
+            lifted = through(surface, solved[:, k], targets, area.through * es)
+            for _ in range(SMOOTHINGS):
+                lifted[targets] = smoothed(surface, lifted, 1)[targets]
+            solved[:, k] = lifted
+    return without_hem(solved, HEM), pinned
+
+
+def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:
+    fap = faps()[handle.fap - 1]
+    vertices = np.flatnonzero(field)
+    weight = field[vertices][:, None]
+    direction = np.array(DIRECTIONS[fap.positive])
+    swell = handle.bulge * np.clip(weight * (1 - weight), 0, None) * marks.surface.normals[vertices]
+    field = (weight * direction + swell) * marks.fapu[fap.unit]
+    return linear(marks.surface, limiter, vertices, field, handle.fap, pinned)
+
+
+def _point(fap: int) -> str:
+    return faps()[fap - 1].feature_points[0]
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with (files(__package__) / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))

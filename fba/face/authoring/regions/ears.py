@@ -1,0 +1,84 @@
+"""The ears: FAPs 65-68. An ear moves as a whole about its soft root; pulled, its rim goes furthest."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.motion import Motion
+from fba.face.authoring.surface.motion_limits import linear
+from fba.face.authoring.surface.weights import smooth_step, smoothed, without_hem
+from fba.face.points import DIRECTIONS
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+
+EARS = {
+    "left": {"top": "10.1", "back": "10.3", "lobe": "10.5", "below": "10.7", "above": "10.9"},
+    "right": {"top": "10.2", "back": "10.4", "lobe": "10.6", "below": "10.8", "above": "10.10"},
+}
+"""Feature points of the ears; "below" and "above" are where they meet the face."""
+RAISE, PULL = {65: "left", 66: "right"}, {67: "left", 68: "right"}
+WHOLE, ROOT = 0.55, 1.15
+"""Up to the first share of the ear's width from its rim the ear moves as one, from the second on nothing."""
+AROUND = (1.1, 1.7)
+"""Seen from the side, the head around the ear moves less and less between these multiples of its size."""
+WIDER = 1.2
+LEAST_PULL = 0.1
+SMOOTHINGS = 6
+HEM = 0.006
+
+
+def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
+    """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
+    found: dict[int, Motion] = {}
+    lost: dict[int, str] = {}
+    for fap, side in (RAISE | PULL).items():
+        point = faps()[fap - 1].feature_points[0]
+        if not marks.has(point):
+            lost[fap] = f"feature point {point} is not on the skin"
+            continue
+        share = _share(marks, side, pull=fap in PULL)
+        vertices = np.flatnonzero(share)
+        entry = faps()[fap - 1]
+        step = np.array(DIRECTIONS[entry.positive]) * marks.fapu[entry.unit]
+        pinned = np.zeros(len(marks.surface), dtype=bool)
+        pinned[marks.vertex[point]] = True
+        field = share[vertices][:, None] * step
+        found[fap] = linear(marks.surface, limiter, vertices, field, fap, pinned)
+    return found, lost
+
+
+def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
+    """(N,) how much each vertex goes with the ear."""
+    names = EARS[side]
+    surface = marks.surface
+    top, back, lobe, below, above = (marks.guess(name) for name in names.values())
+    root = (below + above) / 2
+    width = float(np.linalg.norm(back - root))
+    rim = _rim(marks, names)
+    away = surface.distances(rim, 1.5 * width) / width
+    share = 1 - smooth_step((np.nan_to_num(away, posinf=9.0) - WHOLE) / (ROOT - WHOLE))
+    share = smoothed(surface, share, SMOOTHINGS)
+    centre = ((top + lobe) / 2 + (back + root) / 2) / 2
+    half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * WIDER])
+    beside = np.linalg.norm((surface.vertices - centre) / half, axis=1)
+    share *= 1 - smooth_step((beside - AROUND[0]) / (AROUND[1] - AROUND[0]))
+    if pull:
+        out = root - back
+        far = 1 - ((surface.vertices - back) @ out) / (out @ out)
+        share = share * (LEAST_PULL + (1 - LEAST_PULL) * np.clip(far, 0.0, 1.2))
+    own = marks.vertex[names["back" if pull else "top"]]
+    return without_hem(share / max(share[own], 1e-9), HEM)
+
+
+def _rim(marks: Landmarks, names: dict[str, str]) -> npt.NDArray[np.intp]:
+    """Vertices around the ear, from its upper end at the face over the back to the lobe."""
+    known = [marks.vertex[names[key]] for key in ("top", "back", "lobe") if marks.has(names[key])]
+    walk = [np.array(known, dtype=np.intp)]
+    walk += [marks.surface.path(a, b) for a, b in pairwise(known)]
+    return np.unique(np.concatenate(walk))

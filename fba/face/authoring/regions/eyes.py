@@ -1,0 +1,138 @@
+"""Eyeballs: FAPs 23-30. Whole eyeballs turn and slide; pupils are moved on their surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.motion import Motion, limits
+from fba.face.authoring.surface.motion_limits import guarded
+from fba.face.eyeball import sphere
+from fba.face.model import Part
+from fba.face.points import EYEBALL_PER_IRIS
+from fba.face.tables import FaceDefTransform
+
+Float64 = npt.NDArray[np.float64]
+
+PUPIL_OF_IRIS = 1 / 3
+"""Of a neutral face."""
+PUPIL_REACH = 1.5
+"""An eyeball without vertices this close to its axis, in radii of the pupil, has no pupil to move."""
+SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
+"""Share of the pupil's, and of the iris's radius, at which the pupil stops."""
+
+
+@dataclass(frozen=True, eq=False)
+class Eye:
+    """side: "left" or "right". parts: names of all parts that turn with it. centre: (3,). radius: metres.
+    pupil: (3,) where it looks out. measured: whether there is an eyeball to measure, or points only.
+    """
+
+    side: str
+    parts: tuple[str, ...]
+    centre: Float64
+    radius: float
+    pupil: Float64
+    measured: bool
+
+    @property
+    def gaze(self) -> Float64:
+        arm = self.pupil - self.centre
+        result: Float64 = arm / np.linalg.norm(arm)
+        return result
+
+
+def eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
+    """Both eyes; where there is no eyeball, the sphere is guessed from the points, for the lids' sake."""
+    iris = marks.fapu.IRISD * 1024
+    pupils = {side: marks.guess(name) for side, name in (("left", "3.5"), ("right", "3.6"))}
+    middle = float((pupils["left"][0] + pupils["right"][0]) / 2)
+    found = {}
+    for side, pupil in pupils.items():
+        own = [
+            part
+            for part in parts
+            if part.kind == "eye" and len(part.vertices) and (_middle(part)[0] > middle) == (side == "left")
+        ]
+        spheres = [fit for part in own if (fit := sphere(part)) is not None]
+        radius = EYEBALL_PER_IRIS * iris
+        if spheres:
+            centre, radius = max(spheres, key=lambda fit: fit[1])[:2]
+        else:
+            centre = pupil - (0.0, 0.0, radius)
+        found[side] = Eye(side, tuple(part.name for part in own), centre, radius, pupil, bool(spheres))
+    return found
+
+
+def _middle(part: Part) -> Float64:
+    ends: Float64 = (part.vertices.min(axis=0) + part.vertices.max(axis=0)).astype(np.float64) / 2
+    return ends
+
+
+def eye_transforms(fap: int, eye: Eye) -> list[FaceDefTransform]:
+    """Turns (FAPs 23-26) and shifts (27, 28) of the parts of an eye."""
+    centre = tuple(eye.centre.tolist())
+    kind, amount = {
+        23: ("rotation", (0.0, 1.0, 0.0)),
+        24: ("rotation", (0.0, 1.0, 0.0)),
+        25: ("rotation", (1.0, 0.0, 0.0)),
+        26: ("rotation", (1.0, 0.0, 0.0)),
+        27: ("translation", (0.0, 0.0, 1.0)),
+        28: ("translation", (0.0, 0.0, 1.0)),
+    }[fap]
+    return [FaceDefTransform(name, kind, amount, centre) for name in eye.parts]
+
+
+def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -> dict[str, Motion]:
+    """By part: the pupil's rim moved along the eyeball, the iris between it and its own rim squeezed."""
+    unit = marks.fapu.IRISD
+    iris = unit * 1024 / 2
+    pupil = iris * PUPIL_OF_IRIS
+    low, high = limits(fap)
+    smallest, largest = SMALLEST_PUPIL * pupil, LARGEST_PUPIL * iris
+    # the diameter grows by value x IRISD
+    bends = np.array([(smallest - pupil) * 2 / unit, (largest - pupil) * 2 / unit])
+    values = np.unique(np.round(np.clip([low, bends[0], 0, bends[1], high], low, high)))
+    radii = np.clip(pupil + values * unit / 2, smallest, largest)
+    found = {}
+    for part in parts:
+        if part.name not in eye.parts:
+            continue
+        points = part.vertices.astype(np.float64)
+        along = (points - eye.centre) @ eye.gaze
+        across = points - eye.centre - along[:, None] * eye.gaze
+        distance = np.linalg.norm(across, axis=1)
+        moving = np.flatnonzero((distance < iris) & (along > 0) & (distance > 1e-9))
+        if not (distance[moving] < PUPIL_REACH * pupil).any():
+            continue
+        outward = across[moving] / distance[moving, None]
+        now = np.array([np.interp(distance[moving], [0, pupil, iris], [0, radius, iris]) for radius in radii])
+        shifts = (now - distance[moving])[:, :, None] * outward
+        shifts += (_depth(distance, along, now) - _depth(distance, along, distance[moving][None]))[
+            :, :, None
+        ] * eye.gaze
+        shifts[values == 0] = 0.0
+        motion = Motion(values, moving, shifts)
+        found[part.name] = guarded(Limiter(points, part.triangles.astype(np.intp)), motion)
+    return found
+
+
+def _depth(distance: Float64, along: Float64, at: Float64) -> Float64:
+    """Depth of an eye's surface along the gaze at some distances from its axis, from its own vertices."""
+    front = along > 0
+    order = np.argsort(distance[front], kind="stable")
+    near, deep = distance[front][order], along[front][order]
+    bins = np.linspace(0, max(float(at.max(initial=0.0)) * 1.2, 1e-9), 13)
+    which = np.digitize(near, bins)
+    used = [k for k in range(1, len(bins)) if (which == k).any()]
+    if len(used) < 2:
+        return np.zeros_like(at)
+    where = [float(near[which == k].mean()) for k in used]
+    what = [float(deep[which == k].max()) for k in used]
+    result: Float64 = np.interp(at, where, what)
+    return result

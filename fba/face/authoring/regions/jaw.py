@@ -1,0 +1,252 @@
+"""The lower jaw: FAP 3 open_jaw, a hinge about the ears, and FAPs 14 and 15, which slide it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.motion import limits
+from fba.face.authoring.surface.weights import region, smooth_step, spread, without_hem
+from fba.face.model import Part
+from fba.face.points import OPEN_JAW
+
+Float64 = npt.NDArray[np.float64]
+
+CHIN = ("2.1", "2.10", "2.11", "2.12")
+EARS = ("10.7", "10.8", "10.9", "10.10")
+"""Where the ears meet the face; the hinge lies between them."""
+STILL = (
+    "5.3",
+    "5.4",
+    "9.1",
+    "9.2",
+    "9.3",
+    "9.15",
+    "3.9",
+    "3.10",
+    "10.5",
+    "10.6",
+    "10.7",
+    "10.8",
+    "10.9",
+    "10.10",
+    "8.1",
+)
+REACH = 1.5
+"""How far the jaw pulls at cheeks and neck, in ES0."""
+NECK = 0.1
+"""Open edges of the skin this far below the chin, in ES0, are where the neck was cut."""
+CORNER = 0.6
+"""How much of the jaw's turn the skin over its corners makes."""
+WIDEST = np.radians(30.0)
+"""Nobody opens further."""
+SLIDE = (0.35, 0.1)
+"""How far the hinge goes forwards and down for a turn of one radian, in ES0: some 11 mm when wide open."""
+INTERVAL = np.radians(3.0)
+"""The arc is cut into intervals no longer than this."""
+LIP_RIDE = 0.5
+"""The lower lip rides on a jaw that slides, but not on one that opens: it has FAPs of its own for that."""
+SLACK = 0.2
+HEM = 0.004
+TEETH_MARGIN = 0.12
+"""In a piece of teeth the jaw's share goes from 0 to 1 within this height about their edge, in MNS0."""
+CHEEK_MARGIN = 0.4
+"""The inside of the mouth stretches over at least this height above and below the teeth's edge, in MNS0."""
+MIXED = 0.15
+"""Teeth further than this from half above and half below their common edge belong to one jaw."""
+LIP_DEPTH = 0.16
+"""From this far behind the lips on, in ES0, the inside of the mouth belongs to the jaws."""
+
+
+@dataclass(frozen=True, eq=False)
+class Jaw:
+    """share: (N,) of the surface, 1 on the chin. sliding: the same for FAPs 14 and 15, with the lower lip.
+    hinge: (y, z) of the axis. chin: (3,), the point that sinks by exactly value x MNS.
+    size: ES0 in metres.
+    """
+
+    share: Float64
+    sliding: Float64
+    hinge: Float64
+    chin: Float64
+    size: float
+
+
+def jaw(marks: Landmarks) -> Jaw | str:
+    """The jaw of a face, or why it has none."""
+    if not marks.has("2.1"):
+        return "feature point 2.1 is not on the skin"
+    ears = np.array([marks.guess(name) for name in EARS])
+    hinge = ears.mean(axis=0)[1:]
+    chin = marks.place("2.1")
+    if chin[2] - hinge[1] <= 0 or chin[1] >= hinge[0]:
+        return "the chin (2.1) is not below and before the ears"
+    share = _share(marks, hinge)
+    return Jaw(share, _with_lip(marks, share), hinge, chin, marks.fapu.ES * 1024)
+
+
+def opening(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
+    """(values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
+    low, high = limits(OPEN_JAW)
+    fine = np.linspace(0, WIDEST, 400)
+    sunk = -turned(jaw.chin[None], jaw, fine)[:, 0, 1]
+    fine = fine[: int(sunk.argmax()) + 1]
+    sunk = np.maximum.accumulate(sunk[: len(fine)])
+    deepest = min(float(sunk[-1]) / unit, high)
+    count = max(5, int(np.ceil(fine[-1] / INTERVAL)))
+    values = np.unique(np.round(np.linspace(0, deepest, count + 1)))
+    angles = np.interp(values * unit, sunk, fine)
+    if values[-1] < high:
+        values, angles = np.append(values, high), np.append(angles, angles[-1])
+    # a closed jaw does not close further
+    return np.append([min(low, -1.0)], values), np.append([0.0], angles)
+
+
+def turned(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
+    """(K, N, 3) shifts of points (N, 3) when the jaw opens by each angle (K,).
+
+    It turns about the hinge, +z down, while the hinge itself slides forwards and a little down, as the
+    joint of a human jaw does.
+    """
+    y, z = points[:, 1] - jaw.hinge[0], points[:, 2] - jaw.hinge[1]
+    cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    zero = np.zeros((len(angles), len(points)))
+    forward, down = (step * jaw.size * angles[:, None] for step in SLIDE)
+    return np.stack([zero, y * cos - z * sin - y - down, y * sin + z * cos - z + forward], axis=-1)
+
+
+def bite(marks: Landmarks) -> float:
+    """Height at which upper and lower teeth meet."""
+    heights = [marks.place(name)[1] for name in ("9.10", "9.11")]
+    known = [h for h in heights if np.isfinite(h)]
+    lips = [marks.place(name)[1] for name in ("2.2", "2.3")]
+    return float(np.mean(known or [h for h in lips if np.isfinite(h)] or [marks.guess("9.10")[1]]))
+
+
+def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
+    """(N,) metres below the plane through the hinge and the teeth's edge."""
+    front = marks.guess("9.10")
+    reach = max(front[2] - hinge[1], 1e-6)
+    ahead = np.clip((points[:, 2] - hinge[1]) / reach, 0.2, None)
+    plane = hinge[0] + (bite(marks) - hinge[0]) * ahead
+    result: Float64 = plane - points[:, 1]
+    return result
+
+
+def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
+    """(V,) how much each vertex of a part inside the mouth turns with the jaw.
+
+    Each connected piece that lies on one side of the teeth's edge goes as one: a tooth does not bend.
+    """
+    from fba.face.authoring.surface.surface import Surface
+
+    if part.kind == "tongue":
+        return np.ones(len(part.vertices))
+    shape = Surface([part])
+    margin = TEETH_MARGIN * marks.fapu.MNS * 1024
+    each = smooth_step(below_bite(marks, shape.vertices, hinge) / (2 * margin) + 0.5)
+    if part.kind == "teeth":
+        row = _by_teeth_points(marks, part)
+        if row is not None:
+            return np.full(len(part.vertices), row)
+        # an overbite does not take the upper teeth along: the whole set decides, then each piece of it
+        if abs(float(each.mean()) - 0.5) > MIXED:
+            return np.full(len(part.vertices), float(each.mean() > 0.5))
+        count = np.bincount(shape.component)
+        mean = np.bincount(shape.component, each) / count
+        whole = np.abs(mean - 0.5) > MIXED
+        each = np.where(whole[shape.component], (mean > 0.5)[shape.component], each)
+    result: Float64 = each[shape.number]
+    return result
+
+
+def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
+    """1 for the lower teeth, 0 for the upper, where the feature points of only one row are on a part."""
+    close = {}
+    for row, names in ((0.0, ("9.8", "9.10")), (1.0, ("9.9", "9.11"))):
+        known = [place for name in names if np.isfinite(place := marks.place(name)).all()]
+        if not known:
+            return None
+        away = [float(np.linalg.norm(part.vertices - place, axis=1).min()) for place in known]
+        close[row] = max(away) < 0.05 * marks.fapu.MNS * 1024
+    if close[0.0] == close[1.0]:
+        return None
+    return 1.0 if close[1.0] else 0.0
+
+
+def _share(marks: Landmarks, hinge: Float64) -> Float64:
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    one = {marks.vertex[name]: 1.0 for name in CHIN if marks.has(name)}
+    line = marks.contour("jaw line")
+    values: dict[int, float] = {}
+    if len(line):
+        values |= dict(zip(line.tolist(), _along_jaw(marks, line).tolist(), strict=True))
+    values |= {marks.vertex[name]: CORNER for name in ("2.13", "2.14") if marks.has(name)}
+    values |= one
+    source = np.array(sorted(values))
+    lips = marks.on("lower outer lip", "upper outer lip", "lower inner lip", "upper inner lip") | marks.lips
+    # below, the neck ends at a body that stays
+    end = surface.open_edge & (surface.vertices[:, 1] < marks.place("2.1")[1] - NECK * es)
+    still = np.unique(
+        [*np.flatnonzero(lips | end), *(marks.vertex[name] for name in STILL if marks.has(name))]
+    )
+    inside = marks.inside_mouth
+    near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
+    free = region(near, far, REACH * es) & ~inside & ~lips
+    fixed = np.concatenate([source, np.flatnonzero(lips)])
+    given = np.concatenate([[values[int(v)] for v in source], np.zeros(int(lips.sum()))])
+    if inside.any():
+        depth = surface.distances(np.flatnonzero(lips | marks.on_inner_lips))
+        below = below_bite(marks, surface.vertices, hinge)
+        clear = np.abs(below) > CHEEK_MARGIN * marks.fapu.MNS * 1024
+        jaws = np.flatnonzero(inside & (depth > LIP_DEPTH * es) & clear)
+        fixed = np.concatenate([fixed, jaws])
+        given = np.concatenate([given, (below[jaws] > 0).astype(np.float64)])
+        free |= inside
+    order = np.unique(fixed, return_index=True)[1]
+    field = spread(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
+    return without_hem(np.clip(field[:, 0], 0.0, 1.0), HEM)
+
+
+def _along_jaw(marks: Landmarks, line: npt.NDArray[np.intp]) -> Float64:
+    """Shares along the jaw line: 1 between the corners of the chin, less towards the corners of the jaw."""
+    chin = [k for k, v in enumerate(line) if v in {marks.vertex.get(name) for name in CHIN}]
+    steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    first, last = length[chin[0]], length[chin[-1]]
+    left = np.where(length < first, (first - length) / max(first, 1e-9), 0.0)
+    right = np.where(length > last, (length - last) / max(length[-1] - last, 1e-9), 0.0)
+    return 1 - (1 - CORNER) * smooth_step(np.maximum(left, right))
+
+
+def _with_lip(marks: Landmarks, share: Float64) -> Float64:
+    """The share of a sliding jaw: the lower lip goes half way, the upper one stays."""
+    lower = marks.on("lower outer lip", "lower inner lip")
+    upper = marks.on("upper outer lip", "upper inner lip")
+    lower &= ~upper
+    if not lower.any():
+        return share
+    # lips and skin around take what lies between the given: chin, lower lip, upper lip
+    es = marks.fapu.ES * 1024
+    surface = marks.surface
+    close = surface.distances(np.flatnonzero(lower), 0.6 * es) < 0.5 * es
+    along = _from_corners(marks, np.flatnonzero(lower))
+    fixed = np.flatnonzero(lower | upper | ~close)
+    given = share.copy()
+    given[upper] = 0.0
+    given[np.flatnonzero(lower)] = LIP_RIDE * along
+    near_jaw = close & (share > 0.9)
+    fixed = np.union1d(fixed, np.flatnonzero(near_jaw))
+    field = spread(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
+    return without_hem(np.clip(field, 0.0, 1.0), HEM)
+
+
+def _from_corners(marks: Landmarks, vertices: npt.NDArray[np.intp]) -> Float64:
+    """(M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
+    x = marks.surface.vertices[vertices, 0]
+    left, right = marks.guess("2.4")[0], marks.guess("2.5")[0]
+    across = (x - right) / (left - right)
+    return smooth_step(3.5 * np.minimum(across, 1 - across) - 0.5)

@@ -1,0 +1,140 @@
+"""Lids kept off the eyeball."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.regions.mouth_opening import CLOSED
+from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.weights import smooth_step
+from fba.face.model import Part
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+Bool = npt.NDArray[np.bool_]
+
+CLEARANCE = 0.012
+"""Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
+FREED = 0.3
+"""Share of the way after which a lid has its full clearance."""
+BULGE = np.radians(12.0)
+"""The cornea bulges by this much beyond where it is now: the eye may look elsewhere."""
+STRICT = np.radians(4.0)
+OUTSIDE = 0.97
+"""What is this far out, in radii of the eyeball, lies before it."""
+DEEPEST = 0.02
+"""How deep an edge is taken to dip, as a share of the eyeball's radius: a longer one is left as it is."""
+BRIDGINGS = 3
+"""Moving a vertex off the eyeball may pull another edge into it; so many times this is looked after."""
+
+
+class Profile:
+    """How far the front of an eyeball reaches out in every direction, the cornea included."""
+
+    def __init__(self, eye: Eye, parts: Sequence[Part], edge: float) -> None:
+        """edge: typical length of the lids' edges, whose middles dip below their ends."""
+        self._eye = eye
+        self._clearance = CLEARANCE * eye.radius
+        self._dip = edge**2 / (8 * eye.radius)
+        self._angles = np.linspace(0, np.pi, 73)
+        self._here = np.full(73, 0.0)
+        self._around = np.full(73, eye.radius)
+        for part in parts:
+            if part.name not in eye.parts:
+                continue
+            arms = part.vertices.astype(np.float64) - eye.centre
+            reach = np.linalg.norm(arms, axis=1)
+            angle = np.arccos(np.clip(arms @ eye.gaze / np.maximum(reach, 1e-12), -1, 1))
+            for k, at in enumerate(self._angles):
+                for radii, within in ((self._here, STRICT), (self._around, BULGE)):
+                    near = np.abs(angle - at) < within
+                    if near.any():
+                        radii[k] = max(radii[k], float(reach[near].max()))
+        self._here[self._here == 0.0] = eye.radius
+
+    def radius(self, points: Float64, *, around: bool) -> Float64:
+        """(N,) how far the eyeball reaches in the directions of points (N, 3), or in those around them."""
+        arms = points - self._eye.centre
+        reach = np.linalg.norm(arms, axis=1)
+        angle = np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1))
+        result: Float64 = np.interp(angle, self._angles, self._around if around else self._here)
+        return result
+
+    @property
+    def reach(self) -> float:
+        """Radius of the eyeball, metres."""
+        return self._eye.radius
+
+    def before(self, points: Float64) -> Bool:
+        """(N,) which points lie outside the eyeball."""
+        reach = np.linalg.norm(points - self._eye.centre, axis=1)
+        return np.asarray(reach >= self.radius(points, around=False))
+
+    def lift(self, points: Float64, shifts: Float64, *, edges: bool = True) -> Float64:
+        """(N, 3): what must be added, forwards, so that what was outside the eyeball stays outside.
+
+        edges: with room for edges between, whose middles dip.
+        """
+        at = points + shifts
+        needed = self.radius(at, around=True) + self._clearance + (self._dip if edges else 0.0)
+        arms = at - self._eye.centre
+        level = (arms[:, :2] ** 2).sum(axis=1)
+        outside = np.linalg.norm(points - self._eye.centre, axis=1) >= OUTSIDE * self.radius(
+            points, around=False
+        )
+        before = np.sqrt(np.maximum(needed**2 - level, 0.0))
+        moved = np.linalg.norm(shifts, axis=1) > 1e-9
+        push = np.where(outside & moved & (arms[:, 2] > 0), np.maximum(before - arms[:, 2], 0.0), 0.0)
+        result = np.zeros_like(at)
+        result[:, 2] = push
+        return result
+
+
+def edge_length(marks: Landmarks, own: Int, other: Int) -> float:
+    """The longer ones of the edges at the margins of an eye."""
+    surface = marks.surface
+    at_margin = np.zeros(len(surface), dtype=bool)
+    at_margin[own] = at_margin[other] = True
+    edges = surface.vertices[surface.edges[at_margin[surface.edges].any(axis=1)]]
+    return float(np.percentile(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1), 80)) if len(edges) else 0.0
+
+
+def freed(profile: Profile, points: Float64, shifts: Float64, values: Float64) -> Float64:
+    """Shifts (K, N, 3) with what would cut the eyeball brought before it, the more the further on its way."""
+    result = shifts.copy()
+    for k, share in enumerate(smooth_step(np.abs(values) / CLOSED / FREED)):
+        result[k] += profile.lift(points, shifts[k]) * share
+    return result
+
+
+def bridged(
+    profile: Profile, surface: Surface, vertices: Int, shifts: Float64, margins: Bool, values: Float64
+) -> Float64:
+    """Shifts (K, N, 3) with vertices brought forwards where the edges from them would cut the eyeball."""
+    place = np.full(len(surface), -1)
+    place[vertices] = np.arange(len(vertices))
+    # a lid's inner side may run into the eyeball where nobody sees it
+    before = (place >= 0) & profile.before(surface.vertices)
+    edges = surface.edges[before[surface.edges].all(axis=1)]
+    # margins meet those of the other lid where they are
+    free = ~margins[edges]
+    local, points = place[edges], surface.vertices[vertices]
+    result = shifts.copy()
+    for k, share in enumerate(smooth_step(np.abs(values) / CLOSED / FREED)):
+        for _ in range(BRIDGINGS):
+            middles = points[local].mean(axis=1)
+            push = profile.lift(middles, result[k][local].mean(axis=1), edges=False)[:, 2]
+            # an edge may dip between ends that are outside; an end that is not pulls nothing along
+            push[~profile.before(points + result[k])[local].all(axis=1)] = 0.0
+            push = np.minimum(push, DEEPEST * profile.reach)
+            worst = np.zeros(len(vertices))
+            np.maximum.at(worst, local[free], np.repeat(2 * share * push, 2)[free.ravel()])
+            if not worst.any():
+                break
+            result[k, :, 2] += worst
+    return result

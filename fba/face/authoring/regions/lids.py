@@ -1,0 +1,151 @@
+"""Eyelids: FAPs 19-22. Every vertex of a lid stays in its own upright plane and turns about the eyeball.
+
+A lid closes column by column, each in proportion to its own opening, so that upper and lower margin meet
+along their whole length however the way is split between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.regions.lid_clearance import Profile, bridged, edge_length, freed
+from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.motion import Motion, limits
+from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, Opening, measure, slid
+from fba.face.authoring.surface.unfold import relaxed
+from fba.face.authoring.surface.motion_limits import guarded
+from fba.face.authoring.surface.weights import smooth_step, smoothed, without_hem
+from fba.face.model import Part
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+
+STEP = 128
+"""Values between two borders of the tables: an eighth of the way."""
+REACH = 0.6
+"""How far a lid pulls at the skin around it at most, in ES0."""
+CREASE = 0.11
+"""Distance from the margin to the crease in ES0, where its feature point is unknown."""
+FOLD = {
+    ("left", "upper"): "3.13",
+    ("right", "upper"): "3.14",
+    ("left", "lower"): "3.9",
+    ("right", "lower"): "3.10",
+}
+"""The feature points on the creases."""
+AT_CREASE = 0.25
+"""The crease goes this share of the margin's way."""
+ENDS = 3.5
+"""What is this many times as far away as the crease rests."""
+EDGE = 0.4
+"""The lid's edge, up to this share of the distance to the crease, goes as one."""
+FURTHER = 0.2
+"""The front edge of a lid may go this much further than the margin."""
+OWN_SIDE = 0.6
+"""What is closer to the other lid than this share of the way goes less and less with this one."""
+NARROW = 0.4
+"""At the corners of the eye distances shrink to this."""
+SMOOTHINGS = 4
+STILL = {
+    "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
+    "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
+}
+HEM = 0.006
+CORNER = 0.12
+"""So near the corners, as a share of the eye's width, a fold does not stop a lid."""
+
+
+def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Sequence[Part]) -> Motion | str:
+    """The motion of the surface, or why there is none."""
+    side, lid = LIDS[fap]
+    own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
+    if not len(own) or not len(other):
+        return f"the margin of the {side} {lid if not len(own) else _other(lid)} lid is not on the skin"
+    opening = measure(marks, eye)
+    if opening is None:
+        return f"the lids of the {side} eye are not one above the other"
+    share = _share(marks, opening, eye, lid, own, other)
+    vertices = np.flatnonzero(share > 0)
+    points = marks.surface.vertices[vertices]
+    values = lid_values(fap)
+    shifts = slid(points, share[vertices], opening, eye, lid, values / CLOSED)
+    profile = Profile(eye, parts, edge_length(marks, own, other))
+    shifts = freed(profile, points, shifts, values)
+    pinned = np.zeros(len(marks.surface), dtype=bool)
+    pinned[own] = pinned[other] = True
+    motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), pinned, True)
+    points = marks.surface.vertices[motion.vertices]
+    shifts = freed(profile, points, motion.shifts, values)
+    shifts = bridged(profile, marks.surface, motion.vertices, shifts, pinned, values)
+    motion = Motion(values, motion.vertices, shifts)
+    # in the corners skin closes on itself
+    margins = np.concatenate([own, other])
+    ends = marks.surface.vertices[own[[0, -1]]]
+    near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)
+    corners = margins[near < CORNER * np.linalg.norm(ends[1] - ends[0])]
+    return guarded(limiter.without(corners), motion, turning=True)
+
+
+def lid_values(fap: int) -> Float64:
+    """Borders: the range of the FAP, and in any case all of the way to the other lid."""
+    low, high = limits(fap)
+    high = max(high, float(CLOSED))
+    between = np.arange(np.ceil(low / STEP) * STEP, high + 1, STEP)
+    return np.unique(np.concatenate([[low, 0.0, high], between[(between > low) & (between < high)]]))
+
+
+def _other(lid: str) -> str:
+    return "lower" if lid == "upper" else "upper"
+
+
+def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Int, other: Int) -> Float64:
+    """(N,) how much each vertex goes with the margin of its column.
+
+    All of it on the lid's edge, a quarter at the crease, nothing well before the brow; towards the corners,
+    where the crease comes closer, within a shorter distance.
+    """
+    surface, es, side = marks.surface, marks.fapu.ES * 1024, eye.side
+    stays = np.setdiff1d(other, own)
+    still = [marks.vertex[name] for name in STILL[side] if marks.has(name)]
+    away = surface.distances(own, 2 * REACH * es)
+    crease = CREASE * es
+    if marks.has(FOLD[side, lid]):
+        crease = float(np.clip(away[marks.vertex[FOLD[side, lid]]], 0.5 * crease, 1.5 * crease))
+    gap = np.maximum(opening.upper[:, 0] - opening.lower[:, 0], 0.0)
+    high = np.interp(surface.vertices[:, 0], opening.x, gap / gap.max())
+    end = max(min(ENDS, 0.85 * float(away[still].min(initial=np.inf)) / crease), EDGE + 0.3)
+    folds = away / (crease * (NARROW + (1 - NARROW) * high))
+    power = np.log(AT_CREASE) / np.log(1 - (1 - EDGE) / (end - EDGE)) if end > 1 + EDGE else 2.0
+    share = np.clip((end - np.maximum(folds, EDGE)) / (end - EDGE), 0.0, 1.0) ** power
+    share *= 1 + _overhang(surface.vertices, opening, eye, lid, gap.max()) * np.clip(
+        2 - folds / EDGE, 0.0, 1.0
+    )
+    opposite = surface.distances(stays, 4 * REACH * es)
+    with np.errstate(invalid="ignore"):
+        share *= smooth_step(np.nan_to_num(opposite / (away + opposite), nan=1.0) / OWN_SIDE)
+    # walking along edges makes the distances uneven
+    pinned = np.zeros(len(surface), dtype=bool)
+    pinned[own] = pinned[stays] = True
+    share[own] = 1.0
+    share[stays] = 0.0
+    share = np.where(pinned, share, smoothed(surface, share, SMOOTHINGS))
+    return without_hem(share, HEM)
+
+
+def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:
+    """(N,) how much further than the margin the front edge of a lid must go to meet that of the other.
+
+    The margin lies on the eyeball; the front edge before it is further away from the other lid.
+    """
+    margin, sign = (opening.upper, 1.0) if lid == "upper" else (opening.lower, -1.0)
+    height, depth = (np.interp(points[:, 0], opening.x, margin[:, axis]) for axis in (0, 1))
+    gap = np.interp(points[:, 0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
+    before = points[:, 2] - eye.centre[2] > depth
+    back = np.maximum(sign * (points[:, 1] - eye.centre[1] - height), 0.0)
+    further = np.clip(2 * back / np.maximum(gap, 0.2 * widest), 0.0, FURTHER)
+    return np.where(before, further, 0.0)

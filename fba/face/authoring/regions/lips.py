@@ -1,0 +1,224 @@
+"""The lips: FAPs 4-13, 16, 17 (inner contour) and 51-60 (outer contour).
+
+Eight handles, each a pair of an inner and an outer point, spread smoothly along the lips and into the skin
+around them. The inner FAP moves what lies towards the inner contour, the outer FAP the rest; sent
+together, as they mostly are, they move the lip as a whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.surface.contours import shares
+from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.motion import Motion, limits
+from fba.face.authoring.surface.unfold import eased_field
+from fba.face.authoring.surface.motion_limits import (
+    caps,
+    goals,
+    guarded,
+    held_back,
+    knots,
+    linear,
+    values_between,
+)
+from fba.face.authoring.surface.weights import region, smooth_step, spread, without_hem
+from fba.face.points import DIRECTIONS
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+
+HANDLES = {
+    "left corner": ("2.4", "8.3"),
+    "upper left": ("2.6", "8.5"),
+    "upper middle": ("2.2", "8.1"),
+    "upper right": ("2.7", "8.6"),
+    "right corner": ("2.5", "8.4"),
+    "lower left": ("2.8", "8.7"),
+    "lower middle": ("2.3", "8.2"),
+    "lower right": ("2.9", "8.8"),
+}
+"""The inner and the outer feature point of each handle."""
+UPPER = ("left corner", "upper left", "upper middle", "upper right", "right corner")
+LOWER = ("left corner", "lower left", "lower middle", "lower right", "right corner")
+ALONG = {
+    6: {"left corner": 1.0, "upper left": 0.5, "lower left": 0.5},
+    7: {"right corner": 1.0, "upper right": 0.5, "lower right": 0.5},
+    16: {"lower middle": 1.0, "lower left": 0.8, "lower right": 0.8},
+    17: {"upper middle": 1.0, "upper left": 0.8, "upper right": 0.8},
+}
+"""FAPs that take more handles along than their own: a stretched lip keeps its points evenly spaced."""
+PUSH = (16, 17)
+OUTER_PUSH = 0.9
+"""How much of a push of the inner contour reaches the outer one, which has no such FAP."""
+LINES = ("upper inner lip", "lower inner lip", "upper outer lip", "lower outer lip")
+REACH = 0.75
+"""How far the lips pull at the face, in ES0."""
+REACH_INSIDE = 0.3
+STILL = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
+"""What the lips do not move."""
+SLACK = 0.25
+"""Distance in ES0 beyond which the skin does not spring back."""
+HEM = 0.006
+
+
+@dataclass(frozen=True, eq=False)
+class _Lips:
+    field: dict[str, Float64]
+    """(N,) by handle: how much each vertex goes with it."""
+    inward: Float64
+    """(N,) 1 on the inner contour and behind it, 0 on the outer contour and beyond."""
+
+
+def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
+    """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
+    numbers = [fap.number for fap in faps() if fap.group in (2, 8) and fap.number not in (3, 14, 15, 18)]
+    lost = {number: reason for number in numbers if (reason := _why_not(marks, number))}
+    if len(lost) == len(numbers):
+        return {}, lost
+    lips = _fields(marks)
+    found: dict[int, Motion] = {}
+    for number in numbers:
+        mate = faps()[number - 1].lip_mate
+        if number in lost or number in found:
+            continue
+        whole = _direction(marks, number)[None] * _whole(lips, number)[:, None]
+        if number in PUSH:
+            share = lips.inward + OUTER_PUSH * (1 - lips.inward)
+            found[number] = _linear(marks, limiter, whole * share[:, None], number)
+        elif mate is None or mate in lost:
+            share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
+            found[number] = _linear(marks, limiter, whole * share[:, None], number)
+        elif number < mate:
+            whole = eased_field(marks.surface, limiter, whole, goals(number), marks.on(*LINES))
+            inward = lips.inward[:, None]
+            pair = _coupled(limiter, whole * inward, whole * (1 - inward), number)
+            found[number], found[mate] = pair
+    return found, lost
+
+
+def _why_not(marks: Landmarks, number: int) -> str:
+    point = faps()[number - 1].feature_points[0]
+    if not marks.has(point):
+        return f"feature point {point} is not on the skin"
+    inner = faps()[number - 1].group == 2
+    side = "inner" if inner else "outer"
+    if not marks.has(*(("2.4", "2.5") if inner else ("8.3", "8.4"))):
+        return f"a corner of the {side} lip contour is not on the skin"
+    needed = [name for name in ("upper", "lower") if not len(marks.contour(f"{name} {side} lip"))]
+    if needed:
+        return f"there is no {needed[0]} {side} lip contour"
+    own = next(pair for pair in HANDLES.values() if point in pair)
+    if not inner and marks.vertex.get(own[0]) == marks.vertex[point]:
+        return f"feature point {point} stands on the same vertex as {own[0]}, which the inner lip's FAP moves"
+    if inner and marks.vertex.get("2.2") == marks.vertex.get("2.3") and marks.has("2.2"):
+        return "the mouth has no opening: upper and lower lip are one"
+    return ""
+
+
+def _direction(marks: Landmarks, number: int) -> Float64:
+    fap = faps()[number - 1]
+    return np.array(DIRECTIONS[fap.positive]) * marks.fapu[fap.unit]
+
+
+def _whole(lips: _Lips, number: int) -> Float64:
+    along = ALONG.get(number) or ALONG.get(faps()[number - 1].lip_mate or 0)
+    point = faps()[number - 1].feature_points[0]
+    own = next(name for name, pair in HANDLES.items() if point in pair)
+    total = np.zeros(len(lips.inward))
+    for name, share in (along or {own: 1.0}).items():
+        total += lips.field[name] * share
+    return total
+
+
+def _fields(marks: Landmarks) -> _Lips:
+    names = list(HANDLES)
+    size = len(marks.surface)
+    values = np.full((size, len(names)), np.nan)
+    for side, which in (("inner", 0), ("outer", 1)):
+        for half, handles in (("upper", UPPER), ("lower", LOWER)):
+            walk = marks.contour(f"{half} {side} lip")
+            if len(walk):
+                nodes = [marks.vertex.get(HANDLES[name][which]) for name in handles]
+                values[walk] = 0.0
+                values[walk[:, None], [names.index(name) for name in handles]] = shares(
+                    marks.surface.vertices, walk, nodes
+                )
+    for name, pair in HANDLES.items():
+        for point in pair:
+            if marks.has(point) and not np.isnan(values[marks.vertex[point], 0]):
+                # where one contour runs through a point of the other, the point comes first
+                values[marks.vertex[point]] = np.array(names) == name
+    fixed = np.flatnonzero(~np.isnan(values[:, 0]))
+    es = marks.fapu.ES * 1024
+    near = marks.surface.distances(fixed, limit=2 * REACH * es)
+    still = [marks.vertex[name] for name in STILL if marks.has(name)]
+    far = marks.surface.distances(still, limit=4 * REACH * es)
+    free = region(near, far, REACH * es)
+    free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
+    solved = spread(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
+    field = {name: without_hem(solved[:, k], HEM) for k, name in enumerate(names)}
+    return _Lips(field, _inward(marks))
+
+
+def _inward(marks: Landmarks) -> Float64:
+    inner = marks.on_inner_lips | marks.inside_mouth
+    outer = marks.on("upper outer lip", "lower outer lip") & ~marks.on_inner_lips
+    for inner_point, outer_point in HANDLES.values():
+        if marks.has(outer_point) and marks.vertex[outer_point] != marks.vertex.get(inner_point):
+            inner[marks.vertex[outer_point]] = False
+            outer[marks.vertex[outer_point]] = True
+    if not outer.any():
+        return np.ones(len(marks.surface))
+    if not inner.any():
+        return np.zeros(len(marks.surface))
+    fixed = np.flatnonzero(inner | outer)
+    field = spread(
+        marks.surface, marks.lips, fixed, inner[fixed][:, None].astype(np.float64), slack=1.0, harmonic=True
+    )
+    return smooth_step(field[:, 0])
+
+
+def _linear(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:
+    vertices = np.flatnonzero(np.abs(field).max(axis=1) > 0)
+    return linear(marks.surface, limiter, vertices, field[vertices], fap, marks.on(*LINES))
+
+
+def _coupled(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:
+    """Motions of an inner and an outer FAP whose sum stays straight although each alone has its limit.
+
+    Where one contour has come as close to the other as the skin between them can take, it stops, and
+    from there on the other one, moving away, takes it along.
+    """
+    low, high = limits(fap)
+    vertices = np.flatnonzero((np.abs(inner) + np.abs(outer)).max(axis=1) > 0)
+    triangles = limiter.touched(vertices)
+    most = {}
+    for sign, end, cap in zip((-1.0, 1.0), (low, high), caps(fap), strict=True):
+        reach = [
+            float(limiter.reach(sign * f, triangles).min(initial=np.inf))
+            for f in (inner, outer, inner + outer)
+        ]
+        together = min(cap, np.inf if 0.98 * reach[2] >= abs(end) else max(reach[2], 1.0))
+        apart = min(reach[0], reach[1])
+        most[sign] = (together, np.inf if 0.98 * apart >= abs(end) else max(apart, 1.0), reach[0] <= reach[1])
+    bends = []
+    for sign, end in ((-1.0, low), (1.0, high)):
+        for limit in most[sign][:2]:
+            bends += [sign * bend for bend in knots(limit, abs(end))]
+    values = values_between(low, high, *bends)
+    moves: list[list[Float64]] = [[], []]
+    for value in values:
+        together, apart, inner_stops = most[1.0 if value > 0 else -1.0]
+        joint = held_back(value, together)
+        ahead = held_back(joint, apart)
+        stops, goes = (inner, outer) if inner_stops else (outer, inner)
+        alone, taking = ahead * stops, joint * goes + (joint - ahead) * stops
+        for place, shift in zip(moves, (alone, taking) if inner_stops else (taking, alone), strict=True):
+            place.append(shift[vertices])
+    motions = [guarded(limiter, Motion(values, vertices, np.array(shifts))) for shifts in moves]
+    return motions[0], motions[1]

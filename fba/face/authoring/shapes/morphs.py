@@ -1,0 +1,125 @@
+"""From a mesh with shapes (the 52 of ARKit, or one a FAP) to a face model whose FAPs use them.
+
+How far each shape moves each feature point is measured; for each group of FAPs that shapes move together
+(a brow, a lip) and each direction the shapes are mixed so that its points move as the standard wants and
+the others least. What is left over at the points is taken away with the tables that `author` makes of the
+mesh alone, so every point moves exactly as far as its FAP says, and between the points the sculptor's
+shapes show.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy.typing as npt
+
+from fba.errors import FbaWarning
+from fba.face.authoring.author import author
+from fba.face.authoring.shapes.mixing import GROUPS, Mixer, guarded_tables
+from fba.face.authoring.shapes.shape_names import canonical, fap_of
+from fba.face.authoring.shapes.shapes import Morphs, Shapes
+from fba.face.expressions import Definitions
+from fba.face.model import FaceModel, Part
+from fba.face.tables import FaceDefTables
+from fba.parameters import faps
+
+if TYPE_CHECKING:
+    from fba.face.interpolation.table import InterpolationTable
+
+FEWEST_FAPS = 5
+"""With so many shapes named after FAPs, the names are taken at their word."""
+ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
+"""FAPs whose points move on arcs, or as bodies: jaw, lids, eyeballs, tongue, head. A shape is straight;
+it serves them only where the mesh alone cannot."""
+STANDING_IN = {
+    3: ("jawOpen", "mouthClose"),
+    19: ("eyeBlinkLeft",),
+    20: ("eyeBlinkRight",),
+    45: ("tongueOut",),
+}
+"""Shapes that serve a FAP where the mesh alone cannot."""
+
+
+def from_morphs(
+    parts: Sequence[Part],
+    points: npt.ArrayLike,
+    morphs: Morphs,
+    *,
+    bound: npt.ArrayLike | None = None,
+    name: str = "",
+    definitions: Definitions | None = None,
+    fit: InterpolationTable | None = None,
+    notes: Mapping[str, str] | None = None,
+) -> FaceModel:
+    """A face whose tables come from named shapes as far as these reach, from the mesh alone beyond.
+
+    parts, points, bound, name, definitions, fit, notes: as `author`. morphs: displacements float32
+    (V, 3), metres, at weight 1, by the name of the shape and of the part; shapes are named as ARKit's
+    blendshapes (synonyms: `arkit.csv`) or as FAPs. Others are left aside.
+
+    FAPs that neither serves are in `lost`. Raises ModelError as `author`, and where displacements do not
+    fit their part.
+    """
+    base = author(parts, points, bound=bound, name=name, definitions=definitions, fit=fit, notes=notes)
+    by_fap = {number: shape for shape in morphs if (number := fap_of(shape)) is not None}
+    if len(by_fap) >= FEWEST_FAPS:
+        return _from_faps(base, Shapes(base, {shape: morphs[shape] for shape in by_fap.values()}), by_fap)
+    known = canonical(morphs)
+    shapes = Shapes(base, {shape: morphs[written] for shape, written in known.items()})
+    if not shapes.halves:
+        if morphs:
+            warnings.warn(
+                f"none of the {len(morphs)} shapes is named after one of ARKit's blendshapes or a FAP "
+                f"({', '.join(sorted(morphs)[:4])}); the tables are made from the mesh alone",
+                FbaWarning,
+                stacklevel=2,
+            )
+        return base
+    return _from_arkit(base, shapes)
+
+
+def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
+    mixer = Mixer(base, shapes)
+    tables: dict[int, FaceDefTables] = dict(base.table_of)
+    used: set[str] = set()
+    for group in GROUPS:
+        made, names = mixer.tables(group)
+        tables |= made
+        used |= names
+    lost = dict(base.lost)
+    for fap, wanted in STANDING_IN.items():
+        if fap in lost and wanted[0] in shapes.morphs:
+            table = mixer.standing_in(fap, [shape for shape in wanted if shape in shapes.morphs])
+            if table is not None:
+                tables[fap] = table
+                used |= set(wanted) & set(shapes.morphs)
+                del lost[fap]
+    said = {
+        **base.notes,
+        "shapes": f"of {len(shapes.morphs)} ARKit shapes used: {', '.join(sorted(used)) or 'none'}",
+    }
+    return replace(base, tables=tuple(tables.values()), lost=lost, notes=said)
+
+
+def _from_faps(base: FaceModel, shapes: Shapes, by_fap: Mapping[int, str]) -> FaceModel:
+    """Shapes that show one FAP each, at the values at which this project's files show them."""
+    from fba.face.gltf.morphs import morph_values
+
+    tables: dict[int, FaceDefTables] = dict(base.table_of)
+    lost = dict(base.lost)
+    for fap, shape in by_fap.items():
+        if fap in ARCS and fap in tables:
+            continue
+        step = shapes.whole(shape) / morph_values()[fap]
+        made = guarded_tables(base, fap, step, step)
+        if made is not None:
+            tables[fap] = made
+            lost.pop(fap, None)
+    said = {
+        **base.notes,
+        "shapes": f"{len(by_fap)} shapes named after FAPs, such as {faps()[min(by_fap) - 1].name}",
+    }
+    return replace(base, tables=tuple(tables.values()), lost=lost, notes=said)

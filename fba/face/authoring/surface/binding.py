@@ -1,0 +1,210 @@
+"""Which vertex each feature point stands on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.authoring.surface.surface import Surface
+from fba.face.feature_points import names, row_of
+from fba.face.model import Part
+
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+FREE_POINTS = ("7.1", "11.5")
+"""Points that lie inside the head or above the skin."""
+KINDS_OF_GROUP = {6: ("tongue",)}
+KINDS_OF_POINT = {
+    **dict.fromkeys(("3.5", "3.6"), ("eye",)),
+    **dict.fromkeys(("9.8", "9.9", "9.10", "9.11"), ("teeth",)),
+}
+SURFACE_KINDS = ("skin", "mouth")
+"""Kinds of parts that together make the one surface that FAPs deform."""
+TOLERANCE = 0.15
+"""A point may lie this far from its part, as a share of the face's size."""
+LIP_SLACK = 0.02
+"""Between lips that touch the right one may be this much further away, as a share of the face's size."""
+JAW_OF_TEETH = {"9.8": 1, "9.10": 1, "9.9": -1, "9.11": -1}
+UPPER_LIP, LOWER_LIP = ("2.2", "2.6", "2.7"), ("2.3", "2.8", "2.9")
+
+
+@dataclass(frozen=True)
+class Binding:
+    """points: float64 (84, 3), on their vertices where bound. bound: int32 (84,), -1 where free.
+    far: points that are too far from what they should stand on, with the distance in metres.
+    """
+
+    points: Float64
+    bound: Int32
+    far: dict[str, float]
+
+
+def face_size(points: Float64) -> float:
+    """A length to measure by: the spread of the known feature points."""
+    known = points[np.isfinite(points).all(axis=1)]
+    if len(known) < 2:
+        raise ModelError(
+            f"only {len(known)} of the {len(points)} feature points are known: nothing to make tables from"
+        )
+    return float(np.linalg.norm(known.max(axis=0) - known.min(axis=0))) / 2
+
+
+def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | None) -> Binding:
+    """Bind feature points to the nearest vertices of the parts that they belong to.
+
+    bound: vertices chosen by the caller, -1 where the nearest is to be taken. Raises ModelError where
+    most points are nowhere near the mesh, or a chosen vertex does not exist.
+    """
+    size = face_size(points)
+    given = np.full(len(points), -1) if bound is None else np.array(bound)
+    total = sum(len(part.vertices) for part in parts)
+    if given.shape != (len(points),) or given.dtype.kind not in "iu":
+        raise ModelError(f"bound vertices must be {len(points)} whole numbers, -1 for none")
+    if (given >= total).any() or (given < -1).any():
+        row = int(np.argwhere((given >= total) | (given < -1))[0, 0])
+        raise ModelError(
+            f"feature point {names()[row]} is bound to vertex {given[row]}, but there are {total}"
+        )
+    vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
+    found = given.astype(np.int32)
+    far: dict[str, float] = {}
+    pieces = cache(lambda: _pieces(parts, KINDS_OF_POINT["9.8"]))
+    sought = [name for name in names() if found[row_of()[name]] < 0 and name not in FREE_POINTS]
+    for name in sought:
+        row = row_of()[name]
+        pool = pool_of(parts, kinds_of(name))
+        if np.isnan(points[row]).any() or not len(pool):
+            continue
+        away = np.linalg.norm(vertices[pool] - points[row], axis=1)
+        nearest = int(away.argmin())
+        if name in JAW_OF_TEETH:
+            nearest = _in_jaw(vertices[pool], pieces(), away, JAW_OF_TEETH[name], LIP_SLACK * size)
+        if away[nearest] > TOLERANCE * size:
+            far[name] = float(away[nearest])
+        else:
+            found[row] = pool[nearest]
+    tried = [name for name in names() if np.isfinite(points[row_of()[name]]).all()]
+    if len(far) > len(tried) / 2 and len(far) > 3:
+        worst = max(far, key=lambda name: far[name])
+        raise ModelError(
+            f"{len(far)} of {len(tried)} feature points are far from the mesh, {worst} by {far[worst]:g} m: "
+            "do points and mesh have the same unit and axes?"
+        )
+    placed = points.copy()
+    held = found >= 0
+    placed[held] = vertices[found[held]]
+    return Binding(placed, found, far)
+
+
+def part_lips(
+    surface: Surface, parts: Sequence[Part], points: Float64, binding: Binding, size: float
+) -> Binding:
+    """The same, where points of one lip that had got hold of the other lip let go of it.
+
+    Lips touch, so the nearest vertex may be on the wrong one; walking tells them apart.
+    """
+    found, row = binding.bound.copy(), row_of()
+    outer = [int(found[row[name]]) for name in ("8.1", "8.2")]
+    if min(outer) < 0:
+        return binding
+    pool = pool_of(parts, SURFACE_KINDS)
+    number = np.full(len(found) if not len(pool) else int(pool.max()) + 1, -1, dtype=np.intp)
+    number[pool] = surface.number
+    walk = [surface.distances([number[vertex]], limit=2 * size) for vertex in outer]
+    places = surface.vertices[number[pool]]
+    for lip, other, group in ((walk[0], walk[1], UPPER_LIP), (walk[1], walk[0], LOWER_LIP)):
+        right = lip < other
+        for name in group:
+            vertex, place = int(found[row[name]]), points[row[name]]
+            if vertex < 0 or right[number[vertex]] or np.isnan(place).any():
+                continue
+            away = np.linalg.norm(places - place, axis=1)
+            away[~right[number[pool]]] = np.inf
+            nearest = int(away.argmin())
+            current = float(np.linalg.norm(surface.vertices[number[vertex]] - place))
+            if away[nearest] <= current + LIP_SLACK * size:
+                found[row[name]] = pool[nearest]
+    vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
+    placed = binding.points.copy()
+    held = found >= 0
+    placed[held] = vertices[found[held]]
+    return Binding(placed, found, binding.far)
+
+
+def _pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:
+    """Connected piece of each vertex of the parts of some kinds."""
+    found, count = [np.zeros(0, dtype=np.intp)], 0
+    for part in parts:
+        if part.kind in kinds:
+            own = Surface([part])
+            found.append(own.component[own.number] + count)
+            count += int(own.component.max(initial=-1)) + 1
+    return np.concatenate(found)
+
+
+def _in_jaw(vertices: Float64, piece: npt.NDArray[np.intp], away: Float64, jaw: int, slack: float) -> int:
+    """Of the vertices that are nearest within some slack, the nearest of the highest or lowest piece.
+
+    Teeth touch, so the nearest vertex may be in the wrong jaw. jaw: 1 upper, -1 lower.
+    """
+    close = np.flatnonzero(away <= away.min() + slack)
+    height = jaw * (np.bincount(piece, vertices[:, 1]) / np.maximum(np.bincount(piece), 1))[piece[close]]
+    right = close[height >= height.max() - slack]
+    return int(right[away[right].argmin()])
+
+
+def lip_sides(
+    surface: Surface, parts: Sequence[Part], points: Float64, bound: Int32
+) -> npt.NDArray[np.intp] | None:
+    """(V,) of the skin's vertices: 1 for those of the upper lip, 2 of the lower, 0 elsewhere.
+
+    None but where the mouth is a slit whose two edges lie on each other, so that they were taken for a
+    seam and joined.
+    """
+    row = row_of()
+    pool = pool_of(parts, SURFACE_KINDS)
+    number = np.full(int(pool.max(initial=-1)) + 1, -1, dtype=np.intp)
+    number[pool] = surface.number
+    line = [int(bound[row[name]]) for name in ("2.4", "2.2", "2.5")]
+    if min(line) < 0:
+        return None
+    left, middle, right = (int(number[vertex]) for vertex in line)
+    walk = np.concatenate([surface.path(left, middle), surface.path(middle, right)])
+    walk = np.setdiff1d(walk, [left, right])
+    skins = [part for part in parts if part.kind in SURFACE_KINDS]
+    starts = np.cumsum([0, *(len(part.vertices) for part in skins)])
+    heights, counts = np.zeros(starts[-1]), np.zeros(starts[-1])
+    for part, start in zip(skins, starts, strict=False):
+        middles = part.vertices[part.triangles, 1].astype(np.float64).mean(axis=1)
+        own = part.triangles.astype(np.intp) + start
+        heights += np.bincount(own.ravel(), np.repeat(middles, 3), len(heights))
+        counts += np.bincount(own.ravel(), minlength=len(counts))
+    above = heights / np.maximum(counts, 1) > surface.vertices[surface.number, 1]
+    on_line = np.isin(surface.number, walk) & (counts > 0)
+    both = np.intersect1d(surface.number[on_line & above], surface.number[on_line & ~above])
+    if len(both) < len(walk) / 2 or not len(both):
+        return None
+    return np.where(np.isin(surface.number, both), np.where(above, 1, 2), 0).astype(np.intp)
+
+
+def kinds_of(name: str) -> tuple[str, ...]:
+    """Kinds of parts that a feature point can stand on."""
+    if name in KINDS_OF_POINT:
+        return KINDS_OF_POINT[name]
+    return KINDS_OF_GROUP.get(int(name.split(".", maxsplit=1)[0]), SURFACE_KINDS)
+
+
+def pool_of(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:
+    """Vertices of the parts of some kinds, counted through all parts."""
+    start, found = 0, [np.zeros(0, dtype=np.intp)]
+    for part in parts:
+        if part.kind in kinds:
+            found.append(np.arange(start, start + len(part.vertices)))
+        start += len(part.vertices)
+    return np.concatenate(found)

@@ -1,0 +1,163 @@
+"""The feature points and contours of a face on its surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.surface.binding import SURFACE_KINDS, lip_sides, pool_of
+from fba.face.authoring.surface.surface import Surface
+from fba.face.fapu import Fapu
+from fba.face.feature_points import names, neutral_points, row_of
+from fba.face.model import Part
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+Bool = npt.NDArray[np.bool_]
+
+CONTOURS = {
+    "upper inner lip": ("2.4", "2.6", "2.2", "2.7", "2.5"),
+    "lower inner lip": ("2.4", "2.8", "2.3", "2.9", "2.5"),
+    "upper outer lip": ("8.3", "8.5", "8.10", "8.1", "8.9", "8.6", "8.4"),
+    "lower outer lip": ("8.3", "8.7", "8.2", "8.8", "8.4"),
+    "left upper lid": ("3.11", "3.1", "3.7"),
+    "left lower lid": ("3.11", "3.3", "3.7"),
+    "right upper lid": ("3.8", "3.2", "3.12"),
+    "right lower lid": ("3.8", "3.4", "3.12"),
+    "jaw line": ("2.13", "2.11", "2.1", "2.12", "2.14"),
+}
+"""Lines on the face by the feature points that they run through."""
+OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
+"""Those about an opening, which in many meshes is a hole."""
+
+
+@dataclass(eq=False)
+class Landmarks:
+    """Where things are on one face.
+
+    surface: skin and inner mouth. points: (84, 3), NaN where unknown. vertex: surface vertex by name of
+    the feature point, for those that stand on the surface. fapu: the units.
+    """
+
+    surface: Surface
+    points: Float64
+    vertex: dict[str, int]
+    fapu: Fapu
+    _contours: dict[str, Int] = field(default_factory=dict)
+
+    def place(self, name: str) -> Float64:
+        """Where a feature point is, NaN where unknown."""
+        place: Float64 = self.points[row_of()[name]]
+        return place
+
+    def has(self, *wanted: str) -> bool:
+        """Whether all these feature points stand on the surface."""
+        return all(name in self.vertex for name in wanted)
+
+    def contour(self, name: str) -> Int:
+        """Vertices along a contour, corner to corner; empty unless both ends and one point between exist."""
+        if name not in self._contours:
+            self._contours[name] = self._walk(CONTOURS[name], rim=name in OPENINGS)
+        return self._contours[name]
+
+    def _walk(self, through: tuple[str, ...], *, rim: bool) -> Int:
+        known = [self.vertex[name] for name in through if name in self.vertex]
+        if len(known) < 3 or not self.has(through[0], through[-1]):
+            return np.zeros(0, dtype=np.intp)
+        walk: list[int] = [known[0]]
+        for start, end in pairwise(known):
+            on_rim = bool(self.surface.open_edge[[start, end]].all())
+            step = self.surface.path(start, end, rim=rim and on_rim)
+            if not len(step):
+                return np.zeros(0, dtype=np.intp)
+            walk += step[1:].tolist()
+        return np.array(walk, dtype=np.intp)
+
+    @cached_property
+    def inside_mouth(self) -> Bool:
+        """(N,) vertices behind the inner lips: what the inner lips cut off from the nose."""
+        return self._cut_off(("upper inner lip", "lower inner lip"))
+
+    @cached_property
+    def lips(self) -> Bool:
+        """(N,) vertices between the outer contour and the inner one, both excluded."""
+        return (
+            self._cut_off(("upper outer lip", "lower outer lip")) & ~self.inside_mouth & ~self.on_inner_lips
+        )
+
+    @cached_property
+    def on_inner_lips(self) -> Bool:
+        """(N,) vertices of the inner contour."""
+        return self.on("upper inner lip", "lower inner lip")
+
+    def on(self, *contours: str) -> Bool:
+        """(N,) vertices of some contours."""
+        mask = np.zeros(len(self.surface), dtype=bool)
+        for name in contours:
+            mask[self.contour(name)] = True
+        return mask
+
+    def _cut_off(self, contours: tuple[str, ...]) -> Bool:
+        nothing = np.zeros(len(self.surface), dtype=bool)
+        loop = np.unique(np.concatenate([self.contour(name) for name in contours]))
+        if any(not len(self.contour(name)) for name in contours):
+            return nothing
+        pieces = self.surface.pieces_without(loop)
+        outside = [
+            self.vertex[name] for name in ("9.3", "9.15", "2.1", "2.10", "11.1", "4.1") if self.has(name)
+        ]
+        if not outside:
+            return nothing
+        main = self.surface.component == self.surface.component[loop[0]]
+        return np.asarray(main & (pieces >= 0) & ~np.isin(pieces, pieces[outside]))
+
+    @cached_property
+    def guessed(self) -> Float64:
+        """(84, 3): every point; those unknown put where they are in an average adult's head.
+
+        The average is stretched along each axis and moved to fit the known points.
+        """
+        average = np.array(neutral_points())
+        known = np.isfinite(self.points).all(axis=1)
+        result = self.points.copy()
+        for axis in range(3):
+            here, there = self.points[known, axis], average[known, axis]
+            spread = float(np.ptp(there))
+            scale = float(np.cov(here, there)[0, 1] / np.var(there, ddof=1)) if spread > 1e-3 else 1.0
+            guess = (average[:, axis] - there.mean()) * scale + here.mean()
+            result[~known, axis] = guess[~known]
+        return result
+
+    def guess(self, name: str) -> Float64:
+        """Where a point is, or where it would be in an average head."""
+        place: Float64 = self.guessed[row_of()[name]]
+        return place
+
+
+def landmarks(surface: Surface, points: Float64, bound: npt.NDArray[np.int32], pool: Int) -> Landmarks:
+    """pool: for each vertex that the surface was made of, its number counted through all parts."""
+    number = np.full(int(max(pool.max(initial=-1), bound.max(initial=-1))) + 1, -1, dtype=np.intp)
+    number[pool] = surface.number
+    vertex = {
+        name: int(number[held])
+        for name, held in zip(names(), bound.tolist(), strict=True)
+        if held >= 0 and number[held] >= 0
+    }
+    return Landmarks(surface, points, vertex, Fapu.measure(points))
+
+
+def surface_of(parts: Sequence[Part], points: Float64, bound: npt.NDArray[np.int32]) -> tuple[Surface, Int]:
+    """(surface, pool): skin and inner mouth as one surface, and its vertices counted through all parts.
+
+    A mouth that is a slit, its edges on each other, stays open.
+    """
+    skins = [part for part in parts if part.kind in SURFACE_KINDS]
+    pool = pool_of(parts, SURFACE_KINDS)
+    surface = Surface(skins)
+    sides = lip_sides(surface, parts, points, bound)
+    return (surface if sides is None else Surface(skins, sides)), pool

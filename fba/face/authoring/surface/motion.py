@@ -1,0 +1,86 @@
+"""What one FAP does, in metres at chosen values; the last step before FaceDefMesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.surface.surface import Surface
+from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+
+STILL = 2e-6
+"""Metres: vertices that never move further are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Vertices on their way as a FAP goes through some values.
+
+    values: (K,) rising FAP values, one of them 0. vertices: (N,). shifts: (K, N, 3), metres from the
+    neutral face at each value, all zero where the value is 0.
+    """
+
+    values: Float64
+    vertices: Int
+    shifts: Float64
+
+    def at(self, value: float) -> Float64:
+        """(N, 3): shifts at a value; beyond the outermost values nothing moves any more."""
+        x = float(np.clip(value, self.values[0], self.values[-1]))
+        k = int(np.clip(np.searchsorted(self.values, x) - 1, 0, len(self.values) - 2))
+        share = (x - self.values[k]) / (self.values[k + 1] - self.values[k])
+        result: Float64 = self.shifts[k] * (1 - share) + self.shifts[k + 1] * share
+        return result
+
+
+def limits(fap: int) -> tuple[float, float]:
+    """Smallest and largest value that a stream can carry with the finest quantiser step."""
+    entry = faps()[fap - 1]
+    assert entry.i_limits is not None
+    low, high = entry.i_limits
+    return float(low * entry.step), float(high * entry.step)
+
+
+def by_part(surface: Surface, motion: Motion) -> dict[str, Motion]:
+    """A motion of the surface as motions of the parts that it was made of."""
+    place = np.full(len(surface), -1)
+    place[motion.vertices] = np.arange(len(motion.vertices))
+    result = {}
+    for name, number in surface.members:
+        own = np.flatnonzero(place[number] >= 0)
+        if len(own):
+            result[name] = Motion(motion.values, own, motion.shifts[:, place[number[own]]])
+    return result
+
+
+def tables(
+    fap: int, unit: float, motions: Mapping[str, Motion], transforms: Iterable[FaceDefTransform] = ()
+) -> FaceDefTables:
+    """FaceDefTables of one FAP. unit: metres a step. motions: by name of the part."""
+    meshes = [mesh for name, motion in motions.items() if (mesh := _mesh(name, motion, unit)) is not None]
+    return FaceDefTables(fap, tuple(meshes), tuple(transforms))
+
+
+def _mesh(part: str, motion: Motion, unit: float) -> FaceDefMesh | None:
+    moving = (np.abs(motion.shifts).max(axis=(0, 2)) > STILL) if len(motion.vertices) else np.zeros(0, bool)
+    if not moving.any():
+        return None
+    borders = np.round(motion.values).astype(np.int64)
+    slopes = np.diff(motion.shifts[:, moving], axis=0) / np.diff(borders)[:, None, None] / unit
+    # past the outermost value nothing moves any more, whatever a stream asks for
+    flat = np.zeros((1, *slopes.shape[1:]))
+    borders = np.concatenate([[borders[0] - 1], borders, [borders[-1] + 1]])
+    slopes = np.concatenate([flat, slopes, flat])
+    return FaceDefMesh(
+        part,
+        borders.astype(np.int32),
+        motion.vertices[moving].astype(np.int32),
+        slopes.swapaxes(0, 1).astype(np.float32),
+    )

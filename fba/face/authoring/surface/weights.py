@@ -1,0 +1,107 @@
+"""Smooth fields on a surface that take given values at some vertices and vanish outside a region."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.authoring.surface.surface import Surface
+
+Float64 = npt.NDArray[np.float64]
+Int = npt.NDArray[np.intp]
+Bool = npt.NDArray[np.bool_]
+
+
+def spread(
+    surface: Surface, free: Bool, fixed: Int, values: Float64, *, slack: float, harmonic: bool = False
+) -> Float64:
+    """Fields that are as smooth as a bent plate between what is given: (N, K).
+
+    free: (N,) vertices whose value is sought; all others that are not fixed keep 0, and the field runs
+    out towards them without a kink. fixed: (M,) vertices with given values (M, K). slack: metres; over
+    distances longer than this the plate behaves like a stretched cloth, which does not overshoot.
+    harmonic: a cloth throughout, between the smallest and the largest given value everywhere.
+    """
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import splu
+
+    given = np.zeros(len(surface), dtype=bool)
+    given[fixed] = True
+    laplacian, areas = surface.laplacian
+    field = np.zeros((len(surface), values.shape[1]))
+    field[fixed] = values
+    sought = np.flatnonzero(free & ~given)
+    if not len(sought):
+        return field
+    near = np.flatnonzero((abs(laplacian) @ (free | given).astype(np.float64)) > 0)
+    local = laplacian[near][:, near]
+    system = local
+    if not harmonic:
+        # on the rim of the crop the rows of L are cut short, but only two rings further in do they matter
+        rows = laplacian[near]
+        system = rows @ diags_array(1 / areas) @ rows.T + local / slack**2
+    inside = np.searchsorted(near, sought)
+    held = np.setdiff1d(np.arange(len(near)), inside)
+    right = -(system[inside][:, held] @ field[near[held]])
+    try:
+        solved = splu(system[inside][:, inside].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right)
+    except (RuntimeError, MemoryError) as error:
+        raise ModelError(
+            f"the skin around vertices {sought[:3].tolist()}... gives no smooth field: {error}; "
+            "are there vertices or triangles listed twice?"
+        ) from None
+    field[sought] = np.nan_to_num(solved)
+    return field
+
+
+def region(near: Float64, far: Float64, reach: float, share: float = 0.8) -> Bool:
+    """(N,) vertices walked to within `reach` that are not most of the way to what must stay.
+
+    near: distances from what moves. far: distances from what stays.
+    """
+    with np.errstate(invalid="ignore"):
+        return (near < reach) & (near < share * (near + far))
+
+
+def smooth_step(x: Float64) -> Float64:
+    """0 below 0, 1 above 1, level at both."""
+    t = np.clip(x, 0.0, 1.0)
+    result: Float64 = t * t * (3 - 2 * t)
+    return result
+
+
+def without_hem(field: Float64, hem: float) -> Float64:
+    """A field with what is below `hem` taken off, 1 staying 1: far vertices that barely move rest."""
+    result: Float64 = np.sign(field) * np.maximum(np.abs(field) - hem, 0.0) / (1 - hem)
+    return result
+
+
+def smoothed(surface: Surface, field: Float64, rounds: int) -> Float64:
+    """A field averaged with that of the neighbours, some rounds."""
+    graph = surface.graph.astype(bool).astype(np.float64)
+    count = np.maximum(graph.sum(axis=1), 1)
+    result = field
+    for _ in range(rounds):
+        result = 0.5 * result + 0.5 * (graph @ result) / count
+    return result
+
+
+def through(surface: Surface, field: Float64, targets: Int, length: float) -> Float64:
+    """A field (N,) that some vertices share with skin near them as the crow flies, up to `length` metres.
+
+    What lies behind moving skin, such as the inside of a nostril, goes along with it.
+    """
+    from scipy.spatial import cKDTree
+
+    sources = np.flatnonzero(field > 0.02)
+    result = field.copy()
+    if not len(sources) or not len(targets):
+        return result
+    tree, goal = cKDTree(surface.vertices[sources]), cKDTree(surface.vertices[targets])
+    pairs = tree.sparse_distance_matrix(goal, length, output_type="ndarray")
+    lifted = field[sources][pairs["i"]] * (1 - (pairs["v"] / length) ** 2) ** 2
+    best = np.zeros(len(targets))
+    np.maximum.at(best, pairs["j"], lifted)
+    result[targets] = np.maximum(field[targets], best)
+    return result

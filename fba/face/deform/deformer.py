@@ -1,0 +1,266 @@
+"""FAPs -> vertices: a face model moved as its FaceDefTables say.
+
+ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import RangeError
+from fba.face.deform.subset import ChosenVertices
+from fba.face.deform.normals import Surface, surface
+from fba.face.deform.flat_tables import (
+    VALUE_MAX,
+    Shifts,
+    all_vertices,
+    bound_points,
+    flat_shifts,
+    flat_transforms,
+)
+from fba.face.feature_points import names
+from fba.face.model import FaceModel
+from fba.mesh.meshes import result_array
+from fba.parameters import FAP_COUNT, faps
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+BLOCK = 64
+"""Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
+
+
+class DeformerTables(NamedTuple):
+    """The vertices of a `Deformer`."""
+
+    part_start: Int64
+    """(P + 1,) where its parts begin."""
+    shifts: Shifts
+    surface: Surface
+
+
+class FaceMotion(NamedTuple):
+    """A face in one pose: see `fba.face.deform.subset_loops.motion_of_parts`."""
+
+    tracks: Float32
+    """(M, 4)"""
+    poses: Float32
+    """(P, 6, 4)"""
+
+
+class Deformer:
+    """Moves a face: `Deformer(model)(faps)` gives its vertices.
+
+    1. Every FAP that is not 0 moves the vertices of its FaceDefMesh along their piecewise linear paths,
+       by value x FAPU; what several FAPs do to a vertex adds up.
+    2. Then each part gets its own transforms, about the centres given, which stay where they are:
+       translations . rotations . scales, the outermost first, as in a Transform node. Of several
+       rotations (or scales) that of the lower FAP is further out, so an eye's yaw (23, 24) stands around
+       its pitch (25, 26); only the head's pitch is innermost, so that the head turns by
+       yaw . roll . pitch (49 . 50 . 48). Of one FAP's, the one listed first is further out.
+    3. Then all parts together get the transforms of `HEAD`, nested in the same way.
+
+    A rotation turns by value x FAPU x amount (radians about each axis), a translation shifts by that
+    much, a scale makes each axis 1 + value x FAPU x amount times as long.
+
+    The model's tables are copied into flat arrays; later calls allocate nothing but their result. A
+    Deformer may be used by several threads, one after the other; for speed give each its own.
+    Raises ModelError for displacements too large for 32-bit floats.
+    """
+
+    def __init__(self, model: FaceModel) -> None:
+        # numba is imported here, with the first face that moves
+        from fba.face.deform import loops
+
+        self.model = model
+        self._loops = loops
+        sizes = [len(part.vertices) for part in model.parts]
+        self._part_start: Int64 = np.cumsum([0, *sizes], dtype=np.int64)
+        self._shifts = flat_shifts(model, all_vertices(model), np.float32)
+        self._transforms = flat_transforms(model)
+        moved = np.zeros(len(model.vertices), dtype=bool)
+        moved[self._shifts.rows] = True
+        self._surface = surface(model, moved)
+        self._scratch = loops.Scratch(
+            moved=np.empty_like(model.vertices),
+            touched=np.zeros(len(sizes), dtype=np.int64),
+            poses=np.empty((len(sizes) + 1, 3, 4)),
+            whole=np.empty((3, 4)),
+            pose=np.empty((3, 4), dtype=np.float32),
+            turn=np.empty((3, 3), dtype=np.float32),
+        )
+        self._point_shifts = flat_shifts(model, bound_points(model), np.float64)
+        self._owner = _owners(model)
+        self._lock = threading.Lock()
+
+    def __call__(
+        self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
+    ) -> Float32:
+        """Vertices of all parts in order, the head turned: float32 (V, 3), metres, for FAPs (68,), or
+        (T, V, 3) for (T, 68).
+
+        faps: numbers of any type, as `resolve` gives them, in the units of the standard; columns 0 and 1
+        (viseme, expression) do nothing. out: written to and returned. normals: filled with the unit
+        normals, made anew from the triangles that the FAPs move, smooth across the seams of a part. Both
+        float32, C-contiguous, of the result's shape.
+
+        Raises ValueError for another shape or type, RangeError for FAPs that are not finite or do not
+        fit 32 bits.
+        """
+        return self._run(faps, out, normals, with_head=True)
+
+    def local(
+        self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
+    ) -> Float32:
+        """Like calling, but in the frame of the head: the transforms of `HEAD` left out."""
+        return self._run(faps, out, normals, with_head=False)
+
+    def chosen(self, rows: npt.NDArray[np.intp]) -> ChosenVertices:
+        """Some vertices of the face, rows (N,), rising: moved alone, in a fraction of the time."""
+        return ChosenVertices(
+            self.model.vertices, self._part_start, self._shifts, self._transforms, np.asarray(rows)
+        )
+
+    @property
+    def tables(self) -> DeformerTables:
+        """What it knows of its vertices, for those that move them by other means."""
+        return DeformerTables(self._part_start, self._shifts, self._surface)
+
+    def motion(self, faps: npt.ArrayLike) -> FaceMotion:
+        """What FAPs (68,) do to any vertices, in the frame of the head. Errors as when called."""
+        values, _ = _frames(faps)
+        tracks = np.empty((len(self._shifts.column), 4), dtype=np.float32)
+        poses = np.empty((len(self.model.parts), 6, 4), dtype=np.float32)
+        from fba.face.deform.subset_loops import motion_of_parts
+
+        with np.errstate(all="ignore"):
+            motion_of_parts(values[0], self._shifts, self._transforms, tracks, poses)
+        return FaceMotion(tracks, poses)
+
+    def head_matrices(self, faps: npt.ArrayLike) -> Float64:
+        """How the head is turned: float64 (4, 4) for FAPs (68,), (T, 4, 4) for (T, 68).
+
+        For column vectors: `calling = matrix . local`. Errors as when called.
+        """
+        values, single = _frames(faps)
+        matrices = self._poses(values)[:, -1]
+        return matrices[0] if single else matrices
+
+    def part_matrices(self, faps: npt.ArrayLike) -> Float64:
+        """How each part is turned, sized and shifted within the head: float64 (P, 4, 4) for FAPs (68,),
+        (T, P, 4, 4) for (T, 68), in the order of `model.parts`.
+
+        The matrix of an eyeball takes it from its neutral place, looking ahead, to where it looks now,
+        in the frame of the head: `head_matrices . part_matrices` is its way into the room. Parts
+        without transforms have the identity; what FaceDefMesh does is not in it. Errors as when called.
+        """
+        values, single = _frames(faps)
+        matrices = self._poses(values)[:, :-1]
+        return matrices[0] if single else matrices
+
+    def feature_points(self, faps: npt.ArrayLike, *, local: bool = False) -> Float64:
+        """The feature points, moved: float64 (84, 3) for FAPs (68,), (T, 84, 3) for (T, 68), metres.
+
+        A point bound to a vertex moves with it. Others move with the transforms of the part that they
+        belong to: a pupil with the nearest eye, points of tongue and teeth with the nearest part of
+        that kind, the rest with the head alone. Points that the face lacks stay NaN. local: without the
+        head's turn. Errors as when called.
+        """
+        values, single = _frames(faps)
+        points: Float64 = np.empty((len(values), len(names()), 3))
+        with np.errstate(all="ignore"):
+            self._loops.points_of_frames(
+                values,
+                self.model.points,
+                self._owner,
+                self._point_shifts,
+                self._transforms,
+                not local,
+                points,
+            )
+        return points[0] if single else points
+
+    def _poses(self, values: Float64) -> Float64:
+        matrices = np.zeros((len(values), len(self.model.parts) + 1, 4, 4))
+        matrices[..., 3, 3] = 1
+        top = np.empty((*matrices.shape[:2], 3, 4))
+        self._loops.poses_of_frames(values, self._transforms, top)
+        matrices[..., :3, :] = top
+        return matrices
+
+    def _run(
+        self, faps: npt.ArrayLike, out: Float32 | None, normals: Float32 | None, *, with_head: bool
+    ) -> Float32:
+        values, single = _frames(faps)
+        count = len(self.model.vertices)
+        shape = (count, 3) if single else (len(values), count, 3)
+        out = result_array(shape, out, normals)
+        placed = out[None] if single else out
+        upright = placed[:0] if normals is None else normals[None] if single else normals
+        with self._lock, np.errstate(all="ignore"):
+            for start in range(0, len(values), BLOCK):
+                stop = start + BLOCK
+                self._loops.deform_frames(
+                    values[start:stop],
+                    self.model.vertices,
+                    self._part_start,
+                    self._shifts,
+                    self._transforms,
+                    self._surface,
+                    self._scratch,
+                    with_head,
+                    placed[start:stop],
+                    upright[start:stop],
+                )
+        return out
+
+
+def _frames(values: npt.ArrayLike) -> tuple[Float64, bool]:
+    """FAPs as float64 (T, 68), and whether they were one frame (68,)."""
+    array = np.asarray(values)
+    if array.ndim not in {1, 2} or array.shape[-1] != FAP_COUNT:
+        raise ValueError(f"FAPs must have shape ({FAP_COUNT},) or (T, {FAP_COUNT}), not {array.shape}")
+    if array.dtype.kind not in "iufb":
+        raise ValueError(f"FAPs must be real numbers, not {array.dtype}")
+    frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, FAP_COUNT)
+    if frames.size and not (frames.min() >= -VALUE_MAX - 1 and frames.max() <= VALUE_MAX):
+        good = (frames >= -VALUE_MAX - 1) & (frames <= VALUE_MAX)
+        frame, column = (int(place) for place in np.argwhere(~good)[0])
+        value = frames[frame, column]
+        raise RangeError(
+            f"{value:g} cannot be shown; FAPs are finite and fit 32 bits",
+            parameter=f"FAP {column + 1} {faps()[column].name}",
+            value=int(value) if np.isfinite(value) else None,
+            limits=(-VALUE_MAX - 1, VALUE_MAX),
+            frame=frame if array.ndim == 2 else None,
+        )
+    return frames, array.ndim == 1
+
+
+POINT_KINDS = {"3.5": "eye", "3.6": "eye", "6": "tongue", "9.8": "teeth", "9.9": "teeth", "9.10": "teeth",
+               "9.11": "teeth"}  # fmt: skip
+"""The kind of part that feature points, or groups of them, belong to where they stand on no vertex."""
+
+
+def _owners(model: FaceModel) -> Int64:
+    """(84,): the part whose transforms move each feature point, -1 for the head alone."""
+    owner = np.full(len(names()), -1, dtype=np.int64)
+    ends = np.cumsum([len(part.vertices) for part in model.parts])
+    for row, name in enumerate(names()):
+        if model.bound[row] >= 0:
+            owner[row] = np.searchsorted(ends, model.bound[row], side="right")
+            continue
+        kind = POINT_KINDS.get(name) or POINT_KINDS.get(name.split(".")[0])
+        away = {
+            number: float(np.linalg.norm(part.vertices - model.points[row], axis=1).min())
+            for number, part in enumerate(model.parts)
+            if part.kind == kind and len(part.vertices)
+        }
+        if away and not np.isnan(model.points[row]).any():
+            owner[row] = min(away, key=lambda number: away[number])
+    return owner

@@ -1,0 +1,73 @@
+"""How parts look that bring no colours of their own: skin, teeth, tongue, and eyes with an iris."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.eyeball import sphere
+from fba.face.feature_points import row_of
+from fba.face.importers.assembly.pieces import Piece
+from fba.face.model import Material, Part
+
+Float64 = npt.NDArray[np.float64]
+
+LOOKS = {
+    "skin": Material("skin", (0.71, 0.47, 0.36), 0.55),
+    "mouth": Material("mouth", (0.35, 0.10, 0.09), 0.4),
+    "teeth": Material("teeth", (0.83, 0.80, 0.72), 0.25),
+    "tongue": Material("tongue", (0.55, 0.16, 0.15), 0.4),
+    "brow": Material("brow", (0.06, 0.04, 0.03), 0.8),
+    "lash": Material("lashes", (0.02, 0.015, 0.01), 0.8),
+    "hair": Material("hair", (0.06, 0.04, 0.03), 0.6),
+    "eye": Material("eye", (0.80, 0.78, 0.75), 0.1),
+}
+"""Materials by kind of part."""
+WHITE, IRIS, PUPIL = (0.80, 0.78, 0.75), (0.16, 0.09, 0.05), (0.004, 0.004, 0.004)
+GREY = 0.03
+"""Colours whose channels differ less are none: what programs write who were told of no colour."""
+
+
+def with_looks(pieces: Sequence[Piece], points: Float64) -> list[Piece]:
+    """The pieces, those without texture and colour with a usual one; irises are drawn on white eyes.
+
+    points: (84, 3), in the same frame.
+    """
+    result = []
+    for piece in pieces:
+        part = piece.part
+        if part.material.texture is None and part.colours is None and _plain(part.material):
+            material = LOOKS.get(part.kind, part.material)
+            part = replace(part, material=material)
+            if part.kind == "eye":
+                part = _with_iris(part, points)
+        result.append(replace(piece, part=part))
+    return result
+
+
+def _plain(material: Material) -> bool:
+    return max(material.colour) - min(material.colour) < GREY and min(material.colour) > 0.5
+
+
+def _with_iris(part: Part, points: Float64) -> Part:
+    """An iris as wide as the lids are apart, its pupil a third of it: the standard's neutral eye."""
+    side = "left" if "left" in part.name else "right"
+    pupil = points[row_of()["3.5" if side == "left" else "3.6"]]
+    lids = ("3.1", "3.3") if side == "left" else ("3.2", "3.4")
+    wide = float(points[row_of()[lids[0]], 1] - points[row_of()[lids[1]], 1])
+    ball = sphere(part)
+    if ball is None or not np.isfinite(pupil).all() or not wide > 0:
+        return part
+    arm = pupil - ball[0]
+    way = arm / max(float(np.linalg.norm(arm)), 1e-9)
+    away = part.vertices - ball[0]
+    along = away @ way
+    off = np.linalg.norm(away - np.outer(along, way), axis=1)
+    colours = np.tile(np.array([*WHITE, 0.9], dtype=np.float32), (len(part.vertices), 1))
+    front = along > 0
+    colours[front & (off < wide / 2), :3] = IRIS
+    colours[front & (off < wide / 6), :3] = PUPIL
+    return replace(part, colours=colours)

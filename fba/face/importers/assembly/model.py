@@ -1,0 +1,121 @@
+"""The last step of every importer: metres, axes, origin, parts of their kinds, and tables."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError, OptionError
+from fba.face.feature_points import names, row_of
+from fba.face.importers.assembly.default_materials import with_looks
+from fba.face.importers.assembly.pieces import Piece, assembled, moved
+from fba.face.importers.assembly.units import metres_per_unit, pupil_distance
+from fba.face.importers.assembly.winding import outward
+from fba.face.model import FaceModel
+
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
+"""Which way is up in a file -> rows that bring it to +x left, +y up, +z forward. z-up faces look to -y."""
+FREE = ("7.1", "11.5")
+EYES = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
+
+
+def turned(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
+    """Pieces and points of a file whose vertical axis is "y" or "z", with y up."""
+    if up not in AXES:
+        raise OptionError(f"up must be one of {', '.join(AXES)}, not {up!r}")
+    if up == "y":
+        return list(pieces), points
+    matrix = np.array(AXES[up], dtype=np.float64)
+    result = []
+    for piece in pieces:
+        part = piece.part
+        normals = None if part.normals is None else (part.normals @ matrix.T).astype(np.float32)
+        part = replace(part, vertices=(part.vertices @ matrix.T).astype(np.float32), normals=normals)
+        morphs = {name: (morph @ matrix.T).astype(np.float32) for name, morph in piece.morphs.items()}
+        result.append(replace(piece, part=part, morphs=morphs))
+    return result, points @ matrix.T
+
+
+def finished(
+    pieces: Sequence[Piece],
+    points: Float64,
+    vertices: Mapping[str, int],
+    *,
+    path: str | os.PathLike[str],
+    unit: float | None = None,
+    up: str = "y",
+    kinds: Mapping[str, str] | None = None,
+    name: str | None = None,
+    notes: Mapping[str, str] | None = None,
+) -> FaceModel:
+    """A face from the pieces of a file and its feature points, both in the file's unit.
+
+    vertices: numbers of the vertices in the file that points stand on. The face comes to metres, its
+    origin between the pupils. Pieces with shapes get tables measured from them.
+    """
+    if not pieces:
+        raise ModelError(f"{os.fspath(path)}: there are no triangles in it")
+    pieces, points = turned(pieces, points, up)
+    size, how = metres_per_unit(points, unit)
+    pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
+    middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else 0.0
+    origin = pupils.mean(axis=0) if np.isfinite(pupils).all() else np.zeros(3)
+    parts = [moved(piece, size, -origin * size) for piece in assembled(pieces, kinds, middle=middle)]
+    # a point in the middle of the head, behind the pupils or the lids
+    eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
+    parts, over = outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
+    placed = (points - origin) * size
+    parts = with_looks(parts, placed)
+    bound = bound_by_number(parts, vertices)
+    everything = np.concatenate([piece.part.vertices for piece in parts]).astype(np.float64)
+    placed[bound >= 0] = everything[bound[bound >= 0]]
+    said = {"source": Path(path).name, "unit": how, **(notes or {})}
+    if over:
+        said["triangles"] = f"{over} turned to face outwards"
+    return authored(parts, placed, bound, name=name or Path(path).stem, notes=said)
+
+
+def authored(
+    pieces: Sequence[Piece], points: Float64, bound: Int32, *, name: str, notes: Mapping[str, str]
+) -> FaceModel:
+    """Tables from the shapes of the pieces where they have some, else from the mesh alone."""
+    parts = tuple(piece.part for piece in pieces)
+    # with no vertex given, the nearest are sought, upper and lower lip told apart
+    held = bound if (bound >= 0).any() else None
+    shapes = sorted({shape for piece in pieces for shape in piece.morphs})
+    if shapes:
+        from fba.face.authoring.shapes.morphs import from_morphs
+
+        morphs = {
+            shape: {piece.part.name: piece.morphs[shape] for piece in pieces if shape in piece.morphs}
+            for shape in shapes
+        }
+        return from_morphs(parts, points, morphs, bound=held, name=name, notes=notes)
+    from fba.face.authoring import author
+
+    return author(parts, points, bound=held, name=name, notes=notes)
+
+
+def bound_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:
+    """int32 (84,): vertices counted through the parts, by their numbers in the file; -1 for others."""
+    bound = np.full(len(names()), -1, dtype=np.int32)
+    first: dict[int, int] = {}
+    start = 0
+    for piece in pieces:
+        if len(piece.origin):
+            numbers, where = np.unique(piece.origin, return_index=True)
+            for number, place in zip(numbers.tolist(), where.tolist(), strict=True):
+                first.setdefault(number, start + place)
+        start += len(piece.part.vertices)
+    for name, vertex in vertices.items():
+        if name not in FREE and vertex in first:
+            bound[row_of()[name]] = first[vertex]
+    return bound

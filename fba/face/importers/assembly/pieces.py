@@ -1,0 +1,257 @@
+"""From the pieces of a mesh file to the parts of a face: kinds, eyes left and right, skin joined."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.importers.assembly.kinds import DROPPED, checked_kinds, kind_of
+from fba.face.importers.assembly.components import shell_labels
+from fba.face.model import Part
+
+Float32 = npt.NDArray[np.float32]
+Int32 = npt.NDArray[np.int32]
+Bool = npt.NDArray[np.bool_]
+
+EYE_ROUND = 0.1
+"""Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
+EYE_SIZES = (0.02, 0.12)
+"""Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A piece of a mesh file, not yet a part.
+
+    part: name and geometry; its kind does not count before `assembled`. material: the material's name in
+    the file. origin: int32 (V,), its vertices' numbers in the file, -1 where they have none. morphs:
+    float32 (V, 3) displacements by the name of a shape.
+    """
+
+    part: Part
+    material: str = ""
+    origin: Int32 = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    morphs: Mapping[str, Float32] = field(default_factory=dict)
+
+
+def assembled(
+    pieces: Sequence[Piece], kinds: Mapping[str, str] | None = None, *, middle: float = 0.0
+) -> tuple[Piece, ...]:
+    """Parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and lower.
+
+    kinds: what the user says, by the name of a group, object, mesh or material. middle: the x of the
+    plane between left and right. Where no name tells, round shells in pairs are eyes and the largest
+    piece is skin. Raises ModelError where nothing is left.
+    """
+    chosen = checked_kinds(kinds)
+    guessed: list[tuple[Piece, str | None]] = []
+    for piece in pieces:
+        kind = chosen.get(piece.part.name, chosen.get(piece.material))
+        if kind is None:
+            kind = kind_of(piece.part.name, piece.material)
+        if kind != DROPPED:
+            guessed.append((piece, kind))
+    if not guessed:
+        raise ModelError("no part of the mesh is left: all are named as transparent shells of the eye")
+    unknown = [piece for piece, kind in guessed if kind is None or kind == "skin"]
+    if not any(kind == "eye" for _, kind in guessed):
+        known = {id(piece): kind for piece, kind in guessed}
+        guessed = [pair for pair in guessed if pair[1] is not None and pair[1] != "skin"]
+        guessed += _with_eyes(unknown, known, middle)
+    if not any(kind == "skin" for _, kind in guessed):
+        largest = max((len(p.part.vertices) for p, kind in guessed if kind is None), default=0)
+        guessed = [
+            (p, "skin" if kind is None and len(p.part.vertices) == largest else kind) for p, kind in guessed
+        ]
+    return _joined_by_kind([(p, kind or "other") for p, kind in guessed], middle)
+
+
+def moved(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
+    """The piece scaled, then shifted."""
+    vertices = piece.part.vertices.astype(np.float64) * scale + np.asarray(shift)
+    part = replace(piece.part, vertices=vertices.astype(np.float32))
+    return replace(piece, part=part, morphs={name: m * np.float32(scale) for name, m in piece.morphs.items()})
+
+
+def _with_eyes(
+    pieces: Sequence[Piece], kinds: Mapping[int, str | None], middle: float
+) -> list[tuple[Piece, str | None]]:
+    """Round shells in mirrored pairs taken out of pieces as eyes."""
+    from fba.face.eyeball import sphere
+
+    if not pieces:
+        return []
+    heights = np.concatenate([piece.part.vertices[:, 1] for piece in pieces])
+    tall = max(float(np.ptp(heights)), 1e-9)
+    round_: list[tuple[int, int, npt.NDArray[np.float64], float]] = []
+    labels = [
+        shell_labels(piece.part.triangles, len(piece.part.vertices), piece.part.vertices) for piece in pieces
+    ]
+    for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
+        sizes = np.bincount(label)
+        for shell in np.flatnonzero((sizes >= 20) & (sizes < len(heights) / 2))[:500]:
+            found = sphere(_cut(piece, label == shell, f"shell {shell}").part)
+            if found is None:
+                continue
+            centre, radius, error, share = found
+            if error < EYE_ROUND * radius and share > 0.5 and EYE_SIZES[0] < radius / tall < EYE_SIZES[1]:
+                round_.append((number, int(shell), centre, radius))
+    eyes: set[tuple[int, int]] = set()
+    for a in round_:
+        mirror = a[2] * (-1, 1, 1) + (2 * middle, 0, 0)
+        if any(b[:2] != a[:2] and np.linalg.norm(b[2] - mirror) < 0.5 * a[3] for b in round_):
+            eyes.add(a[:2])
+    result: list[tuple[Piece, str | None]] = []
+    for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
+        mask = np.isin(label, [shell for which, shell in eyes if which == number])
+        if mask.any():
+            result.append((_cut(piece, mask, f"{piece.part.name} eyes"), "eye"))
+        if not mask.all():
+            rest = _cut(piece, ~mask, piece.part.name) if mask.any() else piece
+            result.append((rest, kinds[id(piece)]))
+    return result
+
+
+def _joined_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
+    found: list[Piece] = []
+
+    def add(kind: str, name: str, chosen: Sequence[Piece]) -> None:
+        if chosen:
+            found.append(_joined(chosen, name, kind))
+
+    def of(kind: str) -> list[Piece]:
+        return [piece for piece, each in pieces if each == kind]
+
+    add("skin", "skin", of("skin"))
+    for kind, left, right in (
+        ("eye", "left eye", "right eye"),
+        ("brow", "left brow", "right brow"),
+        ("lash", "left lashes", "right lashes"),
+    ):
+        add(kind, left, _side(of(kind), lambda centre: centre[0] > middle))
+        add(kind, right, _side(of(kind), lambda centre: centre[0] <= middle))
+    teeth = of("teeth")
+    if teeth:
+        levels = np.concatenate([piece.part.vertices[:, 1] for piece in teeth])
+        between = float(levels.min() + levels.max()) / 2
+        add("teeth", "upper teeth", _side(teeth, lambda centre: centre[1] > between))
+        add("teeth", "lower teeth", _side(teeth, lambda centre: centre[1] <= between))
+    for kind in ("tongue", "mouth"):
+        add(kind, kind, of(kind))
+    taken = {piece.part.name for piece in found}
+    for piece, kind in pieces:
+        if kind in ("hair", "other"):
+            name, count = piece.part.name, 1
+            while name in taken:
+                count += 1
+                name = f"{piece.part.name} {count}"
+            taken.add(name)
+            found.append(replace(piece, part=replace(piece.part, name=name, kind=kind)))
+    return tuple(found)
+
+
+def _side(pieces: Sequence[Piece], wanted: Callable[[npt.NDArray[np.float64]], bool]) -> list[Piece]:
+    """Of each piece the shells whose middle lies on the wanted side."""
+    result = []
+    for piece in pieces:
+        vertices = piece.part.vertices
+        label = shell_labels(piece.part.triangles, len(vertices), vertices)
+        mask = np.zeros(len(vertices), dtype=np.bool_)
+        for shell in range(int(label.max()) + 1):
+            inside = label == shell
+            box = vertices[inside].astype(np.float64)
+            mask[inside] = wanted((box.min(axis=0) + box.max(axis=0)) / 2)
+        if mask.any():
+            result.append(piece if mask.all() else _cut(piece, mask, piece.part.name))
+    return result
+
+
+def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
+    """The vertices of a mask, with the triangles that have all corners among them."""
+    part = piece.part
+    number = np.cumsum(mask) - 1
+    triangles = number[part.triangles[mask[part.triangles].all(axis=1)]].astype(np.int32)
+
+    def chosen(array: Float32 | None) -> Float32 | None:
+        return None if array is None else array[mask]
+
+    cut = Part(
+        name,
+        part.kind,
+        part.vertices[mask],
+        triangles,
+        chosen(part.normals),
+        chosen(part.texcoords),
+        chosen(part.colours),
+        part.material,
+    )
+    return Piece(
+        cut,
+        piece.material,
+        piece.origin[mask] if len(piece.origin) else piece.origin,
+        {shape: morph[mask] for shape, morph in piece.morphs.items()},
+    )
+
+
+def _joined(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
+    """Several pieces as one part; the largest gives the texture, the others' colours become vertices'."""
+    if len(pieces) == 1:
+        return replace(pieces[0], part=replace(pieces[0].part, name=name, kind=kind))
+    parts = [piece.part for piece in pieces]
+    main = max(parts, key=lambda part: len(part.vertices))
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    plain = all(part.colours is None and part.material.colour == main.material.colour for part in parts)
+    shapes = {shape for piece in pieces for shape in piece.morphs}
+    same_texture = [
+        part.texcoords is not None and part.material.texture == main.material.texture for part in parts
+    ]
+    material = main.material
+    if not plain:
+        material = replace(material, colour=(1.0, 1.0, 1.0))
+    joined = Part(
+        name,
+        kind,
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.triangles + start for part, start in zip(parts, starts[:-1], strict=True)]),
+        np.concatenate([part.normals for part in parts if part.normals is not None]),
+        np.concatenate(
+            [
+                part.texcoords
+                if part.texcoords is not None and same
+                else np.zeros((len(part.vertices), 2), np.float32)
+                for part, same in zip(parts, same_texture, strict=True)
+            ]
+        )
+        if main.texcoords is not None
+        else None,
+        None if plain else np.concatenate([_colours(part) for part in parts]),
+        material,
+    )
+    return Piece(
+        joined,
+        pieces[0].material,
+        np.concatenate(
+            [
+                piece.origin if len(piece.origin) else np.full(len(piece.part.vertices), -1, dtype=np.int32)
+                for piece in pieces
+            ]
+        ),
+        {
+            shape: np.concatenate(
+                [piece.morphs.get(shape, np.zeros_like(piece.part.vertices)) for piece in pieces]
+            )
+            for shape in sorted(shapes)
+        },
+    )
+
+
+def _colours(part: Part) -> Float32:
+    own = np.ones((len(part.vertices), 4), np.float32) if part.colours is None else part.colours.copy()
+    own[:, :3] *= np.array(part.material.colour, dtype=np.float32)
+    if part.colours is None:
+        own[:, 3] = 1.0 - part.material.roughness
+    return own

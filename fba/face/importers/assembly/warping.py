@@ -1,0 +1,73 @@
+"""The adult head's feature points, bent to those that were found on another head."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
+from fba.face.importers.assembly.pieces import Piece
+
+Float64 = npt.NDArray[np.float64]
+
+ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
+LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")
+"""Points that are not used to bend the others."""
+FREE = ("7.1", "11.5")
+"""Points that stand on no surface."""
+SMOOTHING = 0.1
+"""How little the bending minds single points: some lie at one place on the adult head, apart on another."""
+
+
+def warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
+    """All points: the adult head's, bent to those found, each then on the nearest surface of its kind."""
+    from scipy.interpolate import RBFInterpolator
+    from scipy.spatial import cKDTree
+
+    from fba.face.authoring.surface.binding import kinds_of
+
+    row, adult = row_of(), neutral_points()
+    known = dict(found)
+    middle = (known["3.5"] + known["3.6"])[0] / 2
+    for left, right in MIRRORED.items():
+        if (left in known) != (right in known):
+            have, lack = (left, right) if left in known else (right, left)
+            known[lack] = known[have] * (-1, 1, 1) + (2 * middle, 0, 0)
+    # pupils lie behind the lids or before them, as the iris is made; they say nothing of the skin
+    held = [name for name in known if name not in LOCAL]
+    scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
+    source = np.array([adult[row[name]] for name in held])
+    target = np.array([known[name] for name in held]) / scale
+    warp = RBFInterpolator(source, target, kernel="linear", degree=1, smoothing=SMOOTHING)
+    points: Float64 = warp(adult) * scale
+    centre = points[[row["3.5"], row["3.6"], row["7.1"]]].mean(axis=0)
+    trees = {}
+    for name in names():
+        if name in known:
+            points[row[name]] = known[name]
+        if name in FREE:
+            continue
+        # what was found is a vertex, or lies on the profile between some
+        pool = (*kinds_of(name), ROWS.get(name, ""), str(name in known))
+        if pool not in trees:
+            fit = [piece for piece in pieces if piece.part.kind in kinds_of(name)]
+            fit = [piece for piece in fit if piece.part.name == ROWS.get(name, piece.part.name)]
+            chosen = [
+                piece.part.vertices.astype(np.float64) if name in known else _outside(piece, centre)
+                for piece in fit
+            ]
+            trees[pool] = cKDTree(np.concatenate(chosen)) if chosen else None
+        tree = trees[pool]
+        points[row[name]] = np.nan if tree is None else tree.data[tree.query(points[row[name]])[1]]
+    return points
+
+
+def _outside(piece: Piece, centre: Float64) -> Float64:
+    """Vertices of a part that look away from the middle of the head: not those of sockets and throat."""
+    vertices = piece.part.vertices.astype(np.float64)
+    if piece.part.kind != "skin" or piece.part.normals is None:
+        return vertices
+    looks = np.einsum("ij,ij->i", vertices - centre, piece.part.normals)
+    return vertices[looks > 0] if (looks > 0).any() else vertices

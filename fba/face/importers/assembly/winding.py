@@ -1,0 +1,98 @@
+"""Triangles that all face the same way, outwards."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.importers.assembly.pieces import Piece
+
+Int32 = npt.NDArray[np.int32]
+Bool = npt.NDArray[np.bool_]
+Float64 = npt.NDArray[np.float64]
+
+
+def outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece], int]:
+    """The pieces with the skin facing away from the centre of the head, and how many triangles turned.
+
+    Within the skin, triangles that run against their neighbours are turned first. When the skin was
+    inside out the other pieces are taken to be so too.
+    """
+    result: list[Piece] = []
+    turned, over = 0, False
+    for piece in pieces:
+        if piece.part.kind == "skin":
+            wrong = _against(piece.part.triangles)
+            triangles = _flipped(piece.part.triangles, wrong)
+            vertices = piece.part.vertices.astype(np.float64)
+            inside_out = float(_facing(vertices, triangles, centre).sum()) < 0
+            over |= inside_out
+            wrong = ~wrong if inside_out else wrong
+            turned += int(wrong.sum())
+            result.append(_turned(piece, wrong) if wrong.any() else piece)
+        else:
+            result.append(piece)
+    if over:
+        for number, piece in enumerate(result):
+            if piece.part.kind != "skin":
+                result[number] = _turned(piece, np.ones(len(piece.part.triangles), dtype=np.bool_))
+                turned += len(piece.part.triangles)
+    return result, turned
+
+
+def _turned(piece: Piece, wrong: Bool) -> Piece:
+    # normals of the file went with the wrong sides: they are made anew
+    part = replace(piece.part, triangles=_flipped(piece.part.triangles, wrong), normals=None)
+    return replace(piece, part=part)
+
+
+def _flipped(triangles: Int32, wrong: Bool) -> Int32:
+    return np.where(wrong[:, None], triangles[:, ::-1], triangles)
+
+
+def _facing(vertices: Float64, triangles: Int32, centre: Float64) -> Float64:
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), (a + b + c) / 3 - centre))
+
+
+def _against(triangles: Int32) -> Bool:
+    """bool (F,): triangles that must turn so that neighbours agree, the fewer of each connected lot."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    count = len(triangles)
+    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    face = np.repeat(np.arange(count), 3)
+    forward = ends[:, 0] < ends[:, 1]
+    key = np.minimum(ends[:, 0], ends[:, 1]) << 32 | np.maximum(ends[:, 0], ends[:, 1])
+    order = np.argsort(key, kind="stable")
+    key, face, forward = key[order], face[order], forward[order]
+    first = np.flatnonzero(key[1:] == key[:-1])
+    # an edge of three or more triangles says nothing of sides
+    crowd = np.zeros(len(key) + 1, dtype=np.bool_)
+    triple = np.flatnonzero(key[2:] == key[:-2])
+    crowd[triple] = crowd[triple + 1] = True
+    first = first[~crowd[first]]
+    if not len(first):
+        return np.zeros(count, dtype=np.bool_)
+    a, b = face[first], face[first + 1]
+    clash = forward[first] == forward[first + 1]
+    if not clash.any():
+        return np.zeros(count, dtype=np.bool_)
+    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count)).tocsr()
+    clashes = {(int(x), int(y)) for x, y in zip(a[clash], b[clash], strict=True)}
+    total, label = connected_components(graph, directed=False)
+    wrong = np.zeros(count, dtype=np.bool_)
+    for lot in np.unique(label[np.concatenate([a[clash], b[clash]])]) if total else ():
+        start = int(np.flatnonzero(label == lot)[0])
+        walk, before = breadth_first_order(graph, start, directed=False)
+        for here in walk[1:]:
+            there = int(before[here])
+            against = (there, int(here)) in clashes or (int(here), there) in clashes
+            wrong[here] = wrong[there] ^ against
+        if wrong[walk].sum() > len(walk) / 2:
+            wrong[walk] = ~wrong[walk]
+    return wrong

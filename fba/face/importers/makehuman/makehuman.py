@@ -1,0 +1,272 @@
+"""MakeHuman's base mesh: the head and neck of it, with eyes, teeth, tongue, lashes and feature points.
+
+Users point it at a copy of their own (the files are CC0). `makehuman.csv` says which vertices of the base
+mesh "hm08" are the feature points, `makehuman_cuts.csv` where head and neck end, where the sockets behind
+the eyeballs are cut off and where the inside of the mouth begins. The base mesh is in decimetres, +x the
+subject's left, +y up, +z forward.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError, Remedy
+from fba.face.feature_points import row_of
+from fba.mesh.text_files import beside, whole
+from fba.face.importers.assembly.default_materials import LOOKS
+from fba.face.importers.makehuman.mhclo import fitted
+from fba.mesh.obj import read_obj
+from fba.mesh.polygons import Polygons, Source, make_part
+from fba.face.model import FaceModel, Material, Part
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+Bool = npt.NDArray[np.bool_]
+
+METRES = 0.1
+"""Metres per unit of the base mesh."""
+VERTICES = 19158
+"""How many vertices the base mesh hm08 has."""
+CROWN, PALATE = 881, 656
+"""Vertices of the head and of the inside of the mouth."""
+EYES = "high-poly.mhclo"
+"""The eyes that are fitted where they lie beside the base mesh; else its helper eyes are taken."""
+
+HELPERS = (
+    ("upper teeth", "teeth", ("helper-upper-teeth",)),
+    ("lower teeth", "teeth", ("helper-lower-teeth",)),
+    ("tongue", "tongue", ("helper-tongue",)),
+    ("left lashes", "lash", ("helper-l-eyelashes-1", "helper-l-eyelashes-2")),
+    ("right lashes", "lash", ("helper-r-eyelashes-1", "helper-r-eyelashes-2")),
+)
+"""Name, kind, groups of the base mesh."""
+
+
+@dataclass(frozen=True, eq=False)
+class MakeHumanHead:
+    """The head of a base mesh, before it gets tables.
+
+    folder: where it lies. base: the whole base mesh, in decimetres. sources: the parts and which vertex of
+    the base mesh each of theirs is (-1 for eyes fitted from a file of their own). points: float64
+    (84, 3), metres; bound: int32 (84,), vertices counted through the parts. shift: metres, what was
+    added to bring the origin between the pupils.
+    """
+
+    folder: Path
+    base: Polygons
+    sources: tuple[Source, ...]
+    points: Float64
+    bound: Int32
+    shift: Float64
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts alone."""
+        return tuple(source.part for source in self.sources)
+
+
+def makehuman_parts(path: str | os.PathLike[str]) -> tuple[tuple[Part, ...], Float64, Int32]:
+    """Parts, feature points (84, 3) in metres and bound vertices (84,) of a MakeHuman base mesh.
+
+    path: its `base.obj`, or the folder that holds it. The origin is brought between the pupils. Raises
+    ModelError where the file is missing, damaged, or not the base mesh hm08.
+    """
+    head = read_makehuman(path)
+    return head.parts, head.points, head.bound
+
+
+def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
+    """The head, with what is needed to apply targets of the base mesh to it; as `makehuman_parts`."""
+    file = base_file(path)
+    base = read_obj(file)
+    missing = [name for name in ("body", *(g for h in HELPERS for g in h[2])) if not _group(base, name).any()]
+    if len(base.vertices) != VERTICES or missing:
+        raise ModelError(
+            f"{file}: this is not MakeHuman's base mesh hm08: {len(base.vertices)} vertices instead of "
+            f"{VERTICES}" + (f", no group {missing[0]!r}" if missing else "")
+        ).with_remedies(Remedy("kind", "import another OBJ file with {} and its feature points", "'obj'"))
+    sources = [_skin(base)]
+    sources += _eyes(file, base)
+    for name, kind, groups in HELPERS:
+        faces = np.any([_group(base, group) for group in groups], axis=0)
+        sources.append(make_part(base, faces, name, kind, scale=METRES, material=LOOKS[kind]))
+    points, bound = _feature_points(base, sources)
+    pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
+    shift = -pupils.mean(axis=0)
+    # float32 positions decide, so that bound points stand on their vertices
+    moved = [Source(_moved(source.part, shift), source.origin) for source in sources]
+    points = points + shift
+    everything = np.concatenate([source.part.vertices for source in moved])
+    points[bound >= 0] = everything[bound[bound >= 0]]
+    return MakeHumanHead(file.parent, base, tuple(moved), points, bound, shift)
+
+
+def base_file(path: str | os.PathLike[str]) -> Path:
+    """The base mesh in a folder, or the file itself; ModelError where there is none."""
+    place = Path(path)
+    for name in ("base.obj", "3dobjs/base.obj", "data/3dobjs/base.obj"):
+        if (place / name).is_file():
+            return place / name
+    if place.is_dir():
+        raise ModelError(f"{place}: there is no base.obj in this folder; give MakeHuman's base mesh")
+    return place
+
+
+@cache
+def _rows(name: str, key: str) -> dict[str, tuple[int, ...]]:
+    with (files(__package__) / name).open(encoding="utf-8") as file:
+        return {row[key]: tuple(map(int, row["vertices"].split())) for row in csv.DictReader(file)}
+
+
+def _group(base: Polygons, name: str) -> Bool:
+    wanted = [index for index, (group, _) in enumerate(base.groups) if group == name]
+    return np.isin(base.group, wanted)
+
+
+def _head(base: Polygons) -> tuple[Bool, Bool]:
+    """Faces of the body that are the head, and among them those of the inside of the mouth.
+
+    Head is what is reached from the crown, mouth what is reached from the palate, without crossing a
+    loop of `makehuman_cuts.csv`.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    body = np.flatnonzero(_group(base, "body"))
+    starts, sizes = base.starts[body], np.diff(base.starts)[body]
+    face = np.repeat(np.arange(len(body)), sizes)
+    place = np.arange(len(face)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    first = base.corners[starts[face] + place].astype(np.int64)
+    second = base.corners[starts[face] + (place + 1) % sizes[face]].astype(np.int64)
+    edge = np.minimum(first, second) << 32 | np.maximum(first, second)
+    walls = []
+    for loop in _rows("makehuman_cuts.csv", "loop").values():
+        a = np.array(loop, dtype=np.int64)
+        b = np.roll(a, -1)
+        walls.append(np.minimum(a, b) << 32 | np.maximum(a, b))
+    open_edges = ~np.isin(edge, np.concatenate(walls))
+    edge, of_edge = edge[open_edges], face[open_edges]
+    order = np.argsort(edge, kind="stable")
+    edge, of_edge = edge[order], of_edge[order]
+    shared = np.flatnonzero(edge[1:] == edge[:-1])
+    links = (np.ones(len(shared)), (of_edge[shared], of_edge[shared + 1]))
+    _, label = connected_components(coo_array(links, shape=(len(body), len(body))), directed=False)
+    found = []
+    for start in (CROWN, PALATE):
+        around = face[first == start]
+        if not len(around):
+            raise ModelError(f"the base mesh has no faces around vertex {start} of its head; is it damaged?")
+        chosen = np.zeros(len(base), dtype=np.bool_)
+        chosen[body[label == label[around[0]]]] = True
+        found.append(chosen)
+    return found[0] | found[1], found[1]
+
+
+def _skin(base: Polygons) -> Source:
+    """The skin, darker and redder inside the mouth."""
+    head, mouth = _head(base)
+    colours = np.tile(np.array([*LOOKS["skin"].colour, 0.4], dtype=np.float32), (len(base.vertices), 1))
+    colours[base.used(mouth)] = (*LOOKS["mouth"].colour, 0.6)
+    painted = replace(base, colours=colours)
+    return make_part(painted, head, "skin", "skin", scale=METRES, material=LOOKS["skin"])
+
+
+def _eyes(file: Path, base: Polygons) -> list[Source]:
+    """Left and right eyeball, of the fitted eyes where they are there."""
+    clothes = beside(file, EYES)
+    if clothes is None:
+        sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
+        return [
+            make_part(base, _group(base, g), n, "eye", scale=METRES, material=LOOKS["eye"]) for n, g in sides
+        ]
+    return eye_pieces(clothes, base.vertices)
+
+
+def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
+    """Left and right eyeball of the eyes in an .mhclo file, fitted to a base mesh (V, 3)."""
+    eyes = fitted(clothes, base)
+    picture = beside(clothes, "brown_eye.png")
+    material = Material("eye", (1.0, 1.0, 1.0), 0.1, whole(picture)) if picture is not None else LOOKS["eye"]
+    sources = []
+    for name, side in (("left eye", 1.0), ("right eye", -1.0)):
+        source = make_part(eyes, _eyeball(eyes, side), name, "eye", scale=METRES, material=material)
+        sources.append(Source(source.part, np.full(len(source.origin), -1, dtype=np.int32)))
+    return sources
+
+
+def _eyeball(eyes: Polygons, side: float) -> Bool:
+    """The faces of one eyeball; the transparent cornea before it, a shell of its own, is left out."""
+    from fba.face.importers.assembly.components import shells
+
+    best = None
+    for faces in shells(eyes):
+        vertices = eyes.vertices[eyes.used(faces)]
+        if vertices[:, 0].mean() * side > 0 and (best is None or vertices[:, 2].max() < best[0]):
+            best = (float(vertices[:, 2].max()), faces)
+    if best is None:
+        raise ModelError(f"{EYES}: there is no {'left' if side > 0 else 'right'} eye in it")
+    return best[1]
+
+
+def _feature_points(base: Polygons, sources: list[Source]) -> tuple[Float64, Int32]:
+    """Points in metres, not yet shifted, and the vertices they are bound to."""
+    points = np.full((len(row_of()), 3), np.nan)
+    bound = np.full(len(row_of()), -1, dtype=np.int32)
+    first: dict[int, int] = {}
+    start = 0
+    for source in sources:
+        for place, origin in enumerate(source.origin.tolist()):
+            first.setdefault(origin, start + place)
+        if source.part.kind == "eye":
+            row = row_of()["3.5" if "left" in source.part.name else "3.6"]
+            front = _front(source.part.vertices)
+            points[row], bound[row] = source.part.vertices[front], start + front
+        start += len(source.part.vertices)
+    for name, vertices in _rows("makehuman.csv", "point").items():
+        points[row_of()[name]] = base.vertices[list(vertices)].mean(axis=0) * METRES
+        if len(vertices) == 1 and name != "11.5":
+            bound[row_of()[name]] = first[vertices[0]]
+    return points, bound
+
+
+def _front(vertices: Float32) -> int:
+    """Where an eyeball looks: of its foremost half, the vertex nearest to its axis."""
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    away = np.hypot(vertices[:, 0] - middle[0], vertices[:, 1] - middle[1])
+    away[vertices[:, 2] < middle[2]] = np.inf
+    return int(away.argmin())
+
+
+def _moved(part: Part, shift: Float64) -> Part:
+    return Part(
+        part.name,
+        part.kind,
+        (part.vertices.astype(np.float64) + shift).astype(np.float32),
+        part.triangles,
+        part.normals,
+        part.texcoords,
+        part.colours,
+        part.material,
+    )
+
+
+def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> FaceModel:
+    """The head of MakeHuman's base mesh with tables; ModelError as `makehuman_parts`."""
+    from fba.face.authoring import author
+
+    head = read_makehuman(path)
+    notes = {
+        "source": "MakeHuman base mesh hm08, head and neck",
+        "licence": "CC0, as stated in the file",
+        "origin": "shifted between the pupils",
+    }
+    return author(head.parts, head.points, bound=head.bound, name=name, notes=notes)

@@ -1,0 +1,82 @@
+"""MakeHuman's targets: how far each vertex of the base mesh moves, and what that makes of its head."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.mesh.text_files import number, whole_number, words
+from fba.face.importers.makehuman.makehuman import EYES, METRES, MakeHumanHead, eye_pieces
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+FOLDERS = ("expression-units", "targets/expression/units/caucasian", "../targets/expression/units/caucasian")
+"""Where MakeHuman's expression units lie, seen from the base mesh."""
+
+
+def read_target(path: str | os.PathLike[str], vertices: int) -> Float64:
+    """Displacements float64 (vertices, 3) of a .target file, in units of the base mesh.
+
+    Lines are a vertex and three numbers. Raises ModelError naming the line.
+    """
+    moved = np.zeros((vertices, 3))
+    seen = 0
+    for where, tokens in words(path):
+        if len(tokens) != 4:
+            raise ModelError(
+                f"{where}: a vertex and three numbers are expected, not {' '.join(tokens)[:60]!r}"
+            )
+        vertex = whole_number(tokens[0], where, "a vertex")
+        if not 0 <= vertex < vertices:
+            raise ModelError(f"{where}: vertex {vertex} does not exist; the base mesh has {vertices}")
+        moved[vertex] = [number(token, where, "a coordinate") for token in tokens[1:]]
+        seen += 1
+    if not seen:
+        raise ModelError(f"{os.fspath(path)}: moves no vertex")
+    return moved
+
+
+def target_files(folder: str | os.PathLike[str]) -> dict[str, Path]:
+    """Expression units beside a base mesh, by name; none where there are none."""
+    for name in FOLDERS:
+        place = Path(folder) / name
+        if place.is_dir():
+            return {file.stem: file for file in sorted(place.glob("*.target"))}
+    return {}
+
+
+def shape_of(head: MakeHumanHead, moved: Float64) -> Mapping[str, Float32]:
+    """What displacements of the base mesh (V, 3) do to the parts of a head: metres, by part.
+
+    Eyes that are fitted to the base mesh follow it. Parts that stay are left out.
+    """
+    found: dict[str, Float32] = {}
+    eyes = None
+    for source in head.sources:
+        if len(source.origin) and source.origin[0] < 0:
+            if eyes is None:
+                before = eye_pieces(head.folder / EYES, head.base.vertices)
+                after = eye_pieces(head.folder / EYES, head.base.vertices + moved)
+                eyes = {
+                    a.part.name: (b.part.vertices - a.part.vertices)
+                    for a, b in zip(before, after, strict=True)
+                }
+            shift = eyes[source.part.name]
+        else:
+            shift = (moved[source.origin] * METRES).astype(np.float32)
+        if np.abs(shift).max() > 1e-7:
+            found[source.part.name] = shift
+    return found
+
+
+def expression_shapes(head: MakeHumanHead) -> dict[str, Mapping[str, Float32]]:
+    """All expression units that lie beside the base mesh, as shapes of the head."""
+    count = len(head.base.vertices)
+    files = target_files(head.folder)
+    return {name: shape_of(head, read_target(file, count)) for name, file in files.items()}

@@ -1,0 +1,152 @@
+"""Files that say where the feature points of a mesh are: CSV, JSON and FDP."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.feature_points import names, row_of
+from fba.mesh.text_files import lines, number, whole, whole_number
+
+Float64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class GivenPoints:
+    """Where feature points are, as their user says.
+
+    points: float64 (84, 3), in the unit of the mesh, NaN where unknown. vertices: the vertex of the mesh
+    file a point stands on, from 0, by its name; where both are given the vertex decides.
+    """
+
+    points: Float64
+    vertices: Mapping[str, int] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.vertices) or bool(np.isfinite(self.points).any())
+
+
+def given_points(points: object) -> GivenPoints:
+    """Points as the caller of an importer gives them.
+
+    points: the path of a file, an array (84, 3) with NaN where unknown, or a mapping from names to a
+    position (x, y, z) or a vertex number. Raises ModelError for anything else.
+    """
+    if isinstance(points, GivenPoints):
+        return points
+    if isinstance(points, str | os.PathLike):
+        return read_points(points)
+    if isinstance(points, Mapping):
+        return _from_mapping(points, "feature points")
+    try:
+        array = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"feature points cannot be read from {type(points).__name__}: {error}") from error
+    if array.shape != (len(names()), 3) or np.isinf(array).any():
+        raise ModelError(
+            f"feature points must have shape ({len(names())}, 3), NaN where unknown, not {array.shape}"
+        )
+    return GivenPoints(array)
+
+
+def read_points(path: str | os.PathLike[str]) -> GivenPoints:
+    """Feature points from a file.
+
+    CSV: lines `name,x,y,z` or `name,vertex`, vertices counted from 0 as in the mesh file; commas,
+    semicolons, tabs or blanks between; a line of titles, empty lines and `#` comments are skipped. JSON:
+    an object from names to [x, y, z] or a vertex number, or the same under "points". FDP: text or
+    Xface. Raises ModelError naming file and line.
+    """
+    name = os.fspath(path)
+    suffix = os.path.splitext(name)[1].lower()
+    if suffix == ".json":
+        try:
+            content = json.loads(whole(name))
+        except (ValueError, RecursionError) as error:
+            raise ModelError(f"{name}: is not JSON: {error}") from error
+        if isinstance(content, dict) and isinstance(content.get("points"), dict):
+            content = content["points"]
+        if not isinstance(content, dict):
+            raise ModelError(f"{name}: an object from names of feature points to places is expected")
+        return _from_mapping(content, name)
+    if suffix in (".fdp", ".xml"):
+        return _from_fdp(name)
+    return _from_csv(name)
+
+
+def _from_csv(path: str) -> GivenPoints:
+    points = np.full((len(names()), 3), np.nan)
+    vertices: dict[str, int] = {}
+    first = True
+    for line, text in lines(path):
+        where = f"{path}:{line}"
+        bare = text.split("#", 1)[0].strip()
+        if not bare:
+            continue
+        tokens = [token.strip().strip('"') for token in re.split(r"[,;\t]|\s+", bare)]
+        tokens = [token for token in tokens if token] if "," not in bare and ";" not in bare else tokens
+        was_first, first = first, False
+        name = tokens[0]
+        if name not in row_of():
+            if was_first and not name[:1].isdigit():
+                continue  # titles
+            raise ModelError(f"{where}: there is no feature point {name[:40]!r}; they are named 2.1 to 11.6")
+        if name in vertices or np.isfinite(points[row_of()[name]]).any():
+            raise ModelError(f"{where}: feature point {name} comes twice")
+        if len(tokens) == 2:
+            vertices[name] = whole_number(tokens[1], where, "a vertex")
+        elif len(tokens) == 4:
+            points[row_of()[name]] = [number(token, where, "a coordinate") for token in tokens[1:]]
+        else:
+            raise ModelError(f"{where}: 'name,x,y,z' or 'name,vertex' is expected, not {bare[:60]!r}")
+    return _filled(GivenPoints(points, vertices), path)
+
+
+def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
+    points = np.full((len(names()), 3), np.nan)
+    vertices: dict[str, int] = {}
+    for name, place in content.items():
+        if name not in row_of():
+            raise ModelError(
+                f"{where}: there is no feature point {str(name)[:40]!r}; they are named 2.1 to 11.6"
+            )
+        if isinstance(place, int | np.integer) and not isinstance(place, bool):
+            vertices[name] = int(place)
+            continue
+        try:
+            position = np.array(place, dtype=np.float64)
+        except (TypeError, ValueError):
+            position = np.array([np.nan])
+        if position.shape != (3,) or not np.isfinite(position).all():
+            raise ModelError(
+                f"{where}: feature point {name} must be [x, y, z] or a vertex, not {str(place)[:60]}"
+            )
+        points[row_of()[name]] = position
+    return _filled(GivenPoints(points, vertices), where)
+
+
+def _from_fdp(path: str) -> GivenPoints:
+    from fba.face.importers.points.fdp import load_fdp
+    from fba.face.importers.points.xface import xface_points
+
+    fdp = load_fdp(path)
+    if fdp.format == "xface":
+        return GivenPoints(xface_points(fdp))
+    return GivenPoints(fdp.points, {name: vertex for name, (_, vertex) in fdp.vertices.items()})
+
+
+def _filled(given: GivenPoints, where: str) -> GivenPoints:
+    if not given:
+        raise ModelError(f"{where}: there is no feature point in it")
+    for name, vertex in given.vertices.items():
+        if vertex < 0:
+            raise ModelError(f"{where}: feature point {name} is vertex {vertex}; vertices count from 0")
+    return given

@@ -1,0 +1,93 @@
+"""Values that a FIT gives to FAPs that were not sent, for many frames at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.interpolation.table import HIGH_LEVEL_NUMBERS, Function, InterpolationTable, Term
+from fba.parameters import INTENSITY_MAX, fap_numbers, faps
+
+Bool = npt.NDArray[np.bool_]
+Int16 = npt.NDArray[np.int16]
+Float64 = npt.NDArray[np.float64]
+
+VALUE_MAX = float(2**31 - 1)
+"""A result beyond this is no FAP value: FAPs are 32-bit integers."""
+
+
+def evaluate(
+    table: InterpolationTable,
+    values: npt.NDArray[np.generic],
+    known: Bool,
+    viseme: Int16,
+    expression: Int16,
+) -> tuple[Float64, Bool, Bool]:
+    """Values with those filled in that a FIT gives.
+
+    values: (T, 68). known: bool (T, 68), which of them stand; columns 0 and 1 say whether a viseme and
+    an expression are in force. viseme: int16 (T, 4), expression: int16 (T, 6), their fields. Returns
+    new arrays (T, 68): values float64; known; and from_high_level, which values follow from a viseme or
+    an expression, straight or through others.
+    """
+    given, known = values.astype(np.float64), known.copy()
+    from_high_level = np.zeros_like(known)
+    fields = {
+        name: np.clip(array[:, place], 0, INTENSITY_MAX).astype(np.float64)
+        for high, array in (("viseme", viseme), ("expression", expression))
+        for place, name in enumerate(HIGH_LEVEL_NUMBERS[high])
+    }
+
+    def number(rows: npt.NDArray[np.intp] | slice, name: str) -> Float64:
+        column: Float64 = fields[name] if name in fields else given[:, fap_numbers()[name] - 1]
+        return column[rows]
+
+    with np.errstate(all="ignore"):  # what is no number is found and left out
+        for fap in table.order:
+            column = fap - 1
+            for link in table.links_to[fap]:
+                missing = ~known[:, column]
+                sources = [fap_numbers()[name] - 1 for name in link.source]
+                rows = np.flatnonzero(reduce(np.logical_and, (known[:, s] for s in sources), missing))
+                if not len(rows):
+                    continue
+                some = slice(None) if len(rows) == len(given) else rows
+                function = link.functions[faps()[column].name]
+                result, good = _ratio(function, partial(number, some), len(rows))
+                rows = rows[good]
+                given[rows, column] = result[good]
+                known[rows, column] = True
+                if any(name in HIGH_LEVEL_NUMBERS for name in link.source):
+                    from_high_level[rows, column] = True
+                else:
+                    from_high_level[rows, column] = reduce(
+                        np.logical_or, (from_high_level[rows, source] for source in sources)
+                    )
+    return given, known, from_high_level
+
+
+def _ratio(function: Function, number: Callable[[str], Float64], count: int) -> tuple[Float64, Bool]:
+    """(count,) values, and which of them are values at all."""
+    result = _sum(function.numerator, number, count)
+    good = np.isfinite(result)
+    if function.denominator:
+        below = _sum(function.denominator, number, count)
+        good &= np.isfinite(below) & (below != 0)
+        result = result / below
+    return result, good & (np.abs(result) <= VALUE_MAX)
+
+
+def _sum(terms: Sequence[Term], number: Callable[[str], Float64], count: int) -> Float64:
+    total = np.zeros(count)
+    for term in terms:
+        product = np.full(count, term.coefficient)
+        for name, exponent in term.powers.items():
+            product *= number(name) ** exponent
+        if term.when is not None:
+            select, value = term.when
+            product = np.where(number(select) == value, product, 0.0)
+        total += product
+    return total

@@ -1,0 +1,197 @@
+"""The FIT as the flat lists of its BIFS node, ISO/IEC 14496-1.
+
+What no public text says is read as follows.
+
+- Graph counts sets from 1: its bounds are 0..68, those of FAPs, which count from 1, and counting from
+  0 would never reach 68. A Graph that contains a 0 can only count from 0, and is read so.
+- A set with FAP 1 brings three numbers for it (select1, select2, blend), with FAP 2 four (select1,
+  intensity1, select2, intensity2), in the order in which a stream sends them.
+- numeratorTerms and denominatorTerms hold one count for each FAP of each link's destination set, links
+  in the order of Graph, FAPs in the order of their set. Exponents and coefficients follow the same order,
+  term by term; a term has one exponent for each number of the source set. No terms make a numerator
+  0 and a denominator 1.
+- numeratorImpulse holds a pair (s, a) for each numerator term of the links whose source set contains
+  FAP 1 or 2, and nothing for the others: the term counts only where the s-th number of the source
+  set, counted from 1, equals a; (0, 0) is a term that always counts. Only selects can be asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from fba.errors import ModelError
+from fba.face.interpolation.table import (
+    EXPONENT_MAX,
+    HIGH_LEVEL_NUMBERS,
+    TERMS_MAX,
+    Function,
+    Link,
+    Term,
+    number_of,
+)
+from fba.parameters import FAP_COUNT, fap_numbers, faps
+
+INTEGER_FIELDS = {
+    "FAPs": (-1, FAP_COUNT),
+    "Graph": (0, FAP_COUNT),
+    "numeratorExp": (0, EXPONENT_MAX),
+    "denominatorExp": (0, EXPONENT_MAX),
+    "numeratorImpulse": (0, 1023),
+    "numeratorTerms": (0, TERMS_MAX),
+    "denominatorTerms": (0, TERMS_MAX),
+}
+"""Fields of the node with their bounds."""
+FLOAT_FIELDS = ("numeratorCoefs", "denominatorCoefs")
+NONE = -1
+"""Ends a set in FAPs."""
+
+
+def links_of(node: Mapping[str, Sequence[float]]) -> list[Link]:
+    """Links from the fields of a node, by their names in the standard; absent ones are empty.
+
+    Raises ModelError naming the field where counts do not fit together or a number is out of bounds.
+    """
+    unknown = sorted(set(node) - {*INTEGER_FIELDS, *FLOAT_FIELDS})
+    if unknown:
+        raise ModelError(f"a FIT node has no field {unknown[0]!r}")
+    fields = {name: _Field(name, node.get(name, ())) for name in (*INTEGER_FIELDS, *FLOAT_FIELDS)}
+    sets = _sets(fields["FAPs"])
+    links: list[Link] = []
+    graph = fields["Graph"]
+    if graph.left % 2:
+        raise ModelError(f"Graph of the FIT holds {graph.left} numbers; it must be pairs")
+    base = 0 if 0 in graph.numbers else 1
+    while graph.left:
+        place = len(links) + 1
+        source, destination = (
+            _set(sets, int(number) - base, f"link {place} of the FIT") for number in graph.take(2, "")
+        )
+        links.append(_link(source, destination, fields, f"link {place} of the FIT"))
+    for one in fields.values():
+        if one.left:
+            raise ModelError(f"{one.name} of the FIT holds {one.left} numbers more than its links need")
+    return links
+
+
+def node_of(links: Sequence[Link]) -> dict[str, list[int] | list[float]]:
+    """The fields of a node; equal sets are listed once."""
+    whole: dict[str, list[int]] = {name: [] for name in INTEGER_FIELDS}
+    coefficients: dict[str, list[float]] = {name: [] for name in FLOAT_FIELDS}
+    sets: dict[tuple[str, ...], int] = {}
+    for link in links:
+        for names in (tuple(link.source), tuple(link.functions)):
+            if names not in sets:
+                sets[names] = len(sets) + 1
+                whole["FAPs"] += [*(fap_numbers()[name] for name in names), NONE]
+            whole["Graph"].append(sets[names])
+        for function in link.functions.values():
+            for part, terms in (("numerator", function.numerator), ("denominator", function.denominator)):
+                whole[f"{part}Terms"].append(len(terms))
+                coefficients[f"{part}Coefs"] += [term.coefficient for term in terms]
+                for term in terms:
+                    whole[f"{part}Exp"] += [term.powers.get(number, 0) for number in link.numbers]
+            if _high_level(link.source):
+                for term in function.numerator:
+                    select, value = term.when or ("", 0)
+                    position = link.numbers.index(select) + 1 if select else 0
+                    whole["numeratorImpulse"] += [position, value]
+    if len(sets) > FAP_COUNT:
+        raise ModelError(f"the FIT has {len(sets)} different sets; a node can number {FAP_COUNT} at most")
+    return {**whole, **coefficients}
+
+
+class _Field:
+    """One list of the node, taken piece by piece."""
+
+    def __init__(self, name: str, numbers: Sequence[float]) -> None:
+        self.name = name
+        self._next = 0
+        if isinstance(numbers, (str, bytes)) or not isinstance(numbers, Iterable):
+            raise ModelError(f"{name} of the FIT must be a list of numbers, not {type(numbers).__name__}")
+        self.numbers = [number_of(number) for number in numbers]
+        low, high = INTEGER_FIELDS.get(name, (-math.inf, math.inf))
+        for place, (number, given) in enumerate(zip(self.numbers, numbers, strict=True), 1):
+            whole = name not in INTEGER_FIELDS or number.is_integer()
+            if not whole or not math.isfinite(number) or not low <= number <= high:
+                wanted = f"a whole number {low}..{high}" if name in INTEGER_FIELDS else "finite"
+                said = str(given) if isinstance(given, float) else repr(given)[:40]
+                raise ModelError(f"{name} of the FIT: number {place} is {said}, which must be {wanted}")
+
+    @property
+    def left(self) -> int:
+        return len(self.numbers) - self._next
+
+    def take(self, count: int, why: str) -> list[float]:
+        if self.left < count:
+            raise ModelError(
+                f"{self.name} of the FIT ends after {len(self.numbers)} numbers: {why} needs {count} more, "
+                f"and {self.left} are left"
+            )
+        self._next += count
+        return self.numbers[self._next - count : self._next]
+
+
+def _sets(field: _Field) -> list[tuple[str, ...]]:
+    sets, names = list[tuple[str, ...]](), list[str]()
+    for number in map(int, field.take(field.left, "")):
+        if number == NONE:
+            if not names:
+                raise ModelError(f"FAPs of the FIT: set {len(sets) + 1} is empty")
+            sets.append(tuple(names))
+            names = []
+        elif number == 0:
+            raise ModelError(f"FAPs of the FIT: set {len(sets) + 1} names FAP 0; there are 1..{FAP_COUNT}")
+        else:
+            names.append(faps()[number - 1].name)
+    if names:
+        raise ModelError(f"FAPs of the FIT: set {len(sets) + 1} is not ended by {NONE}")
+    return sets
+
+
+def _set(sets: list[tuple[str, ...]], place: int, where: str) -> tuple[str, ...]:
+    if not 0 <= place < len(sets):
+        raise ModelError(f"{where} asks for set {place + 1}, but FAPs lists {len(sets)}")
+    return sets[place]
+
+
+def _high_level(source: Sequence[str]) -> bool:
+    return any(name in HIGH_LEVEL_NUMBERS for name in source)
+
+
+def _link(
+    source: tuple[str, ...], destination: tuple[str, ...], fields: dict[str, _Field], where: str
+) -> Link:
+    numbers = Link(source, {}).numbers
+    functions = {}
+    for name in destination:
+        if name in functions:
+            raise ModelError(f"{where}: its destination set names {name} twice")
+        functions[name] = Function(
+            *(
+                tuple(_terms(part, numbers, _high_level(source), fields, f"{where}, {name}"))
+                for part in ("numerator", "denominator")
+            )
+        )
+    return Link(source, functions)
+
+
+def _terms(
+    part: str, numbers: tuple[str, ...], high_level: bool, fields: dict[str, _Field], where: str
+) -> list[Term]:
+    count = int(fields[f"{part}Terms"].take(1, where)[0])
+    terms = []
+    for _ in range(count):
+        exponents = fields[f"{part}Exp"].take(len(numbers), where)
+        when = None
+        if high_level and part == "numerator":
+            position, value = map(int, fields["numeratorImpulse"].take(2, where))
+            if position > len(numbers) or (position == 0 and value):
+                raise ModelError(
+                    f"{where}: the impulse ({position}, {value}) does not name one of the "
+                    f"{len(numbers)} numbers of the source set"
+                )
+            when = (numbers[position - 1], value) if position else None
+        powers = {name: int(e) for name, e in zip(numbers, exponents, strict=True) if e}
+        terms.append(Term(float(fields[f"{part}Coefs"].take(1, where)[0]), powers, when))
+    return terms

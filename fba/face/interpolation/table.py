@@ -1,0 +1,265 @@
+"""The FIT: how FAPs that a stream leaves out follow from those that it sends.
+
+ISO/IEC 14496-1, node FIT (FAP interpolation table). Sets of FAPs hang together by directed links; a
+link gives each FAP of its destination set as a rational function of the numbers of its source set:
+
+    sum_i( when_i  c_i  prod_j F_j ** l_ij ) / sum_i( b_i  prod_j F_j ** m_ij )
+
+where `when_i`, the impulse of a term, is 1 or 0: whether a select of the source set has one certain
+value ("the expression is joy").
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import Any
+
+from fba.errors import ModelError
+from fba.parameters import (
+    EXPRESSION_FIELDS,
+    EXPRESSION_SELECT_MAX,
+    FAP_COUNT,
+    FIRST_LOW_LEVEL_FAP,
+    VISEME_FIELDS,
+    VISEME_SELECT_MAX,
+    fap_numbers,
+    faps,
+)
+
+EXPONENT_MAX = 15
+"""Largest exponent that the node can carry."""
+TERMS_MAX = 10
+"""Most terms of a numerator or denominator that the node can carry."""
+HIGH_LEVEL_NUMBERS = {"viseme": VISEME_FIELDS[:3], "expression": EXPRESSION_FIELDS[:4]}
+"""The numbers that FAP 1 and FAP 2 bring to a source set."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """coefficient x product of powers, where the impulse holds, else 0.
+
+    coefficient: finite. powers: exponent 0..15 of each number of the source set, by name; absent is 0.
+    when: (select, value), such as ("expression_select1", 1), or None for always; numerators only.
+    """
+
+    coefficient: float = 1.0
+    powers: Mapping[str, int] = field(default_factory=dict)
+    when: tuple[str, int] | None = None
+
+
+@dataclass(frozen=True)
+class Function:
+    """A destination FAP as numerator / denominator.
+
+    Both are sums of at most 10 terms; an empty numerator is 0, an empty denominator 1.
+    """
+
+    numerator: Sequence[Term] = ()
+    denominator: Sequence[Term] = ()
+
+
+@dataclass(frozen=True)
+class Link:
+    """From one set of FAPs to another.
+
+    source: names of its FAPs, such as ("lower_t_midlip", "raise_b_midlip"). "viseme" stands for the
+    numbers viseme_select1, viseme_select2 and viseme_blend, "expression" for expression_select1,
+    expression_intensity1, expression_select2 and expression_intensity2 (both 0..63 as sent).
+    functions: the destination set, each of its FAPs with its function.
+    """
+
+    source: Sequence[str]
+    functions: Mapping[str, Function]
+
+    @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the numbers that the functions may use, in order."""
+        return tuple(n for name in self.source for n in HIGH_LEVEL_NUMBERS.get(name, (name,)))
+
+
+@dataclass(frozen=True)
+class InterpolationTable:
+    """How unsent FAPs follow from sent ones.
+
+    links: for each FAP the links that lead to it are tried in this order; the first one counts whose
+    source FAPs are all available (sent, or themselves interpolated) and whose function has a value
+    there. A denominator of zero, or a result that is not finite or beyond 32 bits, is no value. A FAP
+    that no link gives is left to the standard's mates.
+
+    Raises ModelError for links that lead round in a circle, empty sets, FAPs that are unknown, listed
+    twice or high-level in a destination set, wrong exponents, term counts, impulses and coefficients.
+    """
+
+    links: Sequence[Link]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "links", tuple(_checked(link, i) for i, link in enumerate(self.links, 1)))
+        circle = find_circle(self.links)
+        if circle:
+            raise ModelError(
+                f"the links of the FIT lead round in a circle: {' -> '.join(circle)}; "
+                "each FAP must follow from others, never from itself"
+            )
+
+    @classmethod
+    def from_node(cls, node: Mapping[str, Sequence[float]]) -> InterpolationTable:
+        """The table that the fields of a BIFS node FIT describe; see `fba.face.interpolation.node`."""
+        from fba.face.interpolation.node import links_of
+
+        return cls(links_of(node))
+
+    def to_node(self) -> dict[str, list[int] | list[float]]:
+        """The fields of a BIFS node FIT: `from_node` of them is this table again."""
+        from fba.face.interpolation.node import node_of
+
+        return node_of(self.links)
+
+    @classmethod
+    def from_dict(cls, data: object) -> InterpolationTable:
+        """The table that `to_dict` gave; ModelError naming the place where it is something else."""
+        from fba.face.interpolation.json import links_of
+
+        return cls(links_of(data))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as lists, dicts, strings and numbers, for JSON."""
+        from fba.face.interpolation.json import data_of
+
+        return data_of(self.links)
+
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """Destination FAPs, every one after those that it may follow from."""
+        done: dict[int, None] = {}
+        sources = sources_of(self.links)
+        while len(done) < len(sources):
+            for fap, needed in sources.items():
+                if fap not in done and all(n in done or n not in sources for n in needed):
+                    done[fap] = None
+        return tuple(done)
+
+    @cached_property
+    def links_to(self) -> dict[int, tuple[Link, ...]]:
+        """For each destination FAP its links, in the order in which they are tried."""
+        numbers = fap_numbers()
+        found: dict[int, list[Link]] = {}
+        for link in self.links:
+            for name in link.functions:
+                found.setdefault(numbers[name], []).append(link)
+        return {fap: tuple(links) for fap, links in found.items()}
+
+
+def sources_of(links: Iterable[Link]) -> dict[int, set[int]]:
+    """For each destination FAP the FAPs that some link to it starts from."""
+    numbers = fap_numbers()
+    found: dict[int, set[int]] = {}
+    for link in links:
+        for name in link.functions:
+            found.setdefault(numbers[name], set()).update(numbers[source] for source in link.source)
+    return found
+
+
+def find_circle(links: Iterable[Link]) -> list[str]:
+    """Names of FAPs that follow from one another in a circle, the first again at the end; else []."""
+    sources = sources_of(links)
+    open_, path = set(sources), list[int]()
+    while open_:
+        path = [min(open_)]
+        while path:
+            further = next((n for n in sorted(sources[path[-1]]) if n in open_), None)
+            if further is None:
+                open_.discard(path.pop())
+            elif further in path:
+                circle = [*path[path.index(further) :], further]
+                return [faps()[number - 1].name for number in reversed(circle)]
+            else:
+                path.append(further)
+    return []
+
+
+@cache
+def select_limits() -> dict[str, int]:
+    """Largest value of each select that an impulse may ask for."""
+    limits = {name: VISEME_SELECT_MAX for name in VISEME_FIELDS if "select" in name}
+    return limits | {name: EXPRESSION_SELECT_MAX for name in EXPRESSION_FIELDS if "select" in name}
+
+
+def _checked(link: Link, place: int) -> Link:
+    where = f"link {place} of the FIT"
+    if not isinstance(link, Link):
+        raise ModelError(f"{where} is {type(link).__name__}, not a Link")
+    for what, names in (("source", tuple(link.source)), ("destination", tuple(link.functions))):
+        if not names:
+            raise ModelError(f"{where}: its {what} set is empty")
+        for name in names:
+            if name not in fap_numbers():
+                raise ModelError(f"{where}: its {what} set names {name!r}, which is no FAP")
+            if names.count(name) > 1:
+                raise ModelError(f"{where}: its {what} set names {name} twice")
+            if what == "destination" and fap_numbers()[name] < FIRST_LOW_LEVEL_FAP:
+                raise ModelError(
+                    f"{where}: {name} cannot be interpolated, only FAPs "
+                    f"{FIRST_LOW_LEVEL_FAP}..{FAP_COUNT} can"
+                )
+    numbers = Link(tuple(link.source), {}).numbers
+    functions = {
+        name: Function(
+            _checked_terms(function.numerator, numbers, f"{where}, numerator of {name}", True),
+            _checked_terms(function.denominator, numbers, f"{where}, denominator of {name}", False),
+        )
+        for name, function in link.functions.items()
+    }
+    return Link(tuple(link.source), functions)
+
+
+def _checked_terms(
+    terms: Sequence[Term], numbers: tuple[str, ...], where: str, impulses: bool
+) -> tuple[Term, ...]:
+    if len(terms) > TERMS_MAX:
+        raise ModelError(f"{where}: {len(terms)} terms, but there may be {TERMS_MAX} at most")
+    return tuple(
+        _checked_term(term, numbers, f"{where}, term {i}", impulses) for i, term in enumerate(terms, 1)
+    )
+
+
+def _checked_term(term: Term, numbers: tuple[str, ...], where: str, impulses: bool) -> Term:
+    coefficient = number_of(term.coefficient)
+    if not math.isfinite(coefficient):
+        raise ModelError(f"{where}: the coefficient {term.coefficient!r} is not a finite number")
+    for name, exponent in term.powers.items():
+        if name not in numbers:
+            raise ModelError(f"{where}: {name!r} is not in the source set ({', '.join(numbers)})")
+        if not _whole(exponent) or not 0 <= exponent <= EXPONENT_MAX:
+            raise ModelError(
+                f"{where}: the exponent of {name} must be a whole number 0..{EXPONENT_MAX}, not {exponent!r}"
+            )
+    if term.when is not None:
+        if not impulses:
+            raise ModelError(f"{where}: only a numerator may have an impulse")
+        select, value = term.when
+        limit = select_limits().get(select, -1) if select in numbers else -1
+        if limit < 0:
+            raise ModelError(
+                f"{where}: the impulse asks for {select!r}, which is no select of the source set"
+            )
+        if not isinstance(value, int) or not 0 <= value <= limit:
+            raise ModelError(f"{where}: the impulse asks for {select} = {value!r}, which must be 0..{limit}")
+    powers = {name: int(term.powers[name]) for name in numbers if term.powers.get(name)}
+    return Term(coefficient, powers, None if term.when is None else (term.when[0], int(term.when[1])))
+
+
+def number_of(value: object) -> float:
+    """A float, NaN for what is none."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
+
+
+def _whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)

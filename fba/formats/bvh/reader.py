@@ -1,0 +1,376 @@
+"""BVH (Biovision hierarchy) text: a skeleton with offsets and channels, then a line of numbers a frame.
+
+Read leniently: CR LF, tabs, any channel order, wrapped or truncated lines, a wrong frame count.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.skeleton import MOST_FRAMES
+from fba.errors import FbaWarning, FormatError, ModelError
+from fba.recognition import HEAD_BYTES, but_recognised
+from fba.source import read_whole
+
+MAX_JOINTS = 4096
+MAX_RATE = 10_000
+MAX_LINES = 4 * MOST_FRAMES
+LARGEST = 1e12
+"""Lengths and angles beyond this are damage."""
+BATCH_LINES = 4096
+NOMINAL_RATES = tuple(
+    sorted({Fraction(n) for n in range(1, 241)} | {Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120)}
+           | {Fraction(n) for n in (250, 300, 480, 500, 1000)})
+)  # fmt: skip
+"""Rates that a rounded frame time is taken for."""
+STRETCH = 1e-3
+"""Share of the skeleton's size by which a joint may move against its parent before it is worth a word."""
+
+
+@dataclass
+class _Hierarchy:
+    names: list[str] = field(default_factory=list)
+    parents: list[int] = field(default_factory=list)
+    offsets: list[tuple[float, float, float]] = field(default_factory=list)
+    channels: list[list[str]] = field(default_factory=list)
+    end_parents: list[int] = field(default_factory=list)
+    end_offsets: list[tuple[float, float, float]] = field(default_factory=list)
+
+
+def sniff(head: bytes, suffix: str) -> bool:
+    """Whether the first bytes of a file look like BVH."""
+    return re.match(rb"(?:\xef\xbb\xbf)?\s*HIERARCHY\s+ROOT\b", head, re.IGNORECASE) is not None
+
+
+def read(
+    path: str | Path,
+    *,
+    rate: Fraction | int | str | None = None,
+    scale: float | None = None,
+    origin: str = "source",
+    ground: str = "floor",
+    plant: bool = True,
+    spine: str | int = "spread",
+    joints: Mapping[str, str] | None = None,
+) -> Animation:
+    """A BVH file as BAPs (see `fba.capture.from_skeleton` for the options).
+
+    Raises FormatError for anything that is not BVH or whose skeleton is not a body; warns (FbaWarning)
+    of oddities.
+    """
+    motion = read_motion(path)
+    try:
+        return from_skeleton(
+            motion, rate, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
+        )
+    except ModelError as error:
+        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
+
+
+def read_motion(path: str | Path) -> SkeletonMotion:
+    """The skeleton and its motion as the file has them. Raises FormatError, warns (FbaWarning)."""
+    data = read_whole(path)
+    kind = but_recognised(data[:HEAD_BYTES])
+    if kind and not re.match(rb"(?:\xef\xbb\xbf)?\s*HIERARCHY\b", data, re.IGNORECASE):
+        raise FormatError(f"a BVH file begins with HIERARCHY{kind}", path=path)
+    text = data.decode("utf-8-sig", errors="replace")
+    return parse(text, name=Path(path).stem, path=path)
+
+
+def parse(text: str, *, name: str = "", path: str | Path | None = None) -> SkeletonMotion:
+    """As `read_motion`, from text. path: named in errors."""
+    if max(text.count("\n"), text.count("\r")) > MAX_LINES:
+        raise FormatError(f"more than {MAX_LINES} lines; cut the motion into pieces", path=path)
+    lines = text.splitlines()
+    tree, after = _hierarchy(lines, path)
+    count, frame_time, first = _motion_header(lines, after, path)
+    channels = sum(len(c) for c in tree.channels)
+    numbers = _numbers(lines, first, channels, count, path)
+    return _motion(tree, numbers, _rate(frame_time), name, path)
+
+
+def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, int]:
+    """The joints, and the line number (0-based) of MOTION. A stack of its own: files may nest deeply."""
+    tree = _Hierarchy()
+    stack: list[int] = []  # open braces: number of the joint, -1 for an End Site
+    waiting: int | None = None  # announced by ROOT, JOINT or End Site, its brace still to come
+    seen_header = False
+    for number, line in enumerate(lines):
+        words = line.replace("{", " { ").replace("}", " } ").split()
+        at = 0
+        while at < len(words):
+            word = words[at].upper()
+
+            def fail(message: str, number: int = number, token: str = words[at]) -> FormatError:
+                return FormatError(message, path=path, line=number + 1, token=token)
+
+            if not seen_header:
+                if word != "HIERARCHY":
+                    raise fail("a BVH file begins with HIERARCHY")
+                seen_header = True
+                at += 1
+            elif word in ("ROOT", "JOINT"):
+                if word == "ROOT" and tree.names:
+                    raise fail("this file has several ROOTs; split it into files of one skeleton each")
+                if word == "JOINT" and (not stack or stack[-1] < 0):
+                    raise fail("a JOINT must stand inside a ROOT or JOINT")
+                if len(tree.names) >= MAX_JOINTS:
+                    raise fail(f"more than {MAX_JOINTS} joints")
+                waiting = len(tree.names)
+                end = next((i for i in range(at + 1, len(words)) if words[i] == "{"), len(words))
+                tree.names.append(" ".join(words[at + 1 : end]) or f"joint{waiting}")
+                tree.parents.append(stack[-1] if stack else -1)
+                tree.offsets.append((0.0, 0.0, 0.0))
+                tree.channels.append([])
+                at = end
+            elif word == "END":
+                if not stack or stack[-1] < 0:
+                    raise fail("an End Site must stand inside a joint")
+                waiting = -1
+                tree.end_parents.append(stack[-1])
+                tree.end_offsets.append((0.0, 0.0, 0.0))
+                at = next((i for i in range(at + 1, len(words)) if words[i] == "{"), len(words))
+            elif word == "{":
+                if waiting is None:
+                    raise fail("a brace opens, but no ROOT, JOINT or End Site stands before it")
+                stack.append(waiting)
+                waiting = None
+                at += 1
+            elif word == "}":
+                if not stack:
+                    raise fail("a brace closes that was never opened")
+                stack.pop()
+                at += 1
+            elif word == "OFFSET":
+                values = [_number(w, path, number) for w in words[at + 1 : at + 4]]
+                if not stack or len(values) != 3:
+                    raise fail("OFFSET needs three numbers, inside a joint or End Site")
+                offset = (values[0], values[1], values[2])
+                if stack[-1] < 0:
+                    tree.end_offsets[-1] = offset
+                else:
+                    tree.offsets[stack[-1]] = offset
+                at += 4
+            elif word == "CHANNELS":
+                at = _channels(tree, stack, words, at, path, number)
+            elif word == "MOTION":
+                if stack or waiting is not None:
+                    raise fail(f"MOTION begins, but {len(stack)} braces are still open")
+                if not tree.names:
+                    raise fail("there is no ROOT joint before MOTION")
+                return tree, number
+            else:
+                raise fail("expected ROOT, JOINT, End Site, OFFSET, CHANNELS, a brace or MOTION")
+    raise FormatError(
+        "the file ends before MOTION; it is cut short, or no BVH file", path=path, line=len(lines)
+    )
+
+
+def _channels(
+    tree: _Hierarchy, stack: list[int], words: list[str], at: int, path: str | Path | None, line: int
+) -> int:
+    text = words[at + 1] if at + 1 < len(words) else ""
+    if not stack or stack[-1] < 0 or not re.fullmatch(r"[0-9]{1,2}", text):
+        raise FormatError("CHANNELS needs a count, inside a joint", path=path, line=line + 1, token=text)
+    names = [w.lower() for w in words[at + 2 : at + 2 + int(text)]]
+    for channel in names:
+        if not re.fullmatch(r"[xyz](rotation|position)", channel):
+            raise FormatError(
+                "channels are Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation",
+                path=path, line=line + 1, token=channel,
+            )  # fmt: skip
+    if len(names) != int(text) or tree.channels[stack[-1]]:
+        raise FormatError(f"expected {text} channels, once for this joint", path=path, line=line + 1)
+    tree.channels[stack[-1]] = names
+    return at + 2 + int(text)
+
+
+def _motion_header(lines: list[str], at: int, path: str | Path | None) -> tuple[int | None, str, int]:
+    """The claimed number of frames, the frame time as text, and the line (0-based) after it."""
+    claimed: int | None = None
+    for number in range(at, min(at + 50, len(lines))):
+        frames = re.search(r"\bFrames\s*:?\s*([0-9]{1,18})\b", lines[number], re.IGNORECASE)
+        if frames:
+            claimed = int(frames[1])
+        time = re.search(r"\bFrame\s+Time\s*:?\s*(\S+)\s*$", lines[number], re.IGNORECASE)
+        if time:
+            value = _number(time[1], path, number)
+            if not 1 / MAX_RATE <= value <= 3600:
+                raise FormatError(
+                    f"the frame time must lie between 1/{MAX_RATE} s and an hour",
+                    path=path, line=number + 1, token=time[1],
+                )  # fmt: skip
+            return claimed, time[1], number + 1
+    raise FormatError("there is no 'Frame Time: <seconds>' after MOTION", path=path, line=at + 1)
+
+
+def _numbers(
+    lines: list[str], first: int, channels: int, claimed: int | None, path: str | Path | None
+) -> npt.NDArray[np.float64]:
+    """float64 (T, channels). Only what is there is read: the claimed count allocates nothing."""
+    if not channels:
+        raise FormatError("no joint has channels, so nothing can move", path=path)
+    read: list[npt.NDArray[np.float64]] = []
+    at: list[int] = []  # the line of each row, and how many numbers it has
+    counts: list[int] = []
+    batch: list[str] = []
+    total = 0
+    for number in range(first, len(lines)):
+        words = lines[number].split()
+        if not words:
+            continue
+        at.append(number)
+        counts.append(len(words))
+        total += len(words)
+        batch += words
+        if total // channels > MOST_FRAMES:
+            raise FormatError(
+                f"more than {MOST_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
+            )
+        if len(at) % BATCH_LINES == 0:
+            read.append(_floats(batch, lines, at, path))
+            batch = []
+    read.append(_floats(batch, lines, at, path))
+    frames, lost = divmod(total, channels)
+    if not frames:
+        raise FormatError("there is no frame of motion after 'Frame Time'", path=path, line=first + 1)
+    bad = next((row for row, count in enumerate(counts) if count != channels), None)
+    if bad is not None:
+        wrapped = claimed is not None and total == claimed * channels
+        cut = bad == len(counts) - 1 and counts[bad] < channels
+        if not (wrapped or cut):
+            raise FormatError(
+                f"expected {channels} numbers, one for each channel, found {counts[bad]}",
+                path=path, line=at[bad] + 1,
+            )  # fmt: skip
+        if cut and not wrapped:
+            warnings.warn(
+                f"{path or 'BVH'}:{at[bad] + 1}: the last frame is cut short "
+                f"({lost} of {channels} numbers); left out",
+                FbaWarning,
+                stacklevel=4,
+            )
+    if claimed is not None and claimed != frames:
+        warnings.warn(
+            f"{path or 'BVH'}: the header says {claimed} frames, the file has {frames}; those are used",
+            FbaWarning,
+            stacklevel=4,
+        )
+    values = np.concatenate(read)[: frames * channels]
+    wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    if len(wrong):
+        ends = np.cumsum(counts)
+        row = int(np.searchsorted(ends, wrong[0], side="right"))
+        raise FormatError(
+            "motion must be finite, plausible numbers",
+            path=path,
+            line=at[row] + 1,
+            token=lines[at[row]].split()[int(wrong[0] - ends[row])],
+        )
+    return values.reshape(frames, channels)
+
+
+def _floats(
+    batch: list[str], lines: list[str], at: list[int], path: str | Path | None
+) -> npt.NDArray[np.float64]:
+    """Numbers of the last rows; FormatError with the line of a word that is none."""
+    try:
+        return np.array([float(word) for word in batch], dtype=np.float64)
+    except ValueError:
+        for number in at[-BATCH_LINES:]:
+            for word in lines[number].split():
+                _number(word, path, number, any_size=True)
+        raise
+
+
+def _number(word: str, path: str | Path | None, line: int, any_size: bool = False) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not (any_size or abs(value) <= LARGEST) or math.isnan(value):
+        raise FormatError("expected a number", path=path, line=line + 1, token=word)
+    return value
+
+
+def _rate(frame_time: str) -> Fraction:
+    """Frames a second. A frame time is rounded in the file: the nearest usual rate within its rounding."""
+    value = float(frame_time)
+    mantissa, _, exponent = frame_time.lower().partition("e")
+    digits = len(mantissa.partition(".")[2]) - (int(exponent) if exponent else 0)
+    tolerance = max(0.5 * 10.0**-digits * 1.01, value * 2e-5)
+    near = [r for r in NOMINAL_RATES if abs(1 / float(r) - value) <= tolerance]
+    if near:
+        # whole rates first: a coarse 0.033 is 30, not 29.97
+        return min(
+            near,
+            key=lambda r: (
+                abs(1 / float(r) - value) > tolerance / 5,
+                r.denominator > 1,
+                abs(1 / float(r) - value),
+            ),
+        )
+    if value > 1:
+        return 1 / Fraction(value).limit_denominator(1000)
+    return Fraction(1 / value).limit_denominator(1000)
+
+
+def _motion(
+    tree: _Hierarchy, numbers: npt.NDArray[np.float64], rate: Fraction, name: str, path: str | Path | None
+) -> SkeletonMotion:
+    from fba import rotations
+
+    frames, joints = len(numbers), len(tree.names)
+    offsets = np.array(tree.offsets)
+    turned = np.zeros((frames, joints, 4))
+    turned[:, :, 0] = 1.0
+    positions = np.tile(offsets[0], (frames, 1))
+    size = float(np.abs(offsets).sum(axis=1).max()) or 1.0
+    stretched = []
+    column = 0
+    for joint, channels in enumerate(tree.channels):
+        place = np.tile(offsets[joint], (frames, 1))
+        for channel in channels:
+            axis = "xyz".index(channel[0])
+            if channel.endswith("position"):
+                place[:, axis] = numbers[:, column]
+            else:
+                turn = rotations.about(axis, np.deg2rad(numbers[:, column]))
+                turned[:, joint] = rotations.multiply(turned[:, joint], turn)
+            column += 1
+        if joint == 0:
+            positions = place
+        elif any(c.endswith("position") for c in channels):
+            if np.abs(place - place[0]).max() > STRETCH * size:
+                stretched.append(tree.names[joint])
+            offsets[joint] = np.median(place, axis=0)
+    if stretched:
+        warnings.warn(
+            f"{path or 'BVH'}: joints that move against their parents are held at their median place: "
+            f"{', '.join(stretched[:5])}{', ...' if len(stretched) > 5 else ''}",
+            FbaWarning,
+            stacklevel=4,
+        )
+    turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+    return SkeletonMotion(
+        names=tuple(tree.names),
+        parents=np.array(tree.parents, dtype=np.int64),
+        offsets=offsets,
+        rotations=turned,
+        positions=positions,
+        rate=rate,
+        end_parents=np.array(tree.end_parents, dtype=np.int64),
+        end_offsets=np.array(tree.end_offsets, dtype=np.float64).reshape(-1, 3),
+        name=name,
+    )

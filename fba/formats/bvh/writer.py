@@ -1,0 +1,169 @@
+"""Write BVH: the standard's joints in the default posture, and the BAPs as the angles of their channels.
+
+A joint's channels are its freedoms in the order in which BAPs turn it, so every number is a BAP, in degrees,
+and no angle is worked out again: nothing flips, nothing is rounded but to `DIGITS`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.atomic import atomic
+from fba.errors import FormatError, OptionError, Remedy
+from fba.formats.body_frames import shown_baps
+from fba.source import Path
+
+if TYPE_CHECKING:
+    from fba.body import BapSolver, Skeleton
+
+CENTIMETRES = 100.0
+DIGITS = 9
+"""Significant digits: 1e-5 rad are 6e-4 degrees."""
+END = 0.5
+"""Length of a last bone, as a share of the one before it."""
+BATCH_FRAMES = 256
+RATES = (1 / 3600, 10_000)
+"""Frames a second that the reader takes."""
+KEPT = (
+    "sacroiliac",
+    "skullbase",
+    *(f"{side}_{joint}" for side in "lr" for joint in ("hip", "knee", "ankle", "metatarsal")),
+    *(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist")),
+)
+"""Joints that are written even where they do not move: with them it is a body."""
+
+
+def write(
+    path: Path,
+    animation: Animation,
+    *,
+    joints: str = "all",
+    skeleton: Skeleton | None = None,
+    axes: str = "iso",
+    unit: float = CENTIMETRES,
+) -> None:
+    """Write the body track as BVH, at the animation's rate; skipped frames are filled in.
+
+    joints: "all" of the skeleton, or "moving": those that move, and what makes them a body (hips, knees,
+    shoulders, ...). skeleton: the body; `Skeleton.default()` where None. axes: which way BAPs turn
+    (`fba.body.convention_names()`). unit: lengths in the file for one metre, by default centimetres.
+
+    The root's OFFSET is 0, its channels are its places in the world: some programs add the two. Read again,
+    the file gives the same BAPs (`fba.capture.standard_skeleton`); times begin at 0. Raises FormatError where there is
+    no body, no frame, or too many, OptionError for an unknown option's value.
+    """
+    from fba.body import BapSolver
+
+    if joints not in ("all", "moving"):
+        raise OptionError(f'joints must be "all" or "moving", not {joints!r}')
+    if not (np.isfinite(unit) and 1e-6 <= unit <= 1e6):
+        raise OptionError(f"unit must be lengths in the file for one metre, 1e-6 to 1e6, not {unit}")
+    if not RATES[0] <= animation.rate <= RATES[1]:
+        raise FormatError(
+            f"{float(animation.rate):g} frames/s cannot be written as BVH, which takes 1/3600 to 10000",
+            path=path,
+        ).with_remedies(Remedy("rate", "resample first, e.g. with {}", "30", "Animation.resample"))
+    values = shown_baps(animation, path, "BVH")
+    solver = BapSolver(skeleton, axes)
+    kept = _kept(solver, values, joints == "moving")
+    columns, factors, shifts, text = _hierarchy(solver, kept, unit)
+    row = " ".join([f"%.{DIGITS}g"] * len(columns)) + "\n"
+    with atomic(path) as file:
+        file.write(text.encode())
+        file.write(f"MOTION\nFrames: {len(values)}\nFrame Time: {float(1 / animation.rate):.12g}\n".encode())
+        for start in range(0, len(values), BATCH_FRAMES):
+            part = values[start : start + BATCH_FRAMES]
+            numbers = np.where(columns >= 0, part[:, columns] * factors, 0.0) + shifts
+            numbers[numbers == 0] = 0.0  # no "-0"
+            file.write("".join([row % tuple(frame) for frame in numbers.tolist()]).encode())
+
+
+def _kept(solver: BapSolver, values: npt.NDArray[np.int32], moving: bool) -> list[int]:
+    """Numbers of the joints to write, parents first."""
+    names = solver.skeleton.names
+    if not moving:
+        return list(range(len(names)))
+    moved: npt.NDArray[np.bool_] = np.asarray(values.any(axis=0))
+    return [
+        number
+        for number, name in enumerate(names)
+        if number == 0 or name in KEPT or moved[list(solver.convention.freedoms(name))].any()
+    ]
+
+
+def _hierarchy(
+    solver: BapSolver, kept: list[int], unit: float
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64], npt.NDArray[np.float64], str]:
+    """For every channel the BAP column (-1 for none), the factor and what is added; and the text."""
+    skeleton, rules = solver.skeleton, solver.convention
+    parents, place = _parents(skeleton, kept), {number: row for row, number in enumerate(kept)}
+    children: list[list[int]] = [[] for _ in kept]
+    for row, parent in enumerate(parents):
+        if parent >= 0:
+            children[parent].append(row)
+    columns = [int(column) for column in rules.translation]
+    factors = [float(sign) * unit / 1000 for sign in rules.translation_sign]
+    shifts = [float(centre) * unit for centre in skeleton.centres[0]]
+    lines = ["HIERARCHY"]
+    # a stack of its own: a skeleton may be a chain of thousands
+    waiting: list[tuple[int, int]] = [(0, 0)]  # joint, or -1 - depth for a brace to close
+    while waiting:
+        row, depth = waiting.pop()
+        pad = "  " * depth
+        if row < 0:
+            lines.append(f"{pad}}}")
+            continue
+        number = kept[row]
+        name = skeleton.names[number]
+        parent = parents[row]
+        offset = skeleton.centres[number] - skeleton.centres[kept[parent] if parent >= 0 else number]
+        lines += [
+            f"{pad}{'JOINT' if depth else 'ROOT'} {name}",
+            f"{pad}{{",
+            f"{pad}  OFFSET {_three(offset * unit)}",
+        ]
+        own, axes, signs = _turns(solver, name)
+        letters = " ".join(f"{'XYZ'[axis]}rotation" for axis in axes)
+        places = "" if depth else "Xposition Yposition Zposition "
+        lines.append(f"{pad}  CHANNELS {3 if depth else 6} {places}{letters}")
+        columns += own
+        factors += [sign * np.degrees(1e-5) for sign in signs]
+        shifts += [0.0, 0.0, 0.0]
+        waiting.append((-1, depth))
+        if children[row]:
+            waiting += [(child, depth + 1) for child in reversed(children[row])]
+        else:
+            end = offset * END * unit if depth else np.zeros(3)
+            lines += [f"{pad}  End Site", f"{pad}  {{", f"{pad}    OFFSET {_three(end)}", f"{pad}  }}"]
+    assert len(place) == len(kept)
+    text = "\n".join(lines) + "\n"
+    return np.array(columns), np.array(factors), np.array(shifts), text
+
+
+def _parents(skeleton: Skeleton, kept: list[int]) -> list[int]:
+    """For every kept joint the place in `kept` of the closest kept joint above it, -1 for the root."""
+    place = {number: row for row, number in enumerate(kept)}
+    result = []
+    for number in kept:
+        parent = int(skeleton.parents[number])
+        while parent >= 0 and parent not in place:
+            parent = int(skeleton.parents[parent])
+        result.append(place.get(parent, -1))
+    return result
+
+
+def _turns(solver: BapSolver, name: str) -> tuple[list[int], list[int], list[float]]:
+    """BAP columns, axes and signs of a joint's three channels, outermost first; -1 where it has no BAP."""
+    rules = solver.convention
+    if name not in rules.joints:
+        return [-1, -1, -1], [2, 0, 1], [1.0, 1.0, 1.0]
+    row = rules.joints.index(name)
+    return rules.bap[row].tolist(), rules.axis[row].tolist(), rules.sign[row].tolist()
+
+
+def _three(vector: npt.NDArray[np.float64]) -> str:
+    return " ".join(f"{float(v) + 0.0:.{DIGITS}g}" for v in np.where(np.abs(vector) < 1e-9, 0.0, vector))

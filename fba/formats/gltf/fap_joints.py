@@ -1,0 +1,161 @@
+"""Joints that FAPs turn and shift, such as eyes and head: their motion as FAPs again."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.deform.flat_tables import KIND_ORDER, flat_transforms
+from fba.face.model import FaceModel
+from fba.face.tables import HEAD
+from fba.gltf.values import Value
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
+
+Float64 = npt.NDArray[np.float64]
+Steps = tuple[tuple[int, Float64], ...]
+
+SQUARE = 1e-6
+"""Cosine up to which two axes count as standing square on each other."""
+LARGEST = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class FapJoint:
+    """A node and the FAPs that move it, in its parent's frame.
+
+    place (3,), rest (3, 3): where it is and how it stands at FAPs of 0. turns: FAP, and radians a step about
+    each axis (3,); the outermost first; axes of two stand square on each other. shifts: FAP, and metres a
+    step (3,), which are independent of each other. told: FAPs to be taken from this joint.
+    """
+
+    node: int
+    place: Float64
+    rest: Float64
+    turns: Steps
+    shifts: Steps
+    told: frozenset[int] = frozenset()
+
+    @classmethod
+    def of_part(
+        cls, model: FaceModel, part: str, node: int, frame: Float64, rest: Float64
+    ) -> FapJoint | None:
+        """What the model's FAPs do to a part or to `HEAD`; None where motion does not tell them apart.
+
+        frame: (4, 4), from the face's frame into that of the node's parent, of one scale. rest: (4, 4), the
+        node at FAPs of 0.
+        """
+        flat = flat_transforms(model)
+        number = [*(part.name for part in model.parts), HEAD].index(part)
+        turns, shifts = [], []
+        centred = True
+        turn = frame[:3, :3] / np.cbrt(np.linalg.det(frame[:3, :3]))
+        for row in range(int(flat.start[number]), int(flat.start[number + 1])):
+            kind, fap = KIND_ORDER[flat.kind[row]], int(flat.column[row]) + 1
+            if kind == "translation":
+                shifts.append((fap, frame[:3, :3] @ flat.amount[row]))
+                continue
+            centre = frame[:3, :3] @ flat.centre[row] + frame[:3, 3]
+            centred = centred and np.allclose(centre, rest[:3, 3], atol=1e-9)
+            if kind == "rotation":
+                turns.append((fap, turn @ flat.amount[row]))
+        if not centred:  # then turning shifts it too
+            shifts = []
+        joint = cls(node, rest[:3, 3], rest[:3, :3], tuple(turns), tuple(shifts))
+        return joint if (turns or shifts) and joint._clear() else None
+
+    def _clear(self) -> bool:
+        """Whether turns and shifts can be told apart."""
+        faps = [fap for fap, _ in (*self.turns, *self.shifts)]
+        if len(self.turns) > 3 or len(self.shifts) > 3 or len(set(faps)) != len(faps):
+            return False
+        axes = np.array([axis for _, axis in self.turns]).reshape(-1, 3)
+        lengths = np.linalg.norm(axes, axis=1)
+        if not (lengths > 1e-12).all():
+            return False
+        axes = axes / lengths[:, None]
+        if np.abs(axes @ axes.T - np.eye(len(axes))).max(initial=0) > SQUARE:
+            return False
+        ways = np.array([way for _, way in self.shifts]).reshape(-1, 3)
+        return bool(not len(ways) or np.linalg.matrix_rank(ways) == len(ways))
+
+    def values(self, turned: Float64, places: Float64) -> dict[int, Float64]:
+        """FAPs (T,) by number, for rotations (T, 3, 3) and places (T, 3) of the node."""
+        found: dict[int, Float64] = {}
+        if self.turns:
+            axes = np.array([axis for _, axis in self.turns])
+            lengths = np.linalg.norm(axes, axis=1)
+            angles = _angles(turned @ self.rest.T, axes / lengths[:, None])
+            for column, (fap, _) in enumerate(self.turns):
+                found[fap] = angles[column] / lengths[column]
+        if self.shifts:
+            steps = (places - self.place) @ np.linalg.pinv(np.array([way for _, way in self.shifts]))
+            for column, (fap, _) in enumerate(self.shifts):
+                found[fap] = steps[:, column]
+        return found
+
+    def note(self, told: Set[int]) -> dict[str, Any]:
+        """As JSON; told: the FAPs to be taken from it."""
+        return {
+            "node": self.node,
+            "place": self.place.tolist(),
+            "rest": self.rest.ravel().tolist(),
+            "turns": [[fap, axis.tolist()] for fap, axis in self.turns],
+            "shifts": [[fap, way.tolist()] for fap, way in self.shifts],
+            "told": sorted(told),
+        }
+
+    @classmethod
+    def of_note(cls, note: Value, nodes: int) -> FapJoint:
+        """From JSON; nodes: how many there are. ModelError where it is wrong."""
+        joint = cls(
+            note.member("node").index(nodes, "node"),
+            np.array(note.member("place").numbers(3, -LARGEST, LARGEST)),
+            np.array(note.member("rest").numbers(9, -1.01, 1.01)).reshape(3, 3),
+            _steps(note.member("turns")),
+            _steps(note.member("shifts")),
+            frozenset(
+                entry.integer(FIRST_LOW_LEVEL_FAP, FAP_COUNT)
+                for entry in note.member("told").elements(FAP_COUNT)
+            ),
+        )
+        named = {fap for fap, _ in (*joint.turns, *joint.shifts)}
+        if not (joint._clear() and joint.told <= named):
+            raise note.error("FAPs cannot be told from this joint's motion")
+        return joint
+
+
+def _steps(note: Value) -> Steps:
+    found = []
+    for entry in note.elements(3):
+        pair = entry.elements(2)
+        if len(pair) != 2:
+            raise entry.error("expected a FAP and its axis")
+        fap = pair[0].integer(FIRST_LOW_LEVEL_FAP, FAP_COUNT)
+        found.append((fap, np.array(pair[1].numbers(3, -LARGEST, LARGEST))))
+    return tuple(found)
+
+
+def _angles(turned: Float64, axes: Float64) -> Float64:
+    """(3, T), radians about up to three axes square on each other, outermost first; unused ones are 0.
+
+    A product of turns about x, y and z once the axes are taken for those.
+    """
+    base = np.eye(3)
+    base[: len(axes)] = axes
+    if len(axes) == 1:  # any direction across; the axis that it has least of is never close to it
+        across = np.eye(3)[int(np.abs(axes[0]).argmin())]
+        base[1] = np.cross(axes[0], across)
+        base[1] /= np.linalg.norm(base[1])
+    if len(axes) < 3:
+        base[2] = np.cross(base[0], base[1])
+    mirrored = float(np.sign(np.linalg.det(base)))
+    base[2] *= mirrored
+    r = base @ turned @ base.T
+    middle = np.arctan2(r[:, 0, 2], np.hypot(r[:, 0, 0], r[:, 0, 1]))
+    outer = np.arctan2(-r[:, 1, 2], r[:, 2, 2])
+    inner = np.arctan2(-r[:, 0, 1], r[:, 0, 0])
+    return np.stack([outer, middle, inner * mirrored])

@@ -1,0 +1,232 @@
+"""Poses of a glTF skeleton: how it rests when its skin is bound, and its animation sampled over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import permutations, product
+
+import numpy as np
+import numpy.typing as npt
+
+from fba import rotations
+from fba.errors import ModelError
+from fba.gltf import Channel, Gltf
+
+Float = npt.NDArray[np.float64]
+
+ALIKE = 0.05
+"""Radians within which joints agree on how the bind pose stands in the scene."""
+
+
+class BindPose:
+    """Rotations and places of the joints in the bind pose, in the scene's frame.
+
+    Joints of no skin stand as their node says, relative to their parent.
+    """
+
+    def __init__(self, gltf: Gltf, nodes: Sequence[int], parents: Sequence[int]) -> None:
+        inverse: dict[int, Float] = {}
+        for skin in gltf.skins:
+            for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
+                if joint in set(nodes):
+                    inverse.setdefault(joint, np.asarray(matrix, dtype=np.float64))
+        bound = {joint: _inverted(gltf, joint, matrix) for joint, matrix in inverse.items()}
+        if bound and np.ptp([matrix[:3, 3] for matrix in bound.values()], axis=0).max() <= 0:
+            bound = {}  # a skin without inverse bind matrices says nothing about how it was bound
+        turn, size = _to_scene(gltf, bound)
+        self._turns = np.zeros((len(nodes), 3, 3))
+        self.places = np.zeros((len(nodes), 3))
+        self._parents = parents
+        for number, node in enumerate(nodes):
+            parent = parents[number]
+            if node in bound:
+                self._turns[number] = turn @ nearest_rotation(bound[node][:3, :3])
+                self.places[number] = size * (turn @ bound[node][:3, 3])
+                continue
+            local = gltf.nodes[node].local
+            if parent < 0:
+                world = gltf.nodes[node].world
+                self._turns[number] = nearest_rotation(world[:3, :3])
+                self.places[number] = world[:3, 3]
+            else:
+                above = gltf.nodes[nodes[parent]].world
+                scale = float(np.cbrt(abs(np.linalg.det(above[:3, :3]))))
+                self._turns[number] = self._turns[parent] @ nearest_rotation(local[:3, :3])
+                self.places[number] = self.places[parent] + scale * (self._turns[parent] @ local[:3, 3])
+
+    def offsets(self) -> Float:
+        """float64 (J, 3): from the parent in the bind pose; the root's own place."""
+        result = self.places.copy()
+        for number, parent in enumerate(self._parents):
+            if parent >= 0:
+                result[number] -= self.places[parent]
+        return result
+
+    def turned(self, number: int, linear: Float) -> Float:
+        """Quaternions (T, 4), w first: how far a joint is turned from the bind pose, from its (T, 3, 3)."""
+        return quaternions(nearest_rotation(linear) @ self._turns[number].T)
+
+
+class Sampler:
+    """Local transforms of nodes at given times (T,), seconds."""
+
+    def __init__(self, gltf: Gltf, channels: Sequence[Channel], times: Float) -> None:
+        self._gltf, self._times = gltf, times
+        self._channels = {(channel.node, channel.path): channel for channel in channels}
+
+    def translation(self, node: int) -> Float:
+        """float64 (T, 3)."""
+        channel = self._channels.get((node, "translation"))
+        if channel is not None:
+            return sample(channel, self._times)
+        return np.broadcast_to(self._gltf.nodes[node].local[:3, 3], (len(self._times), 3))
+
+    def linear(self, node: int) -> Float:
+        """float64 (T, 3, 3): rotation times scale."""
+        own = self._gltf.nodes[node]
+        turn, scale = (self._channels.get((node, path)) for path in ("rotation", "scale"))
+        if turn is None and scale is None:
+            return np.broadcast_to(own.local[:3, :3], (len(self._times), 3, 3))
+        if own.rotation is None or own.scale is None:  # given as a matrix, which is never animated in part
+            lengths = np.linalg.norm(own.local[:3, :3], axis=0)
+            matrix = nearest_rotation(own.local[:3, :3])
+        else:
+            lengths, matrix = own.scale, rotations.matrices(np.roll(own.rotation, 1))
+        if turn is None:
+            matrices = np.broadcast_to(matrix, (len(self._times), 3, 3))
+        else:
+            matrices = rotations.matrices(np.roll(sample(turn, self._times), 1, axis=-1))
+        sizes = lengths if scale is None else sample(scale, self._times)[:, None, :]
+        result: Float = matrices * sizes
+        return result
+
+
+def key_times(channels: Sequence[Channel]) -> Float:
+    """All times of keys, rising. ModelError where there are none."""
+    times = [np.asarray(channel.times, dtype=np.float64) for channel in channels if len(channel.times)]
+    if not times:
+        raise ModelError("the animation has no keys")
+    return np.unique(np.concatenate(times))
+
+
+def sample(channel: Channel, times: Float) -> Float:
+    """Values (T, width) of a channel at times (T,); before the first key and after the last they stand
+    still."""
+    keys = np.asarray(channel.times, dtype=np.float64)
+    values = np.asarray(channel.values, dtype=np.float64)
+    turns = channel.path == "rotation"
+    after = np.clip(np.searchsorted(keys, times, side="right"), 1, max(1, len(keys) - 1))
+    before = after - 1
+    after = np.minimum(after, len(keys) - 1)
+    gap = np.maximum(keys[after] - keys[before], 1e-12)
+    share = np.clip((times - keys[before]) / gap, 0.0, 1.0)
+    if channel.interpolation == "CUBICSPLINE":
+        s, d = share[:, None], gap[:, None]
+        result = (
+            (2 * s**3 - 3 * s**2 + 1) * values[before, 1]
+            + (s**3 - 2 * s**2 + s) * d * values[before, 2]
+            + (3 * s**2 - 2 * s**3) * values[after, 1]
+            + (s**3 - s**2) * d * values[after, 0]
+        )
+    elif channel.interpolation == "STEP":
+        result = np.where((share >= 1.0)[:, None], values[after], values[before])
+    elif turns:
+        unit = _unit(values)
+        return rotations.interpolate(unit[:, None, :], before, after, share)[:, 0]
+    else:
+        result = values[before] * (1 - share[:, None]) + values[after] * share[:, None]
+    return _unit(result) if turns else result
+
+
+def nearest_rotation(matrices: Float) -> Float:
+    """The rotations (..., 3, 3) closest to matrices that also scale; ModelError where they flatten."""
+    u, s, v = np.linalg.svd(matrices)
+    if (s[..., -1] <= 1e-9 * np.maximum(s[..., 0], 1e-300)).any():
+        raise ModelError("a joint is scaled to nothing; its rotation is unknown")
+    sign = np.sign(np.linalg.det(u @ v))
+    u[..., :, -1] *= sign[..., None]
+    result: Float = u @ v
+    return result
+
+
+def quaternions(matrices: Float) -> Float:
+    """Unit quaternions (..., 4), w first, of rotations (..., 3, 3)."""
+    m = matrices
+    trace = np.trace(m, axis1=-2, axis2=-1)
+    # four ways to take it apart; the one with the largest part is exact
+    squares = np.stack([trace, m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], axis=-1)
+    best = np.argmax(squares, axis=-1)
+    result = np.zeros((*m.shape[:-2], 4))
+    for which in range(4):
+        use = best == which
+        if not use.any():
+            continue
+        n = m[use]
+        if which == 0:
+            w = np.sqrt(1 + trace[use]) / 2
+            parts = [
+                w, (n[:, 2, 1] - n[:, 1, 2]) / (4 * w), (n[:, 0, 2] - n[:, 2, 0]) / (4 * w),
+                (n[:, 1, 0] - n[:, 0, 1]) / (4 * w),
+            ]  # fmt: skip
+        else:
+            i = which - 1
+            j, k = (i + 1) % 3, (i + 2) % 3
+            x = np.sqrt(np.maximum(1 + n[:, i, i] - n[:, j, j] - n[:, k, k], 1e-300)) / 2
+            parts = [(n[:, k, j] - n[:, j, k]) / (4 * x), x, x, x]
+            parts[1 + i] = x
+            parts[1 + j] = (n[:, j, i] + n[:, i, j]) / (4 * x)
+            parts[1 + k] = (n[:, k, i] + n[:, i, k]) / (4 * x)
+        result[use] = np.stack(parts, axis=-1)
+    return _unit(result)
+
+
+def _unit(values: Float) -> Float:
+    length = np.linalg.norm(values, axis=-1, keepdims=True)
+    if (length < 1e-6).any():
+        raise ModelError("an animation has a rotation that is no rotation: a quaternion of length 0")
+    result: Float = values / length
+    return result
+
+
+def _inverted(gltf: Gltf, joint: int, matrix: Float) -> Float:
+    result = np.full((4, 4), np.nan)
+    with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
+        result[:] = np.linalg.inv(matrix)
+    if not np.isfinite(result).all():
+        raise ModelError(f"{gltf.file}: the inverse bind matrix of {gltf.nodes[joint].name!r} has no inverse")
+    return result
+
+
+def _to_scene(gltf: Gltf, bound: dict[int, Float]) -> tuple[Float, float]:
+    """Rotation and scale from the frame in which the skin was bound to the scene's.
+
+    Where the nodes stand in the bind pose, they say it exactly. Where they stand otherwise, it is taken for
+    one of the 24 turns between axes, the one closest to what the first joint says.
+    """
+    if not bound:
+        return np.eye(3), 1.0
+    turns = []
+    sizes = []
+    for joint, matrix in bound.items():
+        both = gltf.nodes[joint].world[:3, :3] @ np.linalg.inv(matrix[:3, :3])
+        turns.append(nearest_rotation(both))
+        sizes.append(float(np.cbrt(abs(np.linalg.det(both)))))
+    size = float(np.median(sizes))
+    first = turns[0]
+    apart = [np.arccos(np.clip((np.trace(first.T @ turn) - 1) / 2, -1, 1)) for turn in turns]
+    if np.median(apart) < ALIKE:
+        return first, size
+    best = max(_axis_turns(), key=lambda turn: float(np.trace(turn.T @ first)))
+    return best, size
+
+
+def _axis_turns() -> list[Float]:
+    result = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), order] = signs
+            if np.linalg.det(matrix) > 0:
+                result.append(matrix)
+    return result

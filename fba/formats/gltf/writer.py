@@ -1,0 +1,243 @@
+"""Write glTF 2.0 (.glb): a skinned, animated person that Blender, three.js and game engines open.
+
+Nodes are the joints of the standard, by name, and stand as in the first frame. Every joint that moves has
+LINEAR keys at the animation's own times, counted from the first frame. A face is morph targets, with FAPs as
+their weights. docs/formats.md describes what is approximate.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.errors import FbaWarning, FormatError
+from fba.formats.body_frames import held_baps
+from fba.formats.gltf.joints import Clip, move, nest
+from fba.gltf.writer import Builder
+from fba.source import Path
+
+if TYPE_CHECKING:
+    from fba.body import BapSolver
+    from fba.body.model import BodyModel
+    from fba.face.model import FaceModel
+    from fba.formats.gltf.head import HeadParts
+
+Float64 = npt.NDArray[np.float64]
+
+MOST_FRAMES = 100_000
+"""Near an hour at 30 frames/s; a frame of a body takes up to 1.4 kB."""
+CHUNK = 2048
+MARK = "fba"
+"""Key of this project's notes in the extras of the animation."""
+
+
+def write(
+    path: Path,
+    animation: Animation,
+    *,
+    mesh: bool = True,
+    model: FaceModel | None = None,
+    body: BodyModel | None = None,
+    axes: str = "iso",
+) -> None:
+    """Write an animation as .glb.
+
+    mesh: with the person's surface; False for the skeleton alone (then there must be a body track). model:
+    the face, by default the built-in head. body: what BAPs move, by default the built-in person. axes: which
+    way BAPs turn (`fba.body.convention_names()`).
+
+    A body track gives the whole person, with a head on it; a face track alone the head by itself. Read
+    again, the file gives the same BAPs and FAPs at the same times (docs/formats.md says what is lost).
+    Raises FormatError where there is no frame, or more than 100,000, or no body for a skeleton; ModelError
+    where glTF cannot hold a model. Warns (FbaWarning) where a body has no place for a face.
+    """
+    if os.fspath(path).lower().endswith(".gltf"):
+        raise FormatError("glTF is written in one file; name it .glb", path=path)
+    if not 1 <= len(animation) <= MOST_FRAMES:
+        raise FormatError(
+            f"{len(animation)} frames; 1 to {MOST_FRAMES} can be written as glTF: take pieces, or resample",
+            path=path,
+        )
+    if animation.body is None and not mesh:
+        raise FormatError("a skeleton alone needs a body, and this animation has only a face", path=path)
+    builder = Builder()
+    builder.root["scene"] = 0
+    first = int(animation.index[0])
+    times = (animation.index - first).astype(np.float64) / float(animation.rate)
+    clip = Clip(builder, times, path)
+    note: dict[str, Any] = {"version": 1, "rate": str(animation.rate), "first": first}
+    if animation.body is not None:
+        roots = _person(builder, clip, animation, note, mesh, model, body, axes)
+    else:
+        roots = _head(builder, clip, animation, note, model)
+    builder.add("scenes", {"nodes": roots})
+    builder.add(
+        "animations",
+        {
+            "name": animation.name or "animation",
+            "samplers": clip.samplers,
+            "channels": clip.channels,
+            "extras": {MARK: note},
+        },
+    )
+    builder.save(path)
+
+
+def _person(
+    builder: Builder,
+    clip: Clip,
+    animation: Animation,
+    note: dict[str, Any],
+    mesh: bool,
+    model: FaceModel | None,
+    body: BodyModel | None,
+    axes: str,
+) -> list[int]:
+    from fba.body import BapSolver, Skeleton
+    from fba.body.model import BodyModel
+    from fba.gltf.part_materials import Looks
+
+    person = (body or BodyModel.default()) if mesh else body
+    skeleton = Skeleton.default() if person is None else person.skeleton
+    solver = BapSolver(skeleton, axes)
+    nodes = nest(builder, skeleton.names, skeleton.parents)
+    turns, places = _local(solver, held_baps(animation))
+    for joint, node in enumerate(nodes):
+        shifts = places if joint == 0 else np.broadcast_to(skeleton.offsets[joint], places.shape)
+        move(builder, clip, node, turns[joint], shifts, always=joint == 0)
+    note |= {"axes": axes, "root": nodes[0], "centre": skeleton.centres[0].tolist()}
+    if person is None:
+        bind = np.tile(np.eye(4), (len(skeleton), 1, 1))
+        bind[:, :3, 3] = skeleton.centres
+        _skin(builder, nodes, bind, nodes[0])
+        _note_face(builder, animation, note, model, None)
+        return [nodes[0]]
+
+    slots: dict[str, int] = {}
+    bound = list(person.bind)
+    joints = list(nodes)
+    head = _head_of(builder, clip, animation, person, model)
+    if head is not None:
+        from fba.body.head_attachment import skull_of
+
+        skull = skull_of(person)
+        node = nodes[skull]
+        if head.turns:
+            node = head.turn(nodes[skull], person.bind[skull])
+            joints[skull] = node  # all that the skull carries, the neck's part too
+            joints.append(nodes[skull])
+            bound.append(person.bind[skull])
+        for name, eye in head.joints(node, person.bind[skull]).items():
+            slots[name] = len(joints)
+            joints.append(eye)
+        bound += [matrix for _, matrix in head.bound]
+    _skin(builder, joints, np.array(bound), nodes[0])
+    looks = Looks(builder)
+    roots = [nodes[0]]
+    for part in person.parts:
+        if part.kind == "neck" and head is not None and head.on is not None and head.on.brings_neck:
+            continue
+        primitive = looks.primitive(part)
+        used = np.where(part.weights > 0, part.joints, 0)
+        primitive["attributes"]["JOINTS_0"] = builder.attribute(used.astype(np.uint16))
+        primitive["attributes"]["WEIGHTS_0"] = builder.attribute(part.weights)
+        shown = builder.add("meshes", {"name": part.name, "primitives": [primitive]})
+        roots.append(builder.add("nodes", {"name": part.name, "mesh": shown, "skin": 0}))
+    if head is not None:
+        roots += head.meshes(slots, looks, True, {})
+    _note_face(builder, animation, note, model, head)
+    return roots
+
+
+def _head_of(
+    builder: Builder, clip: Clip, animation: Animation, person: BodyModel, model: FaceModel | None
+) -> HeadParts | None:
+    from fba.face.model import FaceModel
+    from fba.formats.gltf.head import HeadParts
+
+    if person.eyes is None:
+        if animation.face is not None or model is not None:
+            warnings.warn(
+                f"the body {person.name!r} has no place for a face; none is shown",
+                FbaWarning,
+                stacklevel=5,
+            )
+        return None
+    face = model or FaceModel.default()
+    return HeadParts(builder, clip, face, _shown(animation, face), person)
+
+
+def _head(
+    builder: Builder, clip: Clip, animation: Animation, note: dict[str, Any], model: FaceModel | None
+) -> list[int]:
+    """A face by itself, in its own frame."""
+    from fba.face.model import FaceModel
+    from fba.formats.gltf.head import HeadParts
+    from fba.gltf.part_materials import Looks
+
+    face = model or FaceModel.default()
+    head = HeadParts(builder, clip, face, _shown(animation, face), None)
+    node = head.turn(None, np.eye(4), always=True)
+    hang = {"": node, **head.joints(node, np.eye(4))}
+    head.meshes({}, Looks(builder), False, hang)
+    _note_face(builder, animation, note, face, head)
+    return [node]
+
+
+def _note_face(
+    builder: Builder,
+    animation: Animation,
+    note: dict[str, Any],
+    model: FaceModel | None,
+    head: HeadParts | None,
+) -> None:
+    """Note which FAPs the head shows; without a head, their numbers."""
+    from fba.face.model import FaceModel
+    from fba.formats.gltf.fap_tracks import face_note
+
+    if animation.face is None:
+        return
+    face = head.model if head is not None else model or FaceModel.default()
+    shown = _shown(animation, face)
+    if head is None:
+        note["face"] = face_note(builder, animation.face, shown, face)
+    else:
+        note["face"] = face_note(builder, animation.face, shown, face, head.targets, head.fap_joints)
+
+
+def _shown(animation: Animation, model: FaceModel) -> npt.NDArray[np.float32]:
+    from fba.face.resolve import resolve
+    from fba.parameters import FAP_COUNT
+
+    if animation.face is None:
+        return np.zeros((len(animation), FAP_COUNT), dtype=np.float32)
+    return resolve(animation.face, model)
+
+
+def _local(solver: BapSolver, baps: npt.NDArray[np.int32]) -> tuple[Float64, Float64]:
+    """(J, T, 3, 3) turns of the joints relative to their parents, (T, 3) places of the root."""
+    count, parents = len(solver.skeleton), solver.skeleton.parents
+    turns = np.empty((count, len(baps), 3, 3))
+    places = np.empty((len(baps), 3))
+    for start in range(0, len(baps), CHUNK):
+        rows = slice(start, start + CHUNK)
+        world = solver.pose(baps[rows])[..., :3, :]
+        places[rows] = world[:, 0, :, 3]
+        turns[0, rows] = world[:, 0, :, :3]
+        for joint in range(1, count):
+            above = world[:, parents[joint], :, :3]
+            turns[joint, rows] = np.swapaxes(above, 1, 2) @ world[:, joint, :, :3]
+    return turns, places
+
+
+def _skin(builder: Builder, joints: list[int], bind: Float64, root: int) -> None:
+    inverse = np.linalg.inv(bind)
+    inverse[:, 3] = (0, 0, 0, 1)
+    builder.add(
+        "skins", {"joints": joints, "skeleton": root, "inverseBindMatrices": builder.matrices(inverse)}
+    )

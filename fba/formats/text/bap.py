@@ -1,0 +1,49 @@
+"""ASCII BAP files (.bap): the text form of a body track, versions 3.1 (186 BAPs) and 3.2 (296)."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from fba.animation import Animation, BodyTrack
+from fba.errors import FormatError
+from fba.formats.text.frame_reader import read_frames
+from fba.formats.text.layout import bap_layout
+from fba.formats.text.lines import sniff_layout
+from fba.formats.text.frame_writer import write_frames
+from fba.source import Path
+
+
+def sniff_bap(head: bytes, suffix: str) -> bool:
+    """Whether a file that begins so is a BAP file: by its mask width, else by its version."""
+    return sniff_layout(head, bap_layout())
+
+
+def read_bap(
+    path: Path,
+    *,
+    fps: str | float | Fraction | None = None,
+    name: str | None = None,
+    salvage: bool = False,
+    angle_scale: Fraction | float = 1,
+) -> Animation:
+    """Read a BAP file; frame numbers become the animation's index as they are.
+
+    fps, name: in place of what the header says, or of a missing header. salvage: keep the frames
+    before a damage or a cut. angle_scale: factor on all angles (BAPs 1..186 but the three
+    translations), for the old files whose unit is not 1e-5 rad. Raises FormatError with line and
+    token; FbaWarning as `fba.formats.text.fap.read_fap`.
+    """
+    frames = read_frames(path, bap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale)
+    body = BodyTrack(frames.slots, frames.mask)
+    return Animation(frames.header.rate, frames.index, None, body, frames.header.name)
+
+
+def write_bap(path: Path, animation: Animation) -> None:
+    """Write the body track as BAP version 3.2, 296 columns. FormatError where there is none, or on a
+    failing disk."""
+    body = animation.body
+    if body is None:
+        raise FormatError(
+            "a BAP file holds a body, and this animation has only a face; write .fap or .fba", path=path
+        )
+    write_frames(path, bap_layout(), animation, body.values, body.mask)

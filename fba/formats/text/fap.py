@@ -1,0 +1,63 @@
+"""ASCII FAP files (.fap): the text form of a face track, versions 2.0 to 2.2."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation, FaceTrack
+from fba.errors import FormatError
+from fba.formats.text.frame_reader import read_frames
+from fba.formats.text.layout import fap_layout
+from fba.formats.text.lines import sniff_layout
+from fba.formats.text.frame_writer import write_frames
+from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
+from fba.source import Path
+
+_VISEME = len(VISEME_FIELDS)
+_FIELDS = _VISEME + len(EXPRESSION_FIELDS)
+
+
+def sniff_fap(head: bytes, suffix: str) -> bool:
+    """Whether a file that begins so is a FAP file: by its mask width, else by its version."""
+    return sniff_layout(head, fap_layout())
+
+
+def read_fap(
+    path: Path,
+    *,
+    fps: str | float | Fraction | None = None,
+    name: str | None = None,
+    salvage: bool = False,
+    angle_scale: Fraction | float = 1,
+) -> Animation:
+    """Read a FAP file; frame numbers become the animation's index as they are.
+
+    fps, name: in place of what the header says, or of a missing header. salvage: keep the frames
+    before a damage or a cut. angle_scale: factor on the eight FAPs in angle units, for files whose
+    unit is not 1e-5 rad (50 for one that took it as 5e-4). Raises FormatError with line and token;
+    FbaWarning for values that had to be rounded, a wrong frame count, frame numbers that do not
+    increase, an unknown version.
+    """
+    frames = read_frames(path, fap_layout(), fps=fps, name=name, salvage=salvage, angle_scale=angle_scale)
+    values = np.zeros((len(frames.index), FAP_COUNT), dtype=np.int32)
+    values[:, 2:] = frames.slots[:, _FIELDS:]
+    face = FaceTrack(
+        values,
+        frames.mask,
+        frames.slots[:, :_VISEME].astype(np.int16),
+        frames.slots[:, _VISEME:_FIELDS].astype(np.int16),
+    )
+    return Animation(frames.header.rate, frames.index, face, None, frames.header.name)
+
+
+def write_fap(path: Path, animation: Animation) -> None:
+    """Write the face track as FAP version 2.2. FormatError where there is none, or on a failing disk."""
+    face = animation.face
+    if face is None:
+        raise FormatError(
+            "a FAP file holds a face, and this animation has only a body; write .bap or .fba", path=path
+        )
+    slots = np.concatenate([face.viseme, face.expression, face.values[:, 2:]], axis=1, dtype=np.int32)
+    write_frames(path, fap_layout(), animation, slots, face.mask)

@@ -1,0 +1,201 @@
+"""What ASCII FAP, BAP and EPF files share: lines with comments, names, the one-line header.
+
+Such files come from many programs, by way of many machines: line ends of all kinds, tabs, byte order
+marks, Latin-1 names, comments anywhere. Files are read block by block, and no line may be longer than
+any of these formats can need, so that neither a missing line end nor a false claim fills the memory.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, BinaryIO
+
+from fba.errors import FormatError, Remedy
+from fba.formats.text.frame_rates import parse_rate
+from fba.recognition import HEAD_BYTES, but_recognised
+from fba.source import Path
+
+if TYPE_CHECKING:
+    from fba.formats.text.layout import Layout
+
+BLOCK_BYTES = 1 << 20
+MAX_LINE_BYTES = 1 << 16
+"""The longest honest line has 297 numbers: 8 KiB even where each is a float with all its digits."""
+
+_MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"), (b"\x00\x00\xfe\xff", "UTF-32"))
+UTF8_MARK = b"\xef\xbb\xbf"
+_VERSION = re.compile(rb"\d{1,3}(\.\d{1,3})?")
+_MASK_BITS = frozenset((b"0", b"1"))
+WIDE = 100
+"""Masks of BAPs have more columns, those of FAPs fewer, whatever their exact number."""
+_MASK_LIKE = 60
+"""A line of at least this many 0s and 1s is taken for a mask, not for a header."""
+
+
+GIVE_RATE = Remedy("fps", "give one with {}", "25")
+
+
+class Lines:
+    """The lines of a text file, without their ends; `number` is that of the last one given out (1-based).
+
+    Raises FormatError for what is no text: NUL bytes, UTF-16, lines beyond `MAX_LINE_BYTES`.
+    """
+
+    def __init__(self, file: BinaryIO, size: int, path: Path) -> None:
+        self.number = 0
+        self.path = path
+        self.head = b""  # how the file begins, once the first line was given out
+        self._lines = self._split(file, size)
+
+    def __iter__(self) -> Iterator[bytes]:
+        return self._lines
+
+    def ends_here(self) -> bool:
+        """Whether nothing but blank lines and comments follows (they are skipped)."""
+        return not any(content(line) for line in self)
+
+    def error(self, message: str, token: bytes | str | None = None, line: int | None = None) -> FormatError:
+        """A FormatError at this line, or the given one."""
+        text = decoded(token) if isinstance(token, bytes) else token
+        return FormatError(message, path=self.path, line=line or self.number or None, token=text)
+
+    def _split(self, file: BinaryIO, size: int) -> Iterator[bytes]:
+        rest = b""
+        first = True
+        while size > 0:
+            try:
+                block = file.read(min(BLOCK_BYTES, size))
+            except OSError as error:
+                raise self.error(f"cannot be read: {error.strerror or error}") from error
+            if not block:
+                break
+            size -= len(block)
+            if first:
+                first = False
+                self.head = block[:HEAD_BYTES]
+                for mark, encoding in _MARKS:
+                    if block.startswith(mark):
+                        raise self.error(f"is {encoding} text; save it as UTF-8 or ASCII")
+                block = block.removeprefix(UTF8_MARK)
+                if not block:  # nothing but the mark
+                    continue
+            if b"\0" in block:
+                at = self.number + (rest + block[: block.index(b"\0")]).count(b"\n") + 1
+                raise self.error(
+                    f"holds NUL bytes: binary data or a damaged file, not text{but_recognised(self.head)}",
+                    line=at,
+                )
+            data = rest + block
+            lines = data.splitlines()
+            # the last line may go on in the next block, and a final CR may be half of a CR LF
+            rest = b"" if data.endswith(b"\n") else lines.pop() + (b"\r" if data.endswith(b"\r") else b"")
+            for line in lines:
+                self.number += 1
+                self._check(line)
+                yield line
+            self._check(rest, 1)
+        if rest:
+            self.number += 1
+            yield rest.removesuffix(b"\r")
+
+    def _check(self, line: bytes, ahead: int = 0) -> None:
+        if len(line) > MAX_LINE_BYTES + 1:
+            raise self.error(
+                f"a line of more than {MAX_LINE_BYTES} bytes: not a text file of this kind, "
+                "or its line ends are lost",
+                line=self.number + ahead,
+            )
+
+
+def content(line: bytes) -> bytes:
+    """The line without comment and surrounding blanks; empty where nothing is left."""
+    return line.partition(b"#")[0].strip()
+
+
+def decoded(text: bytes) -> str:
+    """Text as UTF-8, else as Latin-1, which takes any bytes."""
+    try:
+        return text.decode()
+    except UnicodeDecodeError:
+        return text.decode("latin-1")
+
+
+def is_mask(tokens: list[bytes]) -> bool:
+    """Whether these are the bits of a mask line, of whatever width."""
+    return len(tokens) >= _MASK_LIKE and _MASK_BITS.issuperset(tokens)
+
+
+@dataclass(frozen=True)
+class Header:
+    """The header line of a FAP or BAP file. frames: how many the file claims, or None."""
+
+    version: str
+    name: str
+    rate: Fraction
+    frames: int | None
+
+
+def is_header(tokens: list[bytes]) -> bool:
+    """Whether a line may be a header: `<version> <name, with blanks> <rate> <frames>`."""
+    return len(tokens) >= 3 and bool(_VERSION.fullmatch(tokens[0])) and not is_mask(tokens)
+
+
+def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Header:
+    """Take a header line apart: first token, the last two, and what is between as the name.
+
+    rate: counts instead of what the header says. Raises FormatError.
+    """
+    tokens = line.split()
+    if not is_header(tokens):
+        what = "expected a header `<version> <name> <frame rate> <number of frames>`"
+        raise lines.error(what + but_recognised(lines.head), token=line.strip())
+    try:
+        frames = int(float(tokens[-1]))  # some programs write 107.0
+    except (ValueError, OverflowError):
+        raise lines.error("the header must end in the number of frames", token=tokens[-1]) from None
+    if rate is None:
+        try:
+            rate = parse_rate(decoded(tokens[-2]))
+        except FormatError as error:
+            reason = str(error).partition(" (found")[0]
+            raise lines.error(reason, token=tokens[-2]).with_remedies(GIVE_RATE) from None
+    name = decoded(b" ".join(tokens[1:-2]))
+    return Header(decoded(tokens[0]), name, rate, frames if frames >= 0 else None)
+
+
+def sniff_layout(head: bytes, layout: Layout) -> bool:
+    """Whether a file that begins so has this layout: by its mask width, else by its version."""
+    version, width = sniff_columns(head)
+    if not width:
+        return version in layout.versions
+    known = [w for count in layout.widths for w in (count, count + 1)]
+    wide = [columns >= WIDE for columns in (width, layout.columns)]
+    return width in known or (version in layout.versions and wide[0] == wide[1])
+
+
+def sniff_columns(head: bytes) -> tuple[str, int]:
+    """What the beginning of a file shows of a FAP or BAP file: version ("" without a header) and the
+    width of its first mask (0 where there is none); ("", 0) where it is neither.
+    """
+    if b"\0" in head:
+        return "", 0
+    version = ""
+    for line in head.removeprefix(UTF8_MARK).splitlines():
+        if not content(line):
+            continue
+        tokens = line.split()
+        if is_mask(content(line).split()):
+            return version, len(content(line).split())
+        if version or not is_header(tokens):
+            return "", 0  # the second line of neither
+        version = decoded(tokens[0])
+        if not _is_number(tokens[-1]) or len(tokens) < 3:
+            return "", 0
+    return version, 0
+
+
+def _is_number(text: bytes) -> bool:
+    return bool(re.fullmatch(rb"[0-9.]{1,40}", text))

@@ -1,0 +1,92 @@
+"""Meshes of faces and bodies to glTF primitives and materials, and materials back."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from fba.errors import ModelError
+from fba.gltf.scene import Gltf
+from fba.gltf.values import Value
+from fba.gltf.writer import Builder
+from fba.mesh.meshes import Float32, Material, Mesh
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+class MeshPart(Mesh, Protocol):
+    """A mesh with its looks: a part of a face or of a body."""
+
+    @property
+    def texcoords(self) -> Float32 | None: ...
+    @property
+    def colours(self) -> Float32 | None: ...
+    @property
+    def material(self) -> Material: ...
+
+
+class Looks:
+    """Writes parts as primitives of a document; materials and textures once each."""
+
+    def __init__(self, builder: Builder) -> None:
+        self._builder = builder
+        self._known: dict[Material, int] = {}
+        self._textures: dict[int, int] = {}
+
+    def primitive(self, part: MeshPart) -> dict[str, Any]:
+        """The primitive of a part, for the list of a mesh. ModelError where glTF cannot hold it."""
+        if not len(part.triangles):
+            raise ModelError(
+                f"part {part.name!r} has no triangles; a glTF mesh needs some: leave the part out"
+            )
+        if part.material.texture is not None and part.texcoords is None:
+            raise ModelError(
+                f"part {part.name!r} has a texture, but no texture coordinates; leave the texture out"
+            )
+        attributes = {"POSITION": self._builder.attribute(part.vertices, bounds=True)}
+        for key, array in (("NORMAL", part.normals), ("TEXCOORD_0", part.texcoords)):
+            if array is not None:
+                attributes[key] = self._builder.attribute(array)
+        if part.colours is not None:
+            attributes["COLOR_0"] = self._builder.colours(part.colours)
+        return {
+            "attributes": attributes,
+            "indices": self._builder.triangles(part.triangles),
+            "material": self._material(part),
+        }
+
+    def _material(self, part: MeshPart) -> int:
+        # in glTF the colours of vertices multiply the material's, here they replace it
+        material, colour = part.material, part.material.colour if part.colours is None else WHITE
+        shown = Material(material.name, colour, material.roughness, material.texture)
+        if shown not in self._known:
+            self._known[shown] = self._builder.add("materials", self._entry(shown, part.name))
+        return self._known[shown]
+
+    def _entry(self, material: Material, part: str) -> dict[str, Any]:
+        numbers = (*material.colour, material.roughness)
+        if len(numbers) != 4 or not all(0 <= number <= 1 for number in numbers):
+            raise ModelError(
+                f"part {part!r}: colour and roughness of its material must be within 0..1, not {numbers}"
+            )
+        look: dict[str, Any] = {
+            "baseColorFactor": [*map(float, material.colour), 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": float(material.roughness),
+        }
+        if material.texture is not None:
+            image = self._builder.image(material.texture, material.name)
+            if image not in self._textures:
+                self._textures[image] = self._builder.add("textures", {"source": image})
+            look["baseColorTexture"] = {"index": self._textures[image]}
+        return {"name": material.name, "pbrMetallicRoughness": look}
+
+
+def material_of(entry: Value, gltf: Gltf, index: int | None) -> Material:
+    """The material of a part. entry: its entry in our extension, which keeps a colour that the colours of
+    vertices replace. index: the document's material, or None."""
+    given = entry.get("colour")
+    if index is None:
+        return Material()
+    shown = gltf.materials[index]
+    red, green, blue = shown.colour[:3] if given is None else given.numbers(3, 0.0, 1.0)
+    return Material(shown.name, (red, green, blue), shown.roughness, shown.texture)

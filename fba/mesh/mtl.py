@@ -1,0 +1,66 @@
+"""Materials of an OBJ file: its .mtl files, colours and one picture each."""
+
+from __future__ import annotations
+
+import os
+import warnings
+
+from fba.errors import FbaWarning, ModelError
+from fba.mesh.text_files import beside, number, whole, words
+from fba.face.model import Material
+
+MAX_PICTURE = 1 << 27
+"""Largest picture, in bytes."""
+PICTURES = (b"\x89PNG", b"\xff\xd8\xff")
+"""How PNG and JPEG files begin."""
+
+
+def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
+    """Materials by name of an .mtl file that lies beside an OBJ file; none where it is missing.
+
+    Kd is the colour (sRGB, as writers put it there), Ns the shine, map_Kd the picture: PNG or JPEG
+    beside the file, others are left out with an FbaWarning. Raises ModelError naming the line.
+    """
+    file = beside(path, library)
+    found: dict[str, Material] = {}
+    if file is None:
+        warnings.warn(f"{path}: its materials {library!r} do not lie beside it", FbaWarning, stacklevel=4)
+        return found
+    name: str | None = None
+    colour, rough, picture = (0.8, 0.8, 0.8), 0.6, b""
+
+    def finish() -> None:
+        if name is not None:
+            found[name] = Material(name, (1.0, 1.0, 1.0) if picture else colour, rough, picture or None)
+
+    for where, tokens in words(file):
+        if len(tokens) < 2:
+            continue
+        if tokens[0] == "newmtl":
+            finish()
+            name, colour, rough, picture = " ".join(tokens[1:]), (0.8, 0.8, 0.8), 0.6, b""
+        elif tokens[0] == "Kd" and len(tokens) >= 4:
+            r, g, b = (min(max(number(t, where, "a colour"), 0.0), 1.0) ** 2.2 for t in tokens[1:4])
+            colour = (r, g, b)
+        elif tokens[0] == "Ns":
+            rough = max(0.05, (2.0 / (max(number(tokens[1], where, "Ns"), 0.0) + 2.0)) ** 0.25)
+        elif tokens[0] == "map_Kd":
+            picture = _picture(file, tokens[-1], where)
+    finish()
+    return found
+
+
+def _picture(file: os.PathLike[str], name: str, where: str) -> bytes:
+    path = beside(file, name)
+    if path is None:
+        warnings.warn(f"{where}: the picture {name!r} does not lie beside it", FbaWarning, stacklevel=5)
+        return b""
+    try:
+        content = whole(path, MAX_PICTURE)
+    except ModelError as error:
+        warnings.warn(f"{where}: {error}", FbaWarning, stacklevel=5)
+        return b""
+    if not content.startswith(PICTURES):
+        warnings.warn(f"{where}: {name!r} is neither PNG nor JPEG; left out", FbaWarning, stacklevel=5)
+        return b""
+    return content

@@ -1,0 +1,60 @@
+"""Wire frame models (.wfm) of Candide: a low-polygon face, its action units and shape units."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import numpy as np
+
+from fba.errors import ModelError
+from fba.mesh.text_files import MAX_FACES, MAX_VERTICES, number, whole_number, words
+from fba.mesh.polygons import Polygons
+
+
+def read_wfm(path: str | os.PathLike[str]) -> Polygons:
+    """Vertices and triangles of a .wfm file, in its own unit (Candide: a face is about 2 high).
+
+    The lists of animation and shape units after the faces are not read. Raises ModelError naming the
+    line.
+    """
+    name = os.fspath(path)
+    rows = words(name)
+    vertices = _table(rows, name, "vertices", MAX_VERTICES)
+    faces = _table(rows, name, "faces", MAX_FACES)
+    positions = np.array([[number(t, where, "a coordinate") for t in tokens] for where, tokens in vertices])
+    corners = np.array(
+        [[whole_number(t, where, "a vertex") for t in tokens] for where, tokens in faces], dtype=np.int64
+    )
+    for (where, _), triangle in zip(faces, corners, strict=True):
+        if triangle.min() < 0 or triangle.max() >= len(positions):
+            raise ModelError(f"{where}: vertex {triangle.max()} does not exist; there are {len(positions)}")
+    return Polygons(
+        positions,
+        np.arange(len(corners) + 1, dtype=np.int32) * 3,
+        corners.reshape(-1).astype(np.int32),
+        np.full(corners.size, -1, dtype=np.int32),
+        np.zeros(len(corners), dtype=np.int32),
+        (("", ""),),
+    )
+
+
+def _table(
+    rows: Iterator[tuple[str, list[str]]], path: str, what: str, most: int
+) -> list[tuple[str, list[str]]]:
+    """A count, then as many rows of three."""
+    where, tokens = next(rows, (path, []))
+    if len(tokens) != 1:
+        raise ModelError(f"{where}: the number of {what} is expected here, alone on its line")
+    count = whole_number(tokens[0], where, f"the number of {what}")
+    if not 1 <= count <= most:
+        raise ModelError(f"{where}: {count} {what}; a face has 1 to {most}")
+    found: list[tuple[str, list[str]]] = []
+    for _ in range(count):
+        where, tokens = next(rows, (path, []))
+        if not tokens:
+            raise ModelError(f"{path}: ends after {len(found)} of {count} {what}")
+        if len(tokens) != 3:
+            raise ModelError(f"{where}: three numbers are expected of each of the {what}, not {len(tokens)}")
+        found.append((where, tokens))
+    return found

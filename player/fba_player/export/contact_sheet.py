@@ -1,0 +1,161 @@
+"""Sheets of small pictures: every FAP, viseme and expression of a face, with its name below it."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.face.model import FaceModel, point_row
+from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
+from fba.tracks import FaceTrack
+from fba_player.view.camera import Camera, Subject
+from fba_player.view.font import label_font, shortened
+from fba_player.export.offscreen import Offscreen
+from fba_player.scene.scene import Scene
+
+UInt8 = npt.NDArray[np.uint8]
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+SHEETS = ("faps", "visemes", "expressions", "all")
+"""What there are sheets of."""
+COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3}
+TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360)}
+"""Columns, and width and height of a picture in pixels."""
+TEXT, FAINT, PAPER = (232, 235, 240), (158, 165, 175), (34, 37, 43)
+SPACE = 4
+"""Pixels between pictures."""
+FULL = 63
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """One picture. label, note: the two lines below it. faps (68,): what the face shows."""
+
+    label: str
+    note: str
+    faps: Float32
+    view: str = "face"
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+
+def contact_sheet(
+    what: str = "all", model: FaceModel | None = None, *, tile: tuple[int, int] | None = None
+) -> UInt8:
+    """A sheet of labelled pictures: uint8 (H, W, 3), sRGB.
+
+    what: "faps", all 66 one by one at a telling value, from where it can be seen; "visemes", the 14;
+    "expressions", the 6 at full intensity; "all", one sheet below the other. model: the face, by default
+    the built-in head. tile: width and height of one picture in pixels.
+
+    Raises ValueError for another name or a size below 16, DisplayError where there is no OpenGL.
+    """
+    if what not in SHEETS:
+        raise ValueError(f"no contact sheet {what!r}; there are {', '.join(SHEETS)}")
+    if tile is not None and min(tile) < 16:
+        raise ValueError(f"a picture of a contact sheet must have at least 16x16 pixels, not {tile}")
+    kinds = COLUMNS if what == "all" else (what,)
+    scene = Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model or FaceModel.default())
+    sheets = [_sheet(scene, kind, tile or TILE[kind]) for kind in kinds]
+    wide = max(sheet.shape[1] for sheet in sheets)
+    whole = np.full((sum(sheet.shape[0] for sheet in sheets), wide, 3), PAPER, dtype=np.uint8)
+    row = 0
+    for sheet in sheets:
+        height, width = sheet.shape[:2]
+        left = (wide - width) // 2
+        whole[row : row + height, left : left + width] = sheet
+        row += height
+    return whole
+
+
+def tiles(kind: str, scene: Scene) -> list[Tile]:
+    """The pictures of a sheet: "faps", "visemes" or "expressions"."""
+    if kind == "faps":
+        return list(_fap_tiles())
+    definitions = scene.model.definitions
+    if kind == "visemes":
+        rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)
+        return [Tile(name, f"viseme {n}", row, "cheeks") for n, (name, row) in enumerate(rows, start=1)]
+    rows = zip(EXPRESSIONS[1:], definitions.expressions[1:], strict=True)
+    return [Tile(name, f"expression {n}, {FULL}", row) for n, (name, row) in enumerate(rows, start=1)]
+
+
+@cache
+def _fap_tiles() -> tuple[Tile, ...]:
+    found = []
+    with (files(__package__) / "contact_sheet.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            number, value = int(row["fap"]), int(row["value"])
+            vector = np.zeros(FAP_COUNT, dtype=np.float32)
+            for pair in row["with"].split():
+                other, _, amount = pair.partition("=")
+                vector[int(other) - 1] = float(amount)
+            vector[number - 1] = value
+            vector.flags.writeable = False
+            label = f"{number} {faps()[number - 1].name}"
+            yaw, pitch = float(row["yaw"]), float(row["pitch"])
+            found.append(Tile(label, f"{value:+d}", vector, row["view"], yaw, pitch))
+    return tuple(found)
+
+
+def close_up(view: str, scene: Scene) -> Subject:
+    """What is in view: "face", or a part of it by the model's feature points; "face" where it lacks them."""
+    whole = scene.face_subject
+    unit = scene.model.fapu
+    eyes, mouth, nose = unit.ES * 1024, unit.MW * 1024, unit.ENS * 1024
+    places: dict[str, tuple[tuple[str, ...], tuple[float, float, float], float, float]] = {
+        "eyes": (("3.5", "3.6"), (0.0, 0.0, 0.0), 0.62 * eyes, 0.95 * eyes),
+        "left eye": (("3.5",), (0.0, 0.0, 0.0), 0.42 * eyes, 0.42 * eyes),
+        "right eye": (("3.6",), (0.0, 0.0, 0.0), 0.42 * eyes, 0.42 * eyes),
+        "left ear": (("10.1", "10.5"), (0.0, 0.0, 0.0), 1.1 * nose, 1.1 * nose),
+        "right ear": (("10.2", "10.6"), (0.0, 0.0, 0.0), 1.1 * nose, 1.1 * nose),
+        "cheeks": (("9.3", "3.5", "3.6"), (0.0, -0.45 * nose, 0.0), 1.05 * eyes, 1.05 * eyes),
+        "brows": (("3.5", "3.6"), (0.0, 0.35 * eyes, 0.0), 0.80 * eyes, 1.15 * eyes),
+        "nose": (("9.3", "9.15"), (0.0, 0.12 * nose, 0.0), 0.75 * nose, 0.80 * nose),
+        "mouth": (("8.1", "8.2", "8.3", "8.4"), (0.0, -0.12 * mouth, 0.0), 0.75 * mouth, 0.85 * mouth),
+        "jaw": (("8.3", "8.4", "2.1"), (0.0, 0.0, 0.0), 1.45 * mouth, 1.5 * mouth),
+    }
+    if view not in places:
+        x, y, z = whole.centre
+        return Subject(
+            (x, y + 0.05 * whole.half_height, z), 0.86 * whole.half_height, 0.86 * whole.half_width
+        )
+    names, offset, high, wide = places[view]
+    points = scene.model.points
+    middle: Float64 = np.mean([points[point_row(name)] for name in names], axis=0) + offset
+    if not np.isfinite(middle).all():
+        return whole
+    x, y, z = (float(v) for v in middle)
+    return Subject((x, y, z), high, wide)
+
+
+def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> UInt8:
+    from PIL import Image, ImageDraw
+
+    wanted = tiles(kind, scene)
+    columns = COLUMNS[kind]
+    rows = -(-len(wanted) // columns)
+    width, height = size
+    letters = max(min(width // 12, 16), 7)
+    line = round(letters * 1.35)
+    step = (width + SPACE, height + 2 * line + SPACE + 4)
+    sheet = Image.new("RGB", (columns * step[0] + SPACE, rows * step[1] + SPACE), PAPER)
+    draw = ImageDraw.Draw(sheet)
+    font, small = label_font(letters), label_font(letters * 0.9)
+    with Offscreen(scene, size, samples=4) as view:
+        for number, one in enumerate(wanted):
+            x, y = SPACE + number % columns * step[0], SPACE + number // columns * step[1]
+            subject = close_up(one.view, scene)
+            view.camera = Camera(yaw=one.yaw, pitch=one.pitch).fit(subject, width / height)
+            sheet.paste(Image.fromarray(view.still(one.faps)[..., :3]), (x, y))
+            draw.text((x + 2, y + height + 2), shortened(draw, one.label, font, width), font=font, fill=TEXT)
+            draw.text((x + 2, y + height + 2 + line), one.note, font=small, fill=FAINT)
+    return np.asarray(sheet)

@@ -1,0 +1,129 @@
+"""Films as GIF: one palette, made from the whole film, and dithering that rests where the picture rests."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import tempfile
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.export.mp4 import import_av
+from fba.atomic_path import PathLike, cannot, written
+
+UInt8 = npt.NDArray[np.uint8]
+
+SMOOTH = Fraction(25)
+"""Frames a second that are enough where none are asked for; some browsers slow down above 50."""
+IN_MEMORY = 64 << 20
+"""Bytes of pictures that are held in memory until the palette is known; beyond that, on disk."""
+TICKS = 100
+"""A GIF's times are hundredths of a second."""
+DITHER = "paletteuse=dither=sierra2_4a:diff_mode=rectangle"
+
+
+def gif_rate(rate: Fraction) -> Fraction:
+    """The rate that a film would have, divided by a whole number where it is above 25 frames a second."""
+    return rate / math.ceil(rate / SMOOTH)
+
+
+class Gif:
+    """A `Sink`: loops for ever. The pictures wait, packed, until the last one is there.
+
+    See `Recorder` for the arguments.
+    """
+
+    def __init__(self, path: PathLike, size: tuple[int, int], rate: Fraction) -> None:
+        self._av = import_av()
+        if min(size) < 1 or max(size) > 65535:
+            raise ValueError(f"a GIF has 1x1 to 65535x65535 pixels, not {size[0]}x{size[1]}")
+        if rate > TICKS:
+            raise ValueError(f"a GIF has at most {TICKS} frames a second, not {rate}")
+        self.stopped = False
+        self._path, self._size, self._rate = Path(path), size, rate
+        self._numbers: list[int] = []
+        self._keep = contextlib.ExitStack()
+        self._temporary = self._keep.enter_context(written(path))
+        self._pictures = self._keep.enter_context(tempfile.SpooledTemporaryFile(IN_MEMORY))  # noqa: SIM115
+        self._colours, self._into, self._palette = self._graph("palettegen=stats_mode=full", 1)
+
+    def write(self, pixels: UInt8, number: int) -> None:
+        """A picture, uint8 (H, W, 4), at number / rate seconds."""
+        try:
+            self._pictures.write(np.ascontiguousarray(pixels[..., :3]).data)
+        except OSError as error:
+            raise cannot(self._path, error, "its pictures could not be kept") from error
+        self._into[0].push(self._frame(pixels, "rgba", number))
+        self._numbers.append(number)
+
+    def finish(self, count: int) -> Path:
+        """The film, count / rate seconds long, stands under its name."""
+        self._into[0].push(None)
+        palette = self._palette.pull()
+        times = [round(number / self._rate * TICKS) for number in (*self._numbers, count)]
+        last = max(times[-1] - times[-2], 1)
+        options = {"loop": "0", "final_delay": str(last)}
+        try:
+            with self._av.open(str(self._temporary), "w", format="gif", options=options) as container:
+                self._encode(container, palette, times)
+        except self._av.error.FFmpegError as error:
+            raise cannot(self._path, error) from error
+        if self.stopped:
+            self.abort()
+        self._keep.close()
+        return self._path
+
+    def abort(self) -> None:
+        """Remove what there is of it."""
+        with contextlib.suppress(InterruptedError), self._keep:
+            raise InterruptedError
+
+    def _encode(self, container: Any, palette: Any, times: list[int]) -> None:
+        width, height = self._size
+        stream = container.add_stream("gif", rate=TICKS)
+        stream.width, stream.height, stream.pix_fmt = width, height, "pal8"
+        stream.codec_context.time_base = Fraction(1, TICKS)
+        _graph, into, out = self._graph(DITHER, 2)
+        into[1].push(palette)
+        into[1].push(None)
+        self._pictures.seek(0)
+        at = -1
+        for number, time in zip(self._numbers, times, strict=False):
+            data = self._pictures.read(width * height * 3)
+            if self.stopped:
+                return
+            if time <= at:
+                continue  # two within a hundredth of a second
+            at = time
+            pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)
+            into[0].push(self._frame(pixels, "rgb24", number))
+            reduced = out.pull()
+            reduced.pts, reduced.time_base = time, Fraction(1, TICKS)
+            container.mux(stream.encode(reduced))
+        container.mux(stream.encode(None))
+
+    def _frame(self, pixels: UInt8, layout: str, number: int) -> Any:
+        frame = self._av.VideoFrame.from_ndarray(pixels, format=layout)
+        frame.pts, frame.time_base = number, Fraction(1, 1000)
+        return frame
+
+    def _graph(self, description: str, inputs: int) -> tuple[Any, list[Any], Any]:
+        """A filter between pictures of the film's size and what comes out; a second input is a palette."""
+        name, _, options = description.partition("=")
+        graph = self._av.filter.Graph()
+        width, height = self._size
+        tick = Fraction(1, 1000)
+        pixels = "rgba" if inputs == 1 else "rgb24"
+        sources = [graph.add_buffer(width=width, height=height, format=pixels, time_base=tick)]
+        if inputs == 2:
+            sources.append(graph.add_buffer(width=16, height=16, format="bgra", time_base=tick))
+        step, end = graph.add(name, options), graph.add("buffersink")
+        for place, source in enumerate(sources):
+            source.link_to(step, 0, place)
+        step.link_to(end)
+        graph.configure()
+        return graph, sources, end

@@ -1,0 +1,62 @@
+"""Single pictures as files: PNG, with transparency where there is some, and JPEG."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.atomic import atomic
+from fba.errors import UnsupportedError
+from fba.atomic_path import PathLike
+
+UInt8 = npt.NDArray[np.uint8]
+
+PICTURES = (".png", ".jpg", ".jpeg")
+JPEG_QUALITY = 90
+
+
+def write_picture(path: PathLike, pixels: UInt8, *, transparent: bool = False) -> Path:
+    """Write pixels, uint8 (H, W, 3 or 4), sRGB, as .png or .jpg, whole or not at all; returns the path.
+
+    transparent: keeps the fourth channel, how opaque each pixel is (not multiplied into the others); PNG
+    only. Raises UnsupportedError for another suffix, or a transparent JPEG,
+    FormatError where it cannot be written.
+    """
+    target = Path(path)
+    check_picture(target, transparent=transparent)
+    with atomic(target) as file:
+        put_picture(file, pixels, target.suffix, transparent=transparent)
+    return target
+
+
+def put_picture(file: BinaryIO, pixels: UInt8, suffix: str, *, transparent: bool = False) -> None:
+    """Like `write_picture`, into an open file."""
+    from PIL import Image
+
+    channels = slice(None) if transparent else slice(3)
+    picture = Image.fromarray(np.ascontiguousarray(pixels[..., channels]))
+    if suffix.lower() == ".png":
+        # The search for repeats longer than runs takes five times as long, and finds little where light
+        # falls on skin: files are as large without, or smaller than with a quick search.
+        picture.save(file, format="PNG", compress_type=zlib.Z_RLE)
+    else:
+        picture.save(file, format="JPEG", quality=JPEG_QUALITY)
+
+
+def check_picture(target: Path, *, transparent: bool) -> None:
+    """Raise UnsupportedError where a picture of that name cannot be written."""
+    suffix = target.suffix.lower()
+    if suffix not in PICTURES:
+        raise UnsupportedError(
+            f"{target}: pictures are written as .png or .jpg, not as {suffix or 'a bare name'}",
+            what=f"rendering to {suffix or 'no suffix'}",
+        )
+    if transparent and suffix != ".png":
+        raise UnsupportedError(
+            f"{target}: only PNG pictures can be transparent; name it {target.with_suffix('.png').name}",
+            what=f"transparency in {suffix}",
+        )

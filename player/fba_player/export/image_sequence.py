@@ -1,0 +1,128 @@
+"""Films as numbered pictures: frames/00000.png, frames/00001.png, ..."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import FormatError, Remedy, UnsupportedError
+from fba_player.export.image_files import check_picture, write_picture
+from fba_player.export.recorder import FILMS
+from fba.atomic_path import PathLike, cannot
+
+UInt8 = npt.NDArray[np.uint8]
+
+NUMBER = re.compile(r"%(0?\d{0,2})d")
+NAMES = "%05d.png"
+"""How the pictures of a folder are called where only the folder is given."""
+
+
+class Numbered:
+    """The names of a sequence of pictures.
+
+    path: a name with %05d, or %d, where the number goes, or a folder with a slash at its end.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        text = os.fspath(path)
+        if text.endswith(("/", os.sep)):
+            text = os.path.join(text, NAMES)
+        self.folder, self.name = Path(text).parent, Path(text).name
+        numbers = NUMBER.findall(self.name)
+        if len(numbers) != 1 or self.name.count("%") != 1 or "%" in str(self.folder):
+            raise UnsupportedError(
+                f"{text}: the names of numbered pictures have their number at one place of the last part, "
+                f"written %05d: e.g. frames/{NAMES}",
+                what="names of pictures",
+            )
+        digits = numbers[0].lstrip("0")
+        self._width = int(digits) if digits else 0
+        if self._width and not numbers[0].startswith("0"):
+            raise UnsupportedError(
+                f"{text}: write %0{numbers[0]}d, so that the numbers have zeros in front",
+                what="names of pictures",
+            )
+        self._before, self._after = NUMBER.split(self.name)[0], NUMBER.split(self.name)[-1]
+
+    def path(self, number: int) -> Path:
+        """The picture of a frame, counted from 0."""
+        return self.folder / f"{self._before}{number:0{self._width}d}{self._after}"
+
+    def there(self) -> list[int]:
+        """Numbers of the pictures that exist already, sorted."""
+        try:
+            names = os.listdir(self.folder)
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise cannot(self.folder, error, "cannot be looked into") from error
+        pattern = re.compile(f"{re.escape(self._before)}(\\d+){re.escape(self._after)}")
+        numbers = [int(found[1]) for name in names if (found := pattern.fullmatch(name))]
+        return sorted(number for number in numbers if self.path(number).exists())
+
+
+def is_sequence(path: PathLike) -> bool:
+    """Whether a name means numbered pictures: it has a % in its last part, or ends with a slash."""
+    text = os.fspath(path)
+    return text.endswith(("/", os.sep)) or "%" in os.path.basename(text)
+
+
+def is_film(path: PathLike) -> bool:
+    """Whether a name means many pictures: a film, or numbered ones."""
+    return os.path.splitext(os.fspath(path))[1].lower() in FILMS or is_sequence(path)
+
+
+class Sequence:
+    """A `Sink`: one picture a frame, each whole or not at all, the first one number 0.
+
+    names: see `Numbered`. count: how many there will be. transparent: PNG with an alpha channel. replace:
+    False refuses where pictures of these names exist; True replaces them, but refuses where some would be
+    left of an older, longer sequence. The folder is made where it is missing.
+
+    Raises FormatError where it refuses, UnsupportedError for names that are not those of pictures.
+    """
+
+    def __init__(
+        self, names: Numbered, count: int, *, transparent: bool = False, replace: bool = False
+    ) -> None:
+        check_picture(Path(names.name), transparent=transparent)
+        there = names.there()
+        if there and not replace:
+            raise FormatError(
+                f"{_several(names, there)} there already; choose another folder", path=names.folder
+            ).with_remedies(Remedy("replace", "or have them replaced with {}", "True"))
+        if beyond := [number for number in there if number >= count]:
+            raise FormatError(
+                f"{_several(names, beyond)} left from a longer sequence, and would follow the {count} new "
+                "pictures; delete them, or choose another folder",
+                path=names.folder,
+            )
+        self.stopped = False
+        self._names, self._transparent = names, transparent
+        try:
+            names.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot(names.folder, error, "the folder cannot be made") from error
+
+    def write(self, pixels: UInt8, number: int) -> None:
+        """A picture, uint8 (H, W, 4)."""
+        path = self._names.path(number)
+        write_picture(path, pixels, transparent=self._transparent)
+
+    def finish(self, count: int) -> Path:
+        """The folder; all pictures are there."""
+        return self._names.folder
+
+    def abort(self) -> None:
+        """Pictures that are finished stay."""
+
+
+def _several(names: Numbered, numbers: list[int]) -> str:
+    first = names.path(numbers[0]).name
+    if len(numbers) == 1:
+        return f"{first} is"
+    return f"{first} to {names.path(numbers[-1]).name} ({len(numbers)} pictures) are"

@@ -1,0 +1,162 @@
+"""Animations in notebooks: a small film in the page.
+
+`Animation._repr_html_`, which notebooks call and terminals do not, looks this module up by name when it is
+called: nobody has to import the player first, and the library below it does not depend on it.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import math
+import tempfile
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from fba.animation import Animation
+from fba.errors import DisplayError, FbaError
+from fba_player.view.camera import Camera
+from fba_player.view.protocols import Showable
+from fba_player.playback.timecode import clock_text
+from fba.atomic_path import PathLike
+
+WIDTH, SHAPE = 480, 4 / 3
+"""Of the film: pixels, and width by height."""
+SECONDS = Fraction(15)
+"""A longer performance is cut: a page is not to grow by it, nor its reader to wait."""
+RATE = Fraction(30)
+"""More frames a second are thinned out."""
+MOST_BYTES = 4 << 20
+"""A film that is larger is not put into the page."""
+NARROWEST = 16
+
+
+class Preview:
+    """A film of an animation that a notebook shows where this is the value of a cell.
+
+    subject: an animation or a scene. width: pixels, at least 16; the height is three quarters of it. camera:
+    as `Offscreen` takes it. start, end: seconds, which part of it; at most 15 s are shown. audio: a file
+    whose sound is heard with it, audio_offset seconds later than the first frame.
+
+    Without a video encoder it is a still picture, without OpenGL a line of text; it says so.
+    """
+
+    def __init__(
+        self,
+        subject: Animation | Showable,
+        *,
+        width: int = WIDTH,
+        camera: Camera | str | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        audio: PathLike | None = None,
+        audio_offset: float = 0.0,
+    ) -> None:
+        if width < NARROWEST:
+            raise ValueError(f"a preview is at least {NARROWEST} pixels wide, not {width}")
+        for name, value in (("start", start), ("end", end)):
+            if value is not None and not math.isfinite(value):
+                raise ValueError(f"{name} must be a finite number of seconds, not {value}")
+        self._subject = subject
+        shown: Any = subject
+        self._animation: Animation = subject if isinstance(subject, Animation) else shown.animation
+        self._size = (width // 2 * 2, round(width / SHAPE) // 2 * 2)
+        self._camera, self._start, self._end = camera, start, end
+        self._audio, self._audio_offset = audio, audio_offset
+        self._html: str | None = None
+
+    def __repr__(self) -> str:
+        return f"<preview of {described(self._animation)}>"
+
+    def _repr_html_(self) -> str:
+        """The film as HTML that needs nothing else; made once."""
+        if self._html is None:
+            self._html = self._made()
+        return self._html
+
+    def _made(self) -> str:
+        caption = described(self._animation)
+        if not len(self._animation):
+            return _figure("", caption)
+        from fba_player.export.render import as_scene
+
+        try:
+            scene = as_scene(self._subject)
+            try:
+                shown, note = self._film(scene)
+            except DisplayError as error:
+                shown, note = self._still(scene), f"A still picture only: {error}"
+        except FbaError as error:
+            shown, note = "", f"No picture: {error}"
+        return _figure(shown, caption, note)
+
+    def _film(self, scene: Showable) -> tuple[str, str]:
+        from fba_player.export.render import film_rate, record
+
+        rate = film_rate(scene.timeline.rate)
+        rate /= -(-rate // RATE)  # whole frames are left out
+        begin, end = scene.timeline.start, scene.timeline.end
+        begin = begin if self._start is None else max(Fraction(self._start), begin)
+        end = end if self._end is None else min(Fraction(self._end), end)
+        last = min(end, begin + SECONDS)
+        note = ""
+        if last < end:
+            note = (
+                f"Shown are {float(SECONDS):g} s from {clock_text(begin)} on. "
+                "player.Preview(clip, start=...) shows others, player.render(clip, 'clip.mp4') all."
+            )
+        with tempfile.TemporaryDirectory(prefix="fba-") as folder:
+            path = Path(folder) / "preview.mp4"
+            record(
+                scene, path, fps=rate, size=self._size, camera=self._camera,
+                start=float(begin), end=float(last), audio=self._audio, audio_offset=self._audio_offset,
+            )  # fmt: skip
+            data = path.read_bytes()
+        if len(data) > MOST_BYTES:
+            size = f"{len(data) / 2**20:.1f} MB"
+            text = (
+                f"A still picture only: the film would add {size} to the page; show less of it, or smaller."
+            )
+            return self._still(scene), text
+        width, height = self._size
+        sound = "muted " if self._audio is None else ""
+        return (
+            f'<video controls loop {sound}playsinline width="{width}" height="{height}" '
+            f'src="data:video/mp4;base64,{base64.b64encode(data).decode()}"></video>'
+        ), note
+
+    def _still(self, scene: Showable) -> str:
+        from fba_player.export.offscreen import Offscreen
+        from fba_player.export.image_files import put_picture
+
+        width, height = self._size
+        with Offscreen(scene, self._size, self._camera) as view:
+            pixels = view.frame(float(scene.timeline.start) if self._start is None else self._start)
+        file = io.BytesIO()
+        put_picture(file, pixels, ".png")
+        data = base64.b64encode(file.getvalue()).decode()
+        return f'<img width="{width}" height="{height}" src="data:image/png;base64,{data}">'
+
+
+def described(animation: Animation) -> str:
+    """One line about an animation: its name, length, rate, and what it moves."""
+    parts = [
+        name for name, track in (("face", animation.face), ("body", animation.body)) if track is not None
+    ]
+    frames = len(animation)
+    rate = f"{float(animation.rate):.3f}".rstrip("0").rstrip(".")
+    name = f"{animation.name}: " if animation.name else ""
+    return (
+        f"{name}{frames} frame{'s' * (frames != 1)}, {clock_text(animation.duration)} at {rate} frames/s, "
+        f"{' and '.join(parts)}"
+    )
+
+
+def _figure(shown: str, *lines: str) -> str:
+    text = "<br>".join(html.escape(line) for line in lines if line)
+    return (
+        f'<figure style="margin: 0">{shown}'
+        f'<figcaption style="font-size: 90%; color: gray">{text}</figcaption></figure>'
+    )

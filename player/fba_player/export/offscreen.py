@@ -1,0 +1,172 @@
+"""Pictures without a window: an animation at any time as an array of pixels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.parameters import FAP_COUNT
+from fba_player.view.camera import Camera
+from fba_player.gl.context import offscreen_context
+from fba_player.gl.gpu.choice import checked
+from fba_player.gl.renderer import Renderer
+from fba_player.scene.scene import Scene
+from fba_player.view.view import View
+from fba_player.view.protocols import Showable
+from fba_player.gl.framebuffer import Target
+
+UInt8 = npt.NDArray[np.uint8]
+
+SAMPLES = 0
+"""Samples a pixel; 0: one, and edges smoothed afterwards."""
+SAMPLES_OF_CLEAR = 4
+"""At least so many where the background is transparent."""
+
+
+class Offscreen:
+    """Renders a scene into memory; needs no display.
+
+    subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a
+    `Camera`, the name of a preset, or None for the one that suits the content. samples: samples a pixel
+    against jagged edges, 0 for one and a pass that smooths edges. deform: who moves the vertices of figures,
+    "cpu", "gpu", or "auto" for what the environment variable FBA_DEFORM says, else for what is faster; the
+    picture is the same. Use it as a context manager, or `close` it. One thread only.
+
+    Raises DisplayError where OpenGL is missing or cannot draw this size; the text says what to install.
+    ValueError for a size below 1, an unknown preset, or another word for deform.
+    """
+
+    def __init__(
+        self,
+        subject: Animation | Showable,
+        size: tuple[int, int] = (1280, 720),
+        camera: Camera | str | None = None,
+        *,
+        samples: int = SAMPLES,
+        deform: str = "auto",
+    ) -> None:
+        checked(deform)
+        width, height = (int(v) for v in size)
+        if width < 1 or height < 1:
+            raise ValueError(f"a picture must have at least 1x1 pixels, not {width}x{height}")
+        self.scene: Any = Scene(subject) if isinstance(subject, Animation) else subject
+        self.size = (width, height)
+        aspect = width / height
+        self.camera = camera if isinstance(camera, Camera) else self.scene.camera(camera, aspect)
+        self._gl: Any = offscreen_context()
+        self._target: Target | None = None
+        self._renderer: Renderer | None = None
+        self._exact: Target | None = None
+        self._samples = samples
+        try:
+            with self._gl:  # current only while it is used: other contexts of this thread go on working
+                self._target = Target(self._gl, self.size, samples)
+                self._renderer = Renderer(self._gl, deform)
+        except Exception:
+            self.close()
+            raise
+        self._buffer = bytearray(width * height * 4)
+
+    def frame(self, time: float) -> UInt8:
+        """The picture at a time in seconds: uint8 (H, W, 4), sRGB, top row first; opaque, unless the scene's
+        background is switched to transparent.
+
+        The same time gives the same picture. Raises ValueError for a time that is not finite, or after
+        `close`.
+        """
+        return self.draw(time).copy()
+
+    def draw(self, time: float) -> UInt8:
+        """Like `frame`, into memory that the next call overwrites."""
+        if self._target is None:
+            raise ValueError("this Offscreen is closed")
+        return self._drawn(self.scene.at(time), following(self.camera, self.scene, time))
+
+    def still(self, faps: npt.ArrayLike) -> UInt8:
+        """A picture of the face for FAPs (68,) as `fba.face.resolve` gives them: uint8 (H, W, 4).
+
+        `camera` may be set in between. Raises ValueError for another shape, or after `close`.
+        """
+        values = np.asarray(faps, dtype=np.float32)
+        if values.shape != (FAP_COUNT,):
+            raise ValueError(f"FAPs must have shape ({FAP_COUNT},), not {values.shape}")
+        return self._drawn(self.scene.still(values), self.camera).copy()
+
+    def _drawn(self, view: View, camera: Camera) -> UInt8:
+        if self._target is None or self._renderer is None:
+            raise ValueError("this Offscreen is closed")
+        if self.scene.switches["background"] == "transparent":
+            return cut_out(*self._before_black_and_white(view, camera))
+        return self._read(view, camera, self._target)
+
+    def _before_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
+        """Both by several samples a pixel: a pass that smooths edges overlooks dark ones before black."""
+        with self._gl:
+            if self._exact is None:
+                self._exact = Target(self._gl, self.size, max(self._samples, SAMPLES_OF_CLEAR))
+        views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)]
+        return [self._read(one, camera, self._exact).copy() for one in views]
+
+    def _read(self, view: View, camera: Camera, target: Target) -> UInt8:
+        assert self._renderer is not None
+        with self._gl:
+            target.begin()
+            within = self._renderer.draw(view, camera, self.size)
+            target.finish(within=within).read_into(self._buffer, components=4)
+        width, height = self.size
+        pixels = np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)
+        if view.extras is not None:
+            pixels[..., 3] = 255  # extras leave a mark there for the target
+        return pixels[::-1]
+
+    @property
+    def deformed(self) -> tuple[str, str]:
+        """Who moved the vertices of the last picture's figures, "cpu" or "gpu", and why."""
+        if self._renderer is None:
+            raise ValueError("this Offscreen is closed")
+        way = self._renderer.way
+        return "gpu" if way.on_gpu else "cpu", way.reason
+
+    def close(self) -> None:
+        """Give everything back; safe to call twice."""
+        if self._gl is None:
+            return
+        with self._gl:
+            for part in (self._renderer, self._target, self._exact):
+                if part is not None:
+                    part.close()
+        self._renderer = self._target = self._exact = None
+        self._gl.release()
+        self._gl = None
+
+    def __enter__(self) -> Offscreen:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def cut_out(black: UInt8, white: UInt8) -> UInt8:
+    """(H, W, 4) what is in front, with alpha, of the same picture before black and before white."""
+    dark, light = (picture[..., :3].astype(np.float32) for picture in (black, white))
+    opaque = np.clip(1 - (light - dark).mean(axis=2) / 255, 0.0, 1.0)
+    found = np.empty_like(black)
+    found[..., :3] = np.clip(np.round(dark / np.maximum(opaque, 1 / 255)[..., None]), 0, 255)
+    found[..., 3] = np.round(opaque * 255)
+    return found
+
+
+def following(camera: Camera, scene: Scene, time: float) -> Camera:
+    """The camera, moved along with a performance that walks away."""
+    moved = scene.travel(time)
+    if not any(moved):
+        return camera
+    x, y, z = (a + b for a, b in zip(camera.target, moved, strict=True))
+    return replace(camera, target=(x, y, z))

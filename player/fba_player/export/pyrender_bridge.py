@@ -1,0 +1,239 @@
+"""A pose as a scene of pyrender, for programs that are built on it, and as a second opinion on our pictures.
+
+pyrender is an extra: `pip install ".[pyrender]"` in the checkout, or `pip install pyrender`. Its last release
+was made for NumPy 1: what it misses of that is lent to it while a scene is built, and taken back, so that
+nothing else sees it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.errors import DisplayError
+from fba_player.view.camera import Camera
+from fba_player.export.offscreen import following
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.scene.scene import Scene
+from fba_player.view.view import Eye, FaceMesh, Mesh
+from fba_player.gl.system_libraries import missing_libraries, missing_text
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyModel
+    from fba.face.model import FaceModel
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+NUMPY_1 = {"infty": np.inf, "Inf": np.inf, "NaN": np.nan, "float_": np.float64}
+"""Names that NumPy 2 has dropped and pyrender, or trimesh below it, may ask for."""
+WHITE, PUPIL = (0.62, 0.58, 0.55), (0.004, 0.004, 0.004)
+"""Of an eye, linear light."""
+IRIS_LIGHT = 2.2
+"""The iris' own colour is that below the cornea, which gathers light on it."""
+WET = 0.15
+"""Roughness of an eye."""
+EXPOSURE = 0.72
+"""Our own pictures hold back what is bright; pyrender's do not, and get less light."""
+EYE_ROWS, EYE_AROUND = 64, 48
+
+
+def to_pyrender(
+    model: FaceModel | None,
+    animation: Animation,
+    t: float = 0.0,
+    *,
+    camera: Camera | str | None = None,
+    aspect: float = 16 / 9,
+    body: BodyModel | None = None,
+    axes: str = "iso",
+) -> Any:
+    """A `pyrender.Scene` of an animation at t seconds: its meshes, our camera and the studio's lights.
+
+    model: the face, None for the built-in head. camera: a `Camera`, the name of a preset, or None for the one
+    that suits the content; aspect: width / height of the picture that is to be made. body, axes: as `Scene`
+    takes them. Everything stands in metres, y up, the person looking along +z.
+
+    Without a display, set PYOPENGL_PLATFORM=egl before pyrender is imported, and draw the scene with
+    `pyrender.OffscreenRenderer(width, height).render(scene)`.
+
+    Raises DisplayError where pyrender cannot be imported, and what `Scene` raises.
+    """
+    with _numpy_1():
+        pyrender = _imported()
+        shown = Scene(animation, model, body=body, axes=axes)
+        view = shown.at(t)
+        eye = camera if isinstance(camera, Camera) else shown.camera(camera, aspect)
+        scene = pyrender.Scene(bg_color=(0.5, 0.5, 0.5, 0.0), ambient_light=_ambient())
+        for face in view.faces:
+            _add(pyrender, scene, face.shape.name or face.shape.kind, *_of_face(pyrender, face))
+        for mesh in view.meshes:
+            _add(pyrender, scene, "mesh", *_of_mesh(pyrender, mesh))
+        for number, ball in enumerate(view.eyes):
+            _add(pyrender, scene, ("left eye", "right eye")[number % 2], *_of_eye(pyrender, ball))
+        _add_camera(pyrender, scene, following(eye, shown, t), aspect)
+        _add_lights(pyrender, scene)
+        return scene
+
+
+def _imported() -> Any:
+    try:
+        import pyrender
+    except Exception as error:  # PyOpenGL raises errors of its own where OpenGL is missing
+        missing = missing_libraries()
+        if missing:
+            raise DisplayError(f"pyrender needs OpenGL, but {missing_text(missing)}") from error
+        raise DisplayError(
+            f"pyrender cannot be imported: {error}. Install it with: pip install pyrender; without a "
+            "display, set PYOPENGL_PLATFORM=egl first"
+        ) from error
+    return pyrender
+
+
+@contextmanager
+def _numpy_1() -> Iterator[None]:
+    lent = [name for name in NUMPY_1 if name not in vars(np)]
+    for name in lent:
+        setattr(np, name, NUMPY_1[name])
+    try:
+        yield
+    finally:
+        for name in lent:
+            delattr(np, name)
+
+
+def _add(pyrender: Any, scene: Any, name: str, attributes: dict[str, Any], material: Any) -> None:
+    primitive = pyrender.Primitive(material=material, mode=4, **attributes)
+    mesh = pyrender.Mesh([primitive], name=name)
+    mesh.bounds  # noqa: B018 - works it out, and keeps it, while NumPy is as pyrender knows it
+    scene.add(mesh, name=name)
+
+
+def _of_face(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
+    shape = face.shape
+    positions = swayed(face.positions, shape.sway, face.turn, face.centre)
+    normals = swayed(face.normals, shape.sway, face.turn, np.zeros(3))
+    attributes = _placed(positions, normals, face.matrix, shape.triangles, shape.colours)
+    texture = None
+    if shape.picture is not None and shape.texcoords is not None:
+        texture = pyrender.Texture(source=shape.picture.pixels, source_channels="RGBA")
+        attributes["texcoord_0"] = np.stack([shape.texcoords[:, 0], 1 - shape.texcoords[:, 1]], axis=1)
+    material = pyrender.MetallicRoughnessMaterial(
+        baseColorTexture=texture,
+        metallicFactor=0.0,
+        roughnessFactor=_roughness(shape.colours),
+        alphaMode="BLEND" if shape.see_through else "OPAQUE",
+        doubleSided=not shape.closed,
+    )
+    return attributes, material
+
+
+def _of_mesh(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
+    shape = mesh.shape
+    attributes = _placed(mesh.positions, mesh.normals, mesh.matrix, shape.triangles, shape.colours)
+    rough = _roughness(shape.colours)
+    material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=rough, doubleSided=True)
+    return attributes, material
+
+
+def _of_eye(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
+    places, triangles = sphere_mesh(EYE_ROWS, EYE_AROUND)
+    across = np.hypot(places[:, 0], places[:, 1])
+    front = places[:, 2] > 0
+    colours = np.tile(np.array([*WHITE, 1.0], dtype=np.float32), (len(places), 1))
+    colours[front & (across < ball.iris), :3] = np.array(ball.tint) * IRIS_LIGHT
+    colours[front & (across < ball.pupil), :3] = PUPIL
+    attributes = _placed(places, places, ball.matrix, triangles, colours)
+    material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=WET, doubleSided=True)
+    return attributes, material
+
+
+def _placed(
+    positions: Float32 | Float64,
+    normals: Float32 | Float64,
+    matrix: Float64,
+    triangles: npt.NDArray[np.int32],
+    colours: Float32,
+) -> dict[str, Any]:
+    """Attributes of a primitive, in the world."""
+    turned = normals @ matrix[:3, :3].T
+    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+    opaque = np.ones((len(colours), 1))
+    return {
+        "positions": (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32),
+        "normals": turned.astype(np.float32),
+        "indices": np.ascontiguousarray(triangles, dtype=np.uint32),
+        "color_0": np.hstack([colours[:, :3], opaque]).astype(np.float32),
+    }
+
+
+def swayed(places: npt.ArrayLike, sway: Float32, turn: Float64, centre: Float64) -> Float64:
+    """(V, 3) turned about a centre as far as each goes with the head: by sway (V,) times `turn`."""
+    at = np.asarray(places, dtype=np.float64)
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-6:
+        return at
+    axis, arm = turn / angle, at - centre
+    sine, cosine = np.sin(angle * sway)[:, None], np.cos(angle * sway)[:, None]
+    along = (arm @ axis)[:, None] * axis
+    turned: Float64 = arm * cosine + np.cross(axis, arm) * sine + along * (1 - cosine) + centre
+    return turned
+
+
+def _roughness(colours: Float32) -> float:
+    """One for the whole part: the colours' fourth channel says how glossy each vertex is."""
+    return float(np.clip(1 - np.median(colours[:, 3]), 0.12, 1.0)) if len(colours) else 1.0
+
+
+def _add_camera(pyrender: Any, scene: Any, camera: Camera, aspect: float) -> None:
+    matrix = camera.projection_matrix(aspect)
+    near = matrix[2, 3] / (matrix[2, 2] - 1)  # of the standard matrix of OpenGL
+    far = matrix[2, 3] / (matrix[2, 2] + 1)
+    lens = pyrender.PerspectiveCamera(
+        yfov=math.radians(camera.field_of_view), znear=near, zfar=far, aspectRatio=aspect
+    )
+    node = scene.add(lens, name="camera", pose=np.linalg.inv(camera.view_matrix()))
+    scene.main_camera_node = node
+
+
+def _add_lights(pyrender: Any, scene: Any) -> None:
+    lights = _studio()
+    for name in ("KEY", "FILL", "RIM"):
+        colour = np.array(lights[name])
+        bright = float(colour.max())
+        # A surface of ours sends back colour x light, one of pyrender's that divided by pi.
+        light = pyrender.DirectionalLight(color=colour / bright, intensity=bright * math.pi * EXPOSURE)
+        scene.add(
+            light, name=f"{name.lower()} light", pose=_shining_from(np.array(lights[f"{name}_DIRECTION"]))
+        )
+
+
+def _ambient() -> Float64:
+    lights = _studio()
+    middle: Float64 = (np.array(lights["SKY"]) + np.array(lights["FLOOR"])) / 2 * EXPOSURE
+    return middle
+
+
+def _studio() -> dict[str, tuple[float, float, float]]:
+    """The studio's lights, from the shaders that draw with them: linear light, and where they stand."""
+    text = (files(__package__) / "shaders" / "lighting.glsl").read_text(encoding="utf-8")
+    found = re.findall(r"const vec3 ([A-Z_]+) = (?:normalize\()?vec3\(([^)]*)\)", text)
+    return {name: tuple(float(v) for v in values.split(",")) for name, values in found}  # type: ignore[misc]
+
+
+def _shining_from(direction: Float64) -> Float64:
+    """(4, 4) pose of a light that shines along its -z, from there onto the origin."""
+    back = direction / np.linalg.norm(direction)
+    right = np.cross([0.0, 1.0, 0.0], back)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([right, np.cross(back, right), back])
+    return pose

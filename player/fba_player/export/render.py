@@ -1,0 +1,270 @@
+"""Animations drawn into files, without a window: pictures, films, numbered pictures."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from fba.animation import Animation
+from fba.errors import FbaError, RangeError, UnsupportedError
+from fba_player.view.camera import Camera
+from fba_player.export.offscreen import Offscreen
+from fba_player.export.image_files import PICTURES, check_picture, write_picture
+from fba_player.export.recorder import FILMS, Recorder, exact_rate
+from fba_player.scene.scene import Scene
+from fba_player.export.image_sequence import Numbered, Sequence, is_film, is_sequence
+from fba_player.view.protocols import Showable
+from fba.atomic_path import PathLike
+
+Progress = Callable[[int, int], None]
+
+__all__ = ["film_rate", "record", "render", "write_picture"]
+
+SMOOTH_RATES = (Fraction(10), Fraction(120))
+"""A film's own rate lies between these where none is asked for."""
+MOST_FRAMES = 1_000_000
+"""A longer film is refused: its times are damaged, or a part of it was meant."""
+SLACK = 0.001
+"""Seconds that a time may lie outside the animation: people round them."""
+PICTURE_SAMPLES = 4
+"""Samples a pixel of a single picture, which may take its time."""
+SIZE, GIF_SIZE = (1280, 720), (480, 270)
+"""Where none is given; a GIF of full size would be huge."""
+
+
+def render(
+    animation: Animation | Showable,
+    path: PathLike,
+    *,
+    size: tuple[int, int] | None = None,
+    fps: Fraction | int | str | None = None,
+    camera: Camera | str | None = None,
+    frame: int | None = None,
+    time: float | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    audio: PathLike | None = None,
+    audio_offset: float = 0.0,
+    transparent: bool = False,
+    replace: bool = False,
+    progress: Progress | None = None,
+) -> Path:
+    """Draw an animation into a file without a window; the name decides what becomes of it.
+
+    .png or .jpg: one picture. .mp4 or .gif: a film. frames/%05d.png, or a folder with a slash at its end:
+    numbered pictures, from 0.
+
+    size: width and height in pixels; by default 1280x720, of a GIF 480x270. camera: a `Camera`, "front",
+    "three-quarter", "profile", "body", or None for the one that suits the content. For a picture: frame,
+    its position in the animation (negative from the end), or time in seconds; by default the first frame.
+    For a film: fps (by default the animation's own rate), and start and end in seconds; audio: a file whose
+    sound goes with an MP4; it begins with the animation's first frame, or audio_offset seconds later
+    (earlier where negative). transparent: PNG without a
+    background, opaque only where something is. replace: numbered pictures that exist may be overwritten.
+    progress: called with (done, total) frames.
+
+    Returns the path, of numbered pictures their folder. A file appears whole or not at all. Raises
+    UnsupportedError for another suffix, DisplayError without OpenGL or video encoder, RangeError for a frame
+    or a stretch that is not in the animation, ValueError for a size or preset that does not exist,
+    FormatError where a file cannot be written or read.
+    """
+    _check_name(path)
+    target = Path(path)
+    scene = as_scene(animation)
+    if is_film(path):
+        if frame is not None or time is not None:
+            raise ValueError(
+                "frame and time choose a single picture; write it to a .png, or give start and end"
+            )
+        return record(
+            scene, path, fps=fps, size=size, camera=camera, start=start, end=end, audio=audio,
+            audio_offset=audio_offset, transparent=transparent, replace=replace, progress=progress,
+        )  # fmt: skip
+    transparent = transparent or _clear(scene)
+    check_picture(target, transparent=transparent)
+    if fps is not None or end is not None or (start is not None and time is not None):
+        raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
+    if audio is not None:
+        raise ValueError("a picture has no sound; leave the audio out, or write an .mp4")
+    if start is not None:
+        check_inside(scene, "start", start)
+    at = _moment(scene, frame, time if time is not None else start)
+    with (
+        _background(scene, clear=transparent),
+        Offscreen(scene, size or SIZE, camera, samples=PICTURE_SAMPLES) as offscreen,
+    ):
+        write_picture(target, offscreen.frame(at), transparent=transparent)
+    if progress is not None:
+        progress(1, 1)
+    return target
+
+
+def record(
+    scene: Showable | Animation,
+    path: PathLike,
+    *,
+    fps: Fraction | int | str | None = None,
+    size: tuple[int, int] | None = None,
+    camera: Camera | str | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    audio: PathLike | None = None,
+    audio_offset: float = 0.0,
+    transparent: bool = False,
+    replace: bool = False,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a film, or numbered pictures, at an exact frame rate. See `render`.
+
+    MP4: H.264, yuv420p, and AAC; it needs even sizes: odd ones lose their last column or row.
+    """
+    shown = as_scene(scene)
+    if not math.isfinite(audio_offset):
+        raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    gif, numbered = suffix == ".gif", is_sequence(path)
+    transparent = transparent or _clear(shown)
+    if transparent and not numbered:
+        raise UnsupportedError(
+            f"{path}: a film cannot be transparent; write numbered pictures, frames/%05d.png",
+            what=f"transparency in {suffix}",
+        )
+    if numbered and audio is not None:
+        raise ValueError("pictures have no sound; leave the audio out, or write an .mp4")
+    if fps is None:
+        rate = film_rate(shown.timeline.rate)
+        if gif:
+            from fba_player.export.gif import gif_rate
+
+            rate = gif_rate(rate)
+    else:
+        rate = Fraction(fps)
+    rate = exact_rate(rate)
+    first, count = _stretch(shown, rate, start, end)
+    width, height = picture_size(size, path)
+    if size is not None and min(width, height) < 1:
+        raise ValueError(f"a film must have at least 2x2 pixels, not {size[0]}x{size[1]}")
+    with ExitStack() as stack:
+        # Whether the encoder is there, and where it writes, shows sooner than the first picture.
+        if numbered:
+            sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
+            recorder = Recorder.into(sink, path, (width, height), rate)
+        else:
+            into = first - shown.timeline.start - Fraction(audio_offset).limit_denominator(10**6)
+            recorder = Recorder(path, (width, height), rate=rate, audio=audio, audio_start=into)
+        stack.enter_context(recorder)
+        stack.enter_context(_background(shown, clear=transparent))
+        samples = PICTURE_SAMPLES if transparent else 0
+        offscreen = stack.enter_context(Offscreen(shown, (width, height), camera, samples=samples))
+        for number in range(count):
+            recorder.add(offscreen.draw(float(first + number / rate)))
+            if progress is not None:
+                progress(number + 1, count)
+        result = recorder.close()
+    assert result is not None
+    return result
+
+
+def picture_size(size: tuple[int, int] | None, path: PathLike) -> tuple[int, int]:
+    """Width and height that a picture or a film of that name gets where a size, or None, was asked for."""
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    width, height = size or (GIF_SIZE if suffix == ".gif" else SIZE)
+    return (width // 2 * 2, height // 2 * 2) if suffix == ".mp4" else (width, height)
+
+
+def as_scene(subject: Animation | Showable) -> Showable:
+    """A scene of an animation; what is a scene already stays."""
+    return Scene(subject) if isinstance(subject, Animation) else subject
+
+
+def film_rate(rate: Fraction) -> Fraction:
+    """The rate itself where people see it as motion, else the nearest multiple or fraction that is."""
+    low, high = SMOOTH_RATES
+    if rate < low:
+        return rate * math.ceil(low / rate)
+    return rate / math.ceil(rate / high)
+
+
+def _check_name(path: PathLike) -> None:
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    if suffix not in (*FILMS, *PICTURES) and not is_sequence(path):
+        raise UnsupportedError(
+            f"{path}: pictures are written as .png or .jpg, films as .mp4 or .gif, numbered pictures as "
+            f"folder/%05d.png, but not {suffix or 'a bare name'}",
+            what=f"rendering to {suffix or 'no suffix'}",
+        )
+
+
+def _clear(scene: Showable) -> bool:
+    """Whether the scene is switched to no background."""
+    return scene.switches["background"] == "transparent"
+
+
+@contextmanager
+def _background(scene: Any, *, clear: bool) -> Iterator[None]:
+    """The scene's own, or none."""
+    before = scene.switches["background"] if clear else None
+    if clear:
+        scene.show("background", "transparent")
+    try:
+        yield
+    finally:
+        if clear:
+            scene.show("background", before)
+
+
+def _moment(scene: Showable, frame: int | None, time: float | None) -> float:
+    if frame is not None and time is not None:
+        raise ValueError("give frame or time, not both")
+    if frame is not None:
+        frames = scene.timeline.frames
+        if not -frames <= frame < frames:
+            raise RangeError(
+                f"there is no frame {frame}: the animation has {frames} (0 to {frames - 1})",
+                value=frame,
+                limits=(0, frames - 1),
+            )
+        return float(scene.timeline.time_of(range(frames)[frame]))
+    if time is None:
+        return float(scene.timeline.start)
+    check_inside(scene, "time", time)
+    return float(time)
+
+
+def check_inside(scene: Showable, name: str, time: float) -> None:
+    """Raises RangeError for a time before the animation begins or after it ends, ValueError for one that is
+    not finite. name: what the error calls it."""
+    if not math.isfinite(time):
+        raise ValueError(f"{name} must be a finite number of seconds, not {time}")
+    begin, stop = float(scene.timeline.start), float(scene.timeline.end)
+    if not begin - SLACK <= time <= stop + SLACK:
+        raise RangeError(
+            f"{name} {time:g} s is outside the animation, which goes from {begin:g} s to {stop:g} s"
+        )
+
+
+def _stretch(scene: Showable, rate: Fraction, start: float | None, end: float | None) -> tuple[Fraction, int]:
+    """Time of the first picture and how many there are."""
+    for name, value in (("start", start), ("end", end)):
+        if value is not None:
+            check_inside(scene, name, value)
+    begin, stop = scene.timeline.start, scene.timeline.end
+    first = begin if start is None else max(Fraction(start).limit_denominator(10**6), begin)
+    last = stop if end is None else min(Fraction(end).limit_denominator(10**6), stop)
+    if last <= first:
+        raise RangeError(
+            f"nothing lies between {float(first):g} s and {float(last):g} s; the animation goes from "
+            f"{float(begin):g} s to {float(stop):g} s"
+        )
+    count = max(math.ceil((last - first) * rate), 1)
+    if count > MOST_FRAMES:
+        raise FbaError(
+            f"this film would have {count} frames ({float(last - first):g} s at {rate} frames/s, at most "
+            f"{MOST_FRAMES}): choose a part with start and end, or a lower rate"
+        )
+    return first, count

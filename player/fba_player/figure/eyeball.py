@@ -1,0 +1,159 @@
+"""Eyeballs of a face model: the sphere that a part of kind "eye" is, and where it looks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled
+from fba.face.model import FaceModel, Part, point_row
+from fba_player.view.view import Eye
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+ROUND = 0.03
+"""A part whose vertices are further than this from a sphere, as a share of its radius, is drawn as it is."""
+FEWEST = 12
+SAMPLED = 96
+"""Vertices from which an eyeball's rotation is found."""
+DILATE = (29, 30)
+LIDS = (("3.1", "3.3", "3.7", "3.11"), ("3.2", "3.4", "3.12", "3.8"))
+"""Middles of upper and lower lid, outer and inner corner, of the left and of the right eye."""
+
+
+@dataclass(frozen=True, eq=False)
+class Eyeball:
+    """One eyeball in the neutral face. side: 0 left, 1 right. centre (3,), radius; metres.
+
+    rows: vertices of the part that are sampled, away from the pupil. lids: vertices of the whole model at
+    `LIDS`, -1 where there are none. iris, pupil: diameters; step: by how much one unit of FAP 29 or 30
+    changes the pupil.
+    """
+
+    side: int
+    centre: Float64
+    radius: float
+    rows: npt.NDArray[np.intp]
+    neutral: Float64
+    lids: tuple[int, ...]
+    iris: float
+    pupil: float
+    step: float
+
+    def posed(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
+        """The eye for moved vertices of its part (V, 3) and of the face, in the world by matrix (4, 4)."""
+        moved = part.take(self.rows, axis=0).astype(np.float64)
+        turn, centre = _placed(self.neutral, moved, self.centre)
+        if not np.isfinite(turn).all():  # squeezed flat
+            turn = _rotation(self.neutral - self.neutral.mean(axis=0), moved - moved.mean(axis=0))
+            centre = moved.mean(axis=0) + turn @ (self.centre - self.neutral.mean(axis=0))
+        frame = np.eye(4)
+        frame[:3, :3] = turn * self.radius
+        frame[:3, 3] = centre
+        pupil = self.pupil + self.step * float(faps[DILATE[self.side] - 1])
+        iris = self.iris / 2 / self.radius
+        return Eye(
+            matrix @ frame,
+            iris,
+            min(max(pupil / 2 / self.radius, 0.03), iris * 0.92),
+            self._lid_places(face, centre),
+            matrix[:3, :3] / math.sqrt(matrix[:3, 0] @ matrix[:3, 0]),
+        )
+
+    def _lid_places(self, face: Float32, centre: Float64) -> Float64:
+        """(4, 3) lids' middles and corners from the centre, in radii; wide open where there are none."""
+        if min(self.lids) >= 0:
+            known: Float64 = (face.take(self.lids, axis=0) - centre) / self.radius
+            return known
+        open_ = np.array([[0.0, 0.5, 0.86], [0.0, -0.5, 0.86], [1.0, 0.0, 0.3], [-1.0, 0.0, 0.3]])
+        for place, vertex in enumerate(self.lids):
+            if vertex >= 0:
+                open_[place] = (face[vertex] - centre) / self.radius
+        return open_
+
+
+def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
+    """The sphere that a part is, or None where it is none."""
+    vertices = part.vertices.astype(np.float64)
+    if len(vertices) < FEWEST:
+        return None
+    on = np.ones(len(vertices), dtype=bool)
+    for _ in range(4):  # what stands out, as a cornea does, is left out
+        centre, radius = _sphere(vertices[on])
+        away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
+        on = away <= max(float(np.quantile(away, 0.7)), 1e-9)
+    if not np.isfinite(radius) or radius <= 0 or float(np.median(away)) > ROUND * radius:
+        return None
+    if float(np.ptp(vertices, axis=0).max()) > 2.4 * radius:
+        return None
+    side = 0 if centre[0] > 0 else 1
+    behind = np.flatnonzero((vertices[:, 2] - centre[2]) < 0.75 * radius)
+    if len(behind) < FEWEST:
+        behind = np.arange(len(vertices))
+    rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED).astype(int))]
+    unit = model.fapu.IRISD
+    lids = tuple(int(model.bound[point_row(name)]) for name in LIDS[side])
+    return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)
+
+
+def _sphere(points: Float64) -> tuple[Float64, float]:
+    """Centre and radius of the sphere nearest to points (N, 3)."""
+    middle = points.mean(axis=0)
+    p = points - middle
+    a = np.column_stack([2 * p, np.ones(len(p))])
+    found = np.linalg.lstsq(a, (p * p).sum(axis=1), rcond=None)[0]
+    return found[:3] + middle, float(np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
+
+
+@compiled
+def _placed(before: Float64, after: Float64, centre: Float64) -> tuple[Float64, Float64]:
+    """(3, 3) the rotation that best takes places (N, 3) to others, and where it takes `centre`; NaN where it
+    is not found: the orthogonal part of their covariance, by Newton's iteration (Higham 1986)."""
+    start, middle = np.zeros(3), np.zeros(3)
+    for i in range(len(before)):
+        for k in range(3):
+            start[k] += before[i, k] / len(before)
+            middle[k] += after[i, k] / len(before)
+    x = np.zeros((3, 3))
+    for i in range(len(before)):
+        for j in range(3):
+            for k in range(3):
+                x[j, k] += (after[i, j] - middle[j]) * (before[i, k] - start[k])
+    y = np.zeros((3, 3))  # cofactors: the inverse transposed, times the determinant
+    for _ in range(60):
+        for j in range(3):
+            j1, j2 = (j + 1) % 3, (j + 2) % 3
+            for k in range(3):
+                k1, k2 = (k + 1) % 3, (k + 2) % 3
+                y[j, k] = x[j1, k1] * x[j2, k2] - x[j1, k2] * x[j2, k1]
+        determinant = x[0, 0] * y[0, 0] + x[0, 1] * y[0, 1] + x[0, 2] * y[0, 2]
+        if not determinant > 1e-300:
+            x[:] = np.nan
+            break
+        scale = determinant ** (-1.0 / 3.0)
+        change = 0.0
+        for j in range(3):
+            for k in range(3):
+                new = 0.5 * (scale * x[j, k] + y[j, k] / (scale * determinant))
+                change = max(change, abs(new - x[j, k]))
+                x[j, k] = new
+        if change < 1e-12:
+            break
+    placed = np.zeros(3)
+    for j in range(3):
+        placed[j] = middle[j]
+        for k in range(3):
+            placed[j] += x[j, k] * (centre[k] - start[k])
+    return x, placed
+
+
+def _rotation(before: Float64, after: Float64) -> Float64:
+    """(3, 3) the rotation that best takes places (N, 3) about their middle to others."""
+    u, _, vt = np.linalg.svd(after.T @ before)
+    flip = np.diag([1.0, 1.0, np.linalg.det(u @ vt)])
+    rotation: Float64 = u @ flip @ vt
+    return rotation

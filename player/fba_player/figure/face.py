@@ -1,0 +1,244 @@
+"""A face model as the player shows it: FAPs in; meshes, eyes and feature points out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.deform.deformer import Deformer
+from fba.face.model import FaceModel, Part, point_row
+from fba.parameters import FAP_COUNT
+from fba_player.view.camera import Subject
+from fba_player.figure.eyeball import Eyeball, find_eyeball
+from fba_player.figure.face_light import MOUTH_OPEN, FaceLight, LitFace
+from fba_player.figure.face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
+from fba_player.mesh.lazy_vertices import Places, Probe, Whole
+from fba_player.view.view import Eye, FaceMesh, FaceShape, rotation_vector
+
+if TYPE_CHECKING:
+    from fba_player.gl.gpu.tables import FaceLightTables, FaceTables, MovedFace
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.intp]
+
+CUT = 0.45
+"""On a body, what sways less than this is left out: the body has a neck of its own."""
+
+GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
+           6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip
+"""FAPs that close the eyes, raise the brows and draw the mouth wide: what they move keeps its detail."""
+EYES_APART = 0.062
+"""Metres between an adult's pupils."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """The face for one set of FAPs (68,): its vertices (V, 3), without the head's turn (4, 4)."""
+
+    faps: Float32
+    whole: Whole
+    turn: Float64
+
+    @property
+    def positions(self) -> Float32:
+        """float32 (V, 3)."""
+        return self.whole.arrays[0]
+
+    @property
+    def normals(self) -> Float32:
+        """float32 (V, 3)."""
+        return self.whole.arrays[1]
+
+
+class FaceFigure:
+    """A face model ready to be shown.
+
+    model: any face. The light that reaches its vertices is worked out on first use, in about a second.
+    sway: float32 (V,), how far each vertex goes with the head, which turns about centre (3,).
+    """
+
+    def __init__(self, model: FaceModel) -> None:
+        self.model = model
+        self.deformer = Deformer(model)
+        self._pose: Pose | None = None
+        self._ranges = {
+            part.name: slice(model.starts[part.name], model.starts[part.name] + len(part.vertices))
+            for part in model.parts
+        }
+        self._eyeballs: list[tuple[Part, Eyeball]] = []
+        self._shapes: dict[str, FaceShape] = {}
+        self._extremes: dict[tuple[int, ...], Float32] = {}
+        sways = sway(model)
+        for part in model.parts:
+            ball = find_eyeball(part, model) if part.kind == "eye" else None
+            if ball is None:
+                self._shapes[part.name] = self._shape(part, sways[self._ranges[part.name]])
+            else:
+                self._eyeballs.append((part, ball))
+        self._extremes.clear()
+        self._cut: dict[str, FaceShape] = {}
+        self.sway = sways
+        self.centre = _head_centre(model)
+        self._light = FaceLight(model, self.deformer, sways)
+        self._probe = Probe(len(model.vertices), self._prepared)
+        looking = [self._ranges[part.name].start + ball.rows for part, ball in self._eyeballs]
+        lids = np.array([row for _, ball in self._eyeballs for row in ball.lids if row >= 0], dtype=np.intp)
+        self._looking = np.concatenate([lids, *looking])
+
+    def _shape(self, part: Part, sways: Float32) -> FaceShape:
+        shape = part_shape(part, sways)
+        if shape.across is not None:  # single hairs are not made of fewer triangles
+            return shape
+        rows = self._ranges[part.name]
+        poses = [self._extreme(faps)[rows] for faps in ({}, MOUTH_OPEN, GRIMACE)]
+        return replace(shape, coarser=coarser_part(part, poses))
+
+    def _extreme(self, faps: dict[int, int]) -> Float32:
+        """(V, 3) the face, for FAPs by their numbers; its head not turned."""
+        key = tuple(faps)
+        if key not in self._extremes:
+            values = np.zeros(FAP_COUNT, dtype=np.float32)
+            for number, value in faps.items():
+                values[number - 1] = value
+            self._extremes[key] = self.deformer.local(values)
+        return self._extremes[key]
+
+    @property
+    def scale(self) -> float:
+        """How large it is: 1 where the eyes are as far apart as an adult's."""
+        return self.model.fapu.ES * 1024 / EYES_APART
+
+    @cached_property
+    def between_eyes(self) -> Float64:
+        """(3,) the point between the pupils, metres, in the frame of the model."""
+        eyes = [self.model.points[point_row(name)] for name in ("3.5", "3.6")]
+        middle: Float64 = np.mean(eyes, axis=0)
+        return middle
+
+    @cached_property
+    def subject(self) -> Subject:
+        """What a camera is to have in view: the head from its top to the upper chest."""
+        model = self.model
+        head = np.concatenate([part.vertices for part in model.of_kind("skin") or model.parts])
+        chin = known_middle(model, ("2.10", "2.1"))
+        tall = model.fapu.ENS * 1024 * 5.2
+        top = float(head[:, 1].max())
+        low = float(chin[1]) if chin is not None else top - tall
+        if not 0.5 * tall < top - low < 2 * tall:  # hair, a hat, or a body below
+            top = low + tall
+        x, _, z = self.between_eyes
+        centre = (float(x), (top + low) / 2 - 0.07 * (top - low), float(z) - 0.3 * (top - low))
+        return Subject(centre, 0.71 * (top - low), 0.60 * (top - low))
+
+    def pose(self, faps: Float32) -> Pose:
+        """The face for FAPs (68,)."""
+        if self._pose is None or not np.array_equal(self._pose.faps, faps):
+            self._pose = self._posed(faps.copy())
+        return self._pose
+
+    def _posed(self, faps: Float32) -> Pose:
+        def make() -> tuple[Float32, Float32]:
+            positions = np.empty((len(self.model.vertices), 3), dtype=np.float32)
+            normals = np.empty_like(positions)
+            return self.deformer.local(faps, out=positions, normals=normals), normals
+
+        def motion() -> MovedFace:
+            from fba_player.gl.gpu.tables import MovedFace
+
+            return MovedFace(self._tables, self.deformer.motion(faps), self._light_tables)
+
+        whole = Whole(len(self.model.vertices), make, lambda rows: self._probe.at(faps, rows)[0], motion)
+        return Pose(faps, whole, self.deformer.head_matrices(faps))
+
+    @cached_property
+    def _tables(self) -> FaceTables:
+        """For a graphics card that deforms it."""
+        from fba_player.gl.gpu.tables import FaceTables
+
+        return FaceTables(self.deformer)
+
+    @cached_property
+    def _light_tables(self) -> FaceLightTables:
+        """The same of the light on it."""
+        from fba_player.gl.gpu.tables import FaceLightTables
+
+        return FaceLightTables(self._light)
+
+    def _prepared(self, rows: Rows) -> Callable[[Float32, Float32], None]:
+        """What writes the places of some vertices (N,), for FAPs (68,)."""
+        return self.deformer.chosen(rows).local
+
+    def meshes(
+        self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()
+    ) -> list[FaceMesh]:
+        """The parts for FAPs (68,), put into the world by matrix (4, 4).
+
+        on_body: without the lower neck and shoulders. without: kinds of parts that are left out.
+        """
+        pose = self.pose(faps)
+        light = self._light.reaching(pose.whole.at, pose.turn[:3, :3], matrix[:3, :3])
+        axis = rotation_vector(pose.turn[:3, :3])
+        found = []
+        for name, shape in (self._on_body() if on_body else self._shapes).items():
+            if self.model.part(name).kind in without or not len(shape.triangles):
+                continue
+            rows = self._ranges[name]
+            places = Places(pose.whole, rows.start, rows.stop - rows.start)
+            found.append(FaceMesh(shape, places, light.of(rows), matrix, axis, self.centre))
+        return found
+
+    @property
+    def shapes(self) -> dict[str, FaceShape]:
+        """All parts but the eyeballs, by name."""
+        return self._shapes
+
+    def rows(self, name: str) -> slice:
+        """Where a part's vertices are among those of the model."""
+        return self._ranges[name]
+
+    def light(self, faps: Float32, frame: Float64) -> LitFace:
+        """What light reaches its vertices. frame: (4, 4), the turned head's into the world."""
+        return self._light.reaching(self.pose(faps).whole.at, np.eye(3), frame[:3, :3])
+
+    def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
+        """The eyeballs for FAPs (68,), put into the world by matrix (4, 4).
+
+        turned: whether that has the head's turn in it.
+        """
+        pose = self.pose(faps)
+        placed = matrix if turned else matrix @ pose.turn
+        positions = pose.whole.at(self._looking)
+        return [
+            ball.posed(positions[self._ranges[part.name]], positions, faps, placed)
+            for part, ball in self._eyeballs
+        ]
+
+    def points(self, faps: Float32, matrix: Float64) -> Float64:
+        """(84, 3) feature points for FAPs (68,) in the world; NaN where the face has none."""
+        places = self.deformer.feature_points(faps)
+        moved: Float64 = places @ matrix[:3, :3].T + matrix[:3, 3]
+        return moved
+
+    def _on_body(self) -> dict[str, FaceShape]:
+        if not self._cut:
+            for name, shape in self._shapes.items():
+                kept = (shape.sway[shape.triangles] > CUT).all(axis=1)
+                if kept.any():
+                    self._cut[name] = with_triangles(shape, shape.triangles[kept])
+        return self._cut
+
+
+def _head_centre(model: FaceModel) -> Float64:
+    """The point that the head turns about, as its tables say."""
+    for number in (48, 49, 50):
+        table = model.table_of.get(number)
+        for transform in table.transforms if table is not None else ():
+            if transform.kind == "rotation":
+                return np.array(transform.centre)
+    return np.zeros(3)

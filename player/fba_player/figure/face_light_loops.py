@@ -1,0 +1,90 @@
+"""The loops of `fba_player.figure.face_light`: how much light reaches vertices, from what was worked out once."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled
+
+Float32 = npt.NDArray[np.float32]
+Rows = npt.NDArray[np.intp]
+
+
+class Table(NamedTuple):
+    """Visibility of N vertices, see `fba_player.figure.occlusion`: with the mouth shut, and of some of them, near
+    (M,), wide open. Harmonics stand side by side: their columns are what goes through the processor fastest.
+    """
+
+    light: Float32
+    """(16, N)"""
+    through: Float32
+    """(16, N)"""
+    open: Float32
+    """(N,)"""
+    wide_light: Float32
+    """(16, M)"""
+    wide_through: Float32
+    """(16, M)"""
+    wide_open: Float32
+    """(M,)"""
+    near: Rows
+
+
+@compiled
+def lit(table: Table, basis: Float32, share: float, more: float, found: Float32) -> None:
+    """found (N, 4): key light, sky, through, rim light. basis (2, 16): what weighs the harmonics for key and
+    rim light. share: how far the mouth is wide open. more: what share of the light that is missing falls in.
+    """
+    count = len(table.open)
+    share, more = np.float32(share), np.float32(more)  # type: ignore[assignment]
+    key, rim, back = _products(table.light, table.through, basis, count)
+    for i in range(count):
+        found[i, 0], found[i, 1], found[i, 2], found[i, 3] = key[i], table.open[i], back[i], rim[i]
+    if share > 0.0 and len(table.near):
+        key, rim, back = _products(table.wide_light, table.wide_through, basis, len(table.near))
+        for k in range(len(table.near)):
+            i = table.near[k]
+            found[i, 0] += share * (key[k] - found[i, 0])
+            found[i, 1] += share * (table.wide_open[k] - found[i, 1])
+            found[i, 2] += share * (back[k] - found[i, 2])
+            found[i, 3] += share * (rim[k] - found[i, 3])
+    if more > 0.0:
+        for i in range(count):
+            found[i, 0] += more * (np.float32(1.0) - found[i, 0])
+            found[i, 1] += more * (np.float32(1.0) - found[i, 1])
+
+
+@compiled
+def sway(found: Float32, still: Float32, rows: Rows, share: Float32) -> None:
+    """Rows of found (N, 4), which go with the head by a share, drawn towards those that stand still."""
+    for k in range(len(rows)):
+        for column in range(4):
+            found[rows[k], column] = still[k, column] + share[k] * (found[rows[k], column] - still[k, column])
+
+
+@compiled
+def _products(
+    light: Float32, through: Float32, basis: Float32, count: int
+) -> tuple[Float32, Float32, Float32]:
+    """Key light, rim light and what comes through of it, each (count,)."""
+    key = np.zeros(count, dtype=np.float32)
+    rim, back = np.zeros_like(key), np.zeros_like(key)
+    for k in range(0, basis.shape[1], 4):  # several at a time: sums are read and written less often
+        a, b, c, d = basis[0, k], basis[0, k + 1], basis[0, k + 2], basis[0, k + 3]
+        e, f, g, h = basis[1, k], basis[1, k + 1], basis[1, k + 2], basis[1, k + 3]
+        one, two, three, four = light[k], light[k + 1], light[k + 2], light[k + 3]
+        for i in range(count):
+            key[i] += a * one[i] + b * two[i] + c * three[i] + d * four[i]
+            rim[i] += e * one[i] + f * two[i] + g * three[i] + h * four[i]
+        one, two, three, four = through[k], through[k + 1], through[k + 2], through[k + 3]
+        for i in range(count):
+            back[i] += e * one[i] + f * two[i] + g * three[i] + h * four[i]
+    low, high = np.float32(0.0), np.float32(1.0)
+    for i in range(count):
+        key[i] = min(max(key[i], low), high)
+        rim[i] = min(max(rim[i], low), high)
+        back[i] = min(max(back[i], low), high)
+    return key, rim, back

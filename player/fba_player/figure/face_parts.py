@@ -1,0 +1,196 @@
+"""What does not change in a face model that is shown: colours, pictures, and how far its neck bends."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import FbaWarning
+from fba.face.model import FaceModel, Part, point_row
+from fba_player.mesh.simplify import Coarser
+from fba_player.mesh.texture_image import FacePicture
+from fba_player.mesh.skin_relief import RELIEF
+from fba_player.view.view import FaceShape
+from fba_player.figure.texture_images import breadth
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyPart
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
+TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
+HAIRY = ("lash", "brow", "hair")
+THICKEST_HAIR = 0.0012
+"""A strip wider than this (m) is no single hair."""
+ROUGH = 0.36
+"""Strength of the skin's relief."""
+NECK = 2.3
+"""Length over which a neck bends, in distances from eyes to nose (ENS)."""
+MOST_BENT, BENT, LONG = 0.1, 0.8, 0.005
+"""Where more than this share of a part's edges bend by more than the angle of this cosine, and are longer
+than this (m), light is worked out pixel by pixel."""
+NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
+"""How a coarser part keeps these: what a normal that is off by its own length, a texture off by a metre, and
+a colour off by all its light count in metres."""
+
+
+def sway(model: FaceModel) -> Float32:
+    """(V,) how far each vertex goes with the head: 1 above jaw and ears, falling to 0 along the neck."""
+    chin = known_middle(model, ("2.1", "2.10"))
+    lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
+    if chin is None or lobe is None:
+        return np.ones(len(model.vertices), dtype=np.float32)
+    reach = NECK * model.fapu.ENS * 1024
+    y, z = model.vertices[:, 1].astype(np.float64), model.vertices[:, 2].astype(np.float64)
+    # The border between head and neck rises from below the chin to below the ears, and stays level behind.
+    along = np.clip((z - lobe[2]) / max(chin[2] - lobe[2], 1e-6), 0.0, 1.0)
+    border = lobe[1] + (chin[1] - 0.12 * reach - lobe[1]) * along
+    share = np.clip(1 - (border - y) / reach, 0.0, 1.0)
+    smooth: Float32 = (share * share * (3 - 2 * share)).astype(np.float32)
+    return smooth
+
+
+def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
+    """Middle of the first two of those feature points that the face has, or None."""
+    places = np.array([model.points[point_row(name)] for name in names])
+    known = places[np.isfinite(places).all(axis=1)][:2]
+    return np.asarray(known.mean(axis=0)) if len(known) else None
+
+
+def part_shape(part: Part, sways: Float32) -> FaceShape:
+    """What does not change in a part. sways (V,): how far its vertices would go with the head."""
+    colours = part.colours
+    if colours is None:
+        row = (*part.material.colour, 1.0 - part.material.roughness)
+        colours = np.tile(np.array(row, dtype=np.float32), (len(part.vertices), 1))
+    picture = _picture(part) if part.texcoords is not None else None
+    return FaceShape(
+        part.triangles,
+        colours,
+        sways if part.kind in ("skin", "hair", "other") else np.ones_like(sways),
+        part.texcoords,
+        picture,
+        SCATTER.get(part.kind, 0.0),
+        _relief(part),
+        part.kind in TWO_SIDED,
+        hairs(part) if part.kind in HAIRY and picture is None else None,
+        name=part.name,
+        kind=part.kind,
+        smooth=_is_smooth(part),
+    )
+
+
+def coarser_part(part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None) -> Coarser:
+    """Levels of detail of a part that takes these poses, (V, 3) each. more: (V, N), what is to be kept
+    besides its normals, colours and texture, scaled to metres."""
+    columns = list(poses)
+    if part.normals is not None:
+        columns.append(part.normals * NORMAL_WEIGHT)
+    if part.texcoords is not None and len(part.triangles):
+        metres = breadth(part.vertices, part.texcoords, part.triangles)
+        columns.append(part.texcoords * (TEXTURE_WEIGHT * metres))
+    if part.colours is not None:
+        columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
+    if more is not None:
+        columns.append(more)
+    return Coarser(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
+
+
+def with_triangles(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> FaceShape:
+    """The same with some of its triangles only."""
+    left = np.ascontiguousarray(triangles, dtype=np.int32)
+    coarser = None if shape.coarser is None else replace(shape.coarser, triangles=left)
+    return replace(shape, triangles=left, coarser=coarser)
+
+
+def hairs(part: Part) -> Float32 | None:
+    """(V, 8) as `FaceShape.across` has it, or None where a part is not of single hairs.
+
+    A hair is a strip of two rows of vertices that ends in a point: the vertex opposite to one is the
+    nearest that an edge joins it to.
+    """
+    if not len(part.triangles):
+        return None
+    vertices, count = part.vertices.astype(np.float64), len(part.vertices)
+    edges = part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.intp)
+    edges = np.concatenate([edges, edges[:, ::-1]])
+    apart = vertices[edges[:, 0]] - vertices[edges[:, 1]]
+    length = np.linalg.norm(apart, axis=1)
+    order = np.lexsort((length, edges[:, 0]))
+    rows, first = np.unique(edges[order, 0], return_index=True)
+    nearest = order[first]
+    opposite = np.arange(count)
+    opposite[rows] = edges[nearest, 1]
+    paired = (opposite[opposite] == np.arange(count)) & (opposite != np.arange(count))
+    half = np.zeros(count)
+    half[rows] = length[nearest] / 2
+    if not paired.any() or 2 * float(np.median(half[paired])) > THICKEST_HAIR:
+        return None
+    hair = _pieces(edges, count)
+    tip = np.full(count, -1)
+    tip[hair[~paired]] = np.flatnonzero(~paired)  # a point is not opposite to what is nearest to it
+    kept = paired & (tip[hair] >= 0)
+    found = np.zeros((count, 8), dtype=np.float32)
+    found[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
+    found[kept, :3] = _units(vertices[kept] - vertices[opposite[kept]])
+    found[kept, 3] = half[kept]
+    found[kept, 4:7] = _units(vertices[tip[hair[kept]]] - vertices[kept])
+    return found
+
+
+def _pieces(edges: npt.NDArray[np.intp], count: int) -> npt.NDArray[np.intp]:
+    """(V,) the lowest vertex that each is joined to. edges (E, 2), both ways."""
+    lowest = np.arange(count)
+    while True:  # each round halves the way that is left to go
+        found = lowest.copy()
+        np.minimum.at(found, edges[:, 0], lowest[edges[:, 1]])
+        np.minimum.at(found, lowest, found)
+        found = found[found]
+        if np.array_equal(found, lowest):
+            return lowest
+        lowest = found
+
+
+def _units(vectors: Float64) -> Float64:
+    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return unit
+
+
+def _relief(part: Part) -> tuple[float, float]:
+    """Strength of the skin's relief and its repeats, so that a repeat is `RELIEF` metres wide."""
+    if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
+        return (0.0, 1.0)
+    metres = breadth(part.vertices, part.texcoords, part.triangles)
+    return (ROUGH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
+
+
+def _is_smooth(part: Part) -> bool:
+    """Whether most edges bend so little that light may be worked out at their ends."""
+    if part.normals is None or not len(part.triangles):
+        return True
+    upright, places = part.normals[part.triangles], part.vertices[part.triangles]
+    cosines = np.einsum("tkn,tkn->tk", upright, np.roll(upright, 1, axis=1))
+    lengths = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2)
+    return bool(((cosines < BENT) & (lengths > LONG)).mean() < MOST_BENT)
+
+
+def _picture(part: Part) -> FacePicture | None:
+    """The part's texture, or None where there is none that can be read."""
+    if part.material.texture is None:
+        return None
+    try:
+        return FacePicture(part.material.texture)
+    except (OSError, ValueError, SyntaxError) as error:
+        warnings.warn(
+            f"the texture of part {part.name!r} cannot be read ({error}): its colour is shown instead",
+            FbaWarning,
+            stacklevel=2,
+        )
+        return None

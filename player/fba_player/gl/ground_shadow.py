@@ -1,0 +1,290 @@
+"""The shadow that bodies cast on the ground: of a large key light and of the sky, on a grid of a few cm.
+
+Points spread evenly over the surface are thrown down along several directions of each light; where they land
+they cover as much ground as their piece of surface hides from that direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled, is_compiled
+from fba_player.figure.face_light import KEY_DIRECTION
+from fba_player.view.view import FaceMesh, FaceShape
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+UInt8 = npt.NDArray[np.uint8]
+Int32 = npt.NDArray[np.int32]
+
+CELLS, CELL = 96, 0.05
+"""The grid: so many squares each way, of this size (m)."""
+SPACING = 0.036
+"""Metres between the points."""
+WITHIN = ("teeth", "tongue", "mouth", "eye")
+"""Kinds of parts that lie within others."""
+COARSE = 0.0032
+"""Surfaces that are off by this (m) cast the same shadow."""
+KEY_RAYS, KEY_WIDTH = 12, 0.11
+"""Directions of the key light, and its radius as an angle (rad)."""
+SKY_RAYS, STEEPEST, FLATTEST = 8, 0.97, 0.62
+"""Directions of the sky, from those heights (sines)."""
+KEY_SHARE, SKY_SHARE = 0.62, 0.85
+"""How dark the ground is where all of either is hidden."""
+KEY_BLUR, SKY_BLUR = 1, 4
+"""Cells that the shadows are blurred by, twice."""
+LEAST = 3
+"""Of 255: what is fainter is not drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class CastShadow:
+    """darkness: uint8 (H, W), rows along z, columns along x; low, high: (x, z) of its corners (m)."""
+
+    darkness: UInt8
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+
+class Points(NamedTuple):
+    """corners int32 (N, 3), shares float32 (N, 3): where on which triangles; area float32 (N,), m².
+    rows int32 (M,): all corners, each once."""
+
+    rows: Int32
+    corners: Int32
+    shares: Float32
+    area: Float32
+
+
+class ShadowCaster:
+    """Works out shadows; remembers the shapes that it has seen."""
+
+    def __init__(self) -> None:
+        self._points: WeakKeyDictionary[FaceShape, Points | None] = WeakKeyDictionary()
+        self._thrown = np.empty((0, 6), dtype=np.float32)
+        self._darkness = np.zeros((CELLS, CELLS), dtype=np.uint8)
+
+    def cast(self, meshes: list[FaceMesh], middle: tuple[float, float]) -> CastShadow | None:
+        """What meshes cast on the ground y = 0 about the place (x, z); None where that is nothing, or where
+        it cannot be worked out (without numba)."""
+        if not is_compiled():
+            return None
+        ahead = 0.9 / KEY_DIRECTION[1]  # shadows fall away from the key light
+        low = [
+            (np.floor((place - ahead * way) / CELL) - CELLS / 2) * CELL
+            for place, way in zip(middle, KEY_DIRECTION[::2], strict=True)
+        ]
+        count = 0
+        for mesh in meshes:
+            points = self._points_of(mesh.shape)
+            if points is None or mesh.turn.any():
+                continue
+            if count + len(points.area) > len(self._thrown):
+                more = np.empty((2 * len(points.area), 6), dtype=np.float32)
+                self._thrown = np.concatenate([self._thrown, more])
+            places = mesh.places.reached(points.rows)
+            count = _place(places, mesh.matrix, points, low[0], low[1], self._thrown, count)
+        left, bottom, right, top = _throw(self._thrown[:count], _rays(), self._darkness)
+        if right <= left:
+            return None
+        return CastShadow(
+            self._darkness[bottom:top, left:right].copy(),
+            (low[0] + left * CELL, low[1] + bottom * CELL),
+            (low[0] + right * CELL, low[1] + top * CELL),
+        )
+
+    def _points_of(self, shape: FaceShape) -> Points | None:
+        if shape not in self._points:
+            self._points[shape] = _spread(shape)
+        return self._points[shape]
+
+
+def _spread(shape: FaceShape) -> Points | None:
+    """Points over a shape's surface, as it is modelled."""
+    if shape.coarser is None or shape.kind in WITHIN:
+        return None
+    found = shape.coarser.within(COARSE)
+    triangles = shape.triangles if found is None else found
+    if not len(triangles):
+        return None
+    a, b, c = (shape.coarser.points[triangles[:, k], :3].astype(np.float64) for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    ends = np.cumsum(area)
+    count = int(ends[-1] / SPACING**2) + 1
+    steps = np.arange(count)
+    owner = np.minimum(np.searchsorted(ends, (steps + 0.5) * ends[-1] / count), len(triangles) - 1)
+    # Evenly over the triangles: a sequence of low discrepancy in the unit square, folded.
+    u, v = (0.5 + steps * 0.7548776662) % 1, (0.5 + steps * 0.5698402910) % 1
+    over = u + v > 1
+    u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
+    return Points(
+        np.unique(triangles[owner]).astype(np.int32),
+        np.ascontiguousarray(triangles[owner], dtype=np.int32),
+        np.stack([1 - u - v, u, v], axis=1).astype(np.float32),
+        np.full(count, ends[-1] / count, dtype=np.float32),
+    )
+
+
+@cache
+def _rays() -> Float64:
+    """(N, 3) unit vectors towards the key light, then the sky."""
+    key = np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION)
+    aside = np.cross(key, (0.0, 1.0, 0.0))
+    aside /= np.linalg.norm(aside)
+    up = np.cross(aside, key)
+    golden = np.pi * (3 - 5**0.5)
+    found = []
+    for k in range(KEY_RAYS):
+        reach = KEY_WIDTH * np.sqrt((k + 0.5) / KEY_RAYS)
+        found.append(key + reach * (np.cos(golden * k) * aside + np.sin(golden * k) * up))
+    for k in range(SKY_RAYS):
+        high = STEEPEST - (STEEPEST - FLATTEST) * (k + 0.5) / SKY_RAYS
+        flat = np.sqrt(1 - high * high)
+        found.append(np.array([flat * np.cos(golden * k + 1), high, flat * np.sin(golden * k + 1)]))
+    rays = np.array(found)
+    unit: Float64 = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    return unit
+
+
+@compiled
+def _place(
+    positions: Float32,
+    matrix: Float64,
+    points: Points,
+    low_x: float,
+    low_z: float,
+    thrown: Float32,
+    count: int,
+) -> int:
+    """Write points from row `count` on: column, height (m), row; normal, as long as the area in cells.
+
+    How many there are then.
+    """
+    _, corners, shares, area = points
+    p = np.empty((3, 3))
+    for i in range(len(corners)):
+        for k in range(3):
+            x, y, z = positions[corners[i, k], 0], positions[corners[i, k], 1], positions[corners[i, k], 2]
+            for axis in range(3):
+                p[k, axis] = matrix[axis, 0] * x + matrix[axis, 1] * y + matrix[axis, 2] * z + matrix[axis, 3]
+        ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
+        vx, vy, vz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        if not length > 1e-12:
+            continue
+        a, b, c = shares[i, 0], shares[i, 1], shares[i, 2]
+        piece = area[i] / (CELL * CELL) / length
+        thrown[count, 0] = (a * p[0, 0] + b * p[1, 0] + c * p[2, 0] - low_x) / CELL - 0.5
+        thrown[count, 1] = max(a * p[0, 1] + b * p[1, 1] + c * p[2, 1], 0.0)
+        thrown[count, 2] = (a * p[0, 2] + b * p[1, 2] + c * p[2, 2] - low_z) / CELL - 0.5
+        thrown[count, 3], thrown[count, 4], thrown[count, 5] = piece * nx, piece * ny, piece * nz
+        count += 1
+    return count
+
+
+@compiled
+def _throw(thrown: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, int, int]:
+    """Write how dark each cell is; the columns and rows between which there is anything."""
+    cells = len(darkness)
+    key, sky = np.zeros((cells, cells), dtype=np.float32), np.zeros((cells, cells), dtype=np.float32)
+    layer = np.empty((cells, cells), dtype=np.float32)  # one ray after another: it stays near the processor
+    for ray in range(len(rays)):
+        layer[:] = np.float32(0.0)
+        _cover(thrown, rays[ray, 0], rays[ray, 1], rays[ray, 2], layer)
+        grid = key if ray < KEY_RAYS else sky
+        for row in range(cells):
+            for column in range(cells):
+                grid[row, column] += min(layer[row, column], np.float32(1.0))
+    _blur(key, KEY_BLUR, layer)
+    _blur(sky, SKY_BLUR, layer)
+    return _darken(key, sky, darkness)
+
+
+@compiled
+def _cover(thrown: Float32, rx: float, ry: float, rz: float, layer: Float32) -> None:
+    """Add to a layer the share of each cell that the points cover, seen along a ray."""
+    cells = len(layer)
+    limit, half, quarters = np.float32(cells - 2), np.float32(0.5), np.float32(0.75)
+    longer = 1.0 / ry
+    x, y, z = np.float32(rx * longer), np.float32(1.0), np.float32(rz * longer)
+    aside, ahead = np.float32(rx * longer / CELL), np.float32(rz * longer / CELL)
+    for i in range(len(thrown)):
+        amount = thrown[i, 3] * x + thrown[i, 4] * y + thrown[i, 5] * z
+        column = thrown[i, 0] - aside * thrown[i, 1]
+        row = thrown[i, 2] - ahead * thrown[i, 1]
+        if not (amount > np.float32(0.0) and 1.0 <= column < limit and 1.0 <= row < limit):
+            continue
+        # Over three cells each way, as a quadratic spline spreads it: the points are not quite even.
+        middle, centre = int(column + half), int(row + half)
+        fx, fy = column - np.float32(middle), row - np.float32(centre)
+        one, two, three = (
+            half * (half - fx) * (half - fx),
+            quarters - fx * fx,
+            half * (half + fx) * (half + fx),
+        )
+        down = amount * (half * (half - fy) * (half - fy))
+        layer[centre - 1, middle - 1] += down * one
+        layer[centre - 1, middle] += down * two
+        layer[centre - 1, middle + 1] += down * three
+        down = amount * (quarters - fy * fy)
+        layer[centre, middle - 1] += down * one
+        layer[centre, middle] += down * two
+        layer[centre, middle + 1] += down * three
+        down = amount * (half * (half + fy) * (half + fy))
+        layer[centre + 1, middle - 1] += down * one
+        layer[centre + 1, middle] += down * two
+        layer[centre + 1, middle + 1] += down * three
+
+
+@compiled
+def _blur(grid: Float32, reach: int, room: Float32) -> None:
+    """Mean over 2 reach + 1 cells, along rows and columns, twice."""
+    cells = len(grid)
+    per = np.float32(1.0 / (2 * reach + 1))
+    for _ in range(2):
+        for row in range(cells):
+            total = np.float32(0.0)
+            for column in range(min(reach, cells)):
+                total += grid[row, column]
+            for column in range(cells):
+                if column + reach < cells:
+                    total += grid[row, column + reach]
+                if column - reach - 1 >= 0:
+                    total -= grid[row, column - reach - 1]
+                room[row, column] = total * per
+        running = np.zeros(cells, dtype=np.float32)
+        for row in range(min(reach, cells)):
+            for column in range(cells):
+                running[column] += room[row, column]
+        for row in range(cells):
+            for column in range(cells):
+                if row + reach < cells:
+                    running[column] += room[row + reach, column]
+                if row - reach - 1 >= 0:
+                    running[column] -= room[row - reach - 1, column]
+                grid[row, column] = running[column] * per
+
+
+@compiled
+def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
+    """Write how dark each cell is, for the rays of both lights that are hidden there; see `_throw`."""
+    cells = len(darkness)
+    left, bottom, right, top = cells, cells, 0, 0
+    for row in range(cells):
+        for column in range(cells):
+            lit = 1.0 - KEY_SHARE * key[row, column] / KEY_RAYS
+            lit *= 1.0 - SKY_SHARE * sky[row, column] / SKY_RAYS
+            edge = min(row, cells - 1 - row, column, cells - 1 - column)
+            dark = 255.0 * (1.0 - lit) * min(edge / 8.0, 1.0)
+            darkness[row, column] = np.uint8(min(max(dark, 0.0), 255.0))
+            if dark >= LEAST:
+                left, right = min(left, column), max(right, column + 1)
+                bottom, top = min(bottom, row), max(top, row + 1)
+    return max(left - 1, 0), max(bottom - 1, 0), min(right + 1, cells), min(top + 1, cells)

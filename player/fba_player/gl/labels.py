@@ -1,0 +1,121 @@
+"""Words in a picture: a legend and the names of points, drawn by Pillow, and where names find room."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.view.annotations import Legend
+
+if TYPE_CHECKING:
+    from PIL.ImageFont import FreeTypeFont, ImageFont
+
+Float64 = npt.NDArray[np.float64]
+UInt8 = npt.NDArray[np.uint8]
+Bool = npt.NDArray[np.bool_]
+
+TEXT = (240, 242, 245, 255)
+FAINT = (186, 192, 200, 255)
+SHADE = (18, 21, 26, 190)
+SMALLEST, SMALLEST_WITH_LEGEND = 96, 240
+"""In pictures lower than this (pixels) there are no names, and no legend."""
+MOST_NAMES = 45
+"""Where more points are in view, none is named."""
+GAP = 2.0
+
+
+@lru_cache(maxsize=16)
+def _font(pixels: int) -> FreeTypeFont | ImageFont:
+    """Pillow's own font: the same on every machine."""
+    from PIL import ImageFont
+
+    return ImageFont.load_default(max(pixels, 6))
+
+
+def legend_picture(legend: Legend, scale: float) -> UInt8:
+    """(H, W, 4) colours with numbers below them and a title above. scale: 1 in a picture 720 high."""
+    from PIL import Image, ImageDraw
+
+    title, small = _font(round(17 * scale)), _font(round(14 * scale))
+    pad, bar = 12 * scale, 14 * scale
+    inner = max(220 * scale, title.getlength(legend.title), small.getlength(legend.unit))
+    width, height = round(inner + 2 * pad), round(88 * scale + pad)
+    picture = Image.new("RGBA", (width, height), (0, 0, 0, 0))
+    draw = ImageDraw.Draw(picture)
+    draw.rounded_rectangle((0, 0, width - 1, height - 1), radius=8 * scale, fill=SHADE)
+    draw.text((pad, 8 * scale), legend.title, font=title, fill=TEXT)
+    draw.text((pad, 30 * scale), legend.unit, font=small, fill=FAINT)
+    top, columns = 54 * scale, round(inner)
+    stops = np.array(legend.stops)
+    for column in range(columns):
+        at = column / max(columns - 1, 1) * (len(stops) - 1)
+        colour = [np.interp(at, np.arange(len(stops)), stops[:, i]) for i in range(3)]
+        fill = tuple(round(255 * float(v)) for v in colour)
+        draw.line((pad + column, top, pad + column, top + bar), fill=(*fill, 255))
+    for share, anchor in ((0.0, "la"), (0.5, "ma"), (1.0, "ra")):
+        place = (pad + share * (columns - 1), top + bar + 4 * scale)
+        draw.text(place, _number(legend.most * share), font=small, fill=TEXT, anchor=anchor)
+    return np.asarray(picture)
+
+
+def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, npt.NDArray[np.int64]]:
+    """(H, W, 4) all names one below the other, and (N, 4) left, top, width and height of each."""
+    from PIL import Image, ImageDraw
+
+    font = _font(pixels)
+    row, pad = round(pixels * 1.35), max(round(pixels * 0.3), 2)
+    widths = [int(np.ceil(font.getlength(name))) + 2 * pad for name in names]
+    picture = Image.new("RGBA", (max(widths, default=1), max(row * len(names), 1)), (0, 0, 0, 0))
+    draw = ImageDraw.Draw(picture)
+    for number, (name, width) in enumerate(zip(names, widths, strict=True)):
+        top = number * row
+        draw.rounded_rectangle((0, top, width - 1, top + row - 1), radius=row * 0.3, fill=SHADE)
+        draw.text((pad, top + row / 2), name, font=font, fill=TEXT, anchor="lm")
+    boxes = [(0, number * row, width, row) for number, width in enumerate(widths)]
+    return np.asarray(picture), np.array(boxes, dtype=np.int64).reshape(-1, 4)
+
+
+def placed_names(
+    dots: Float64, sizes: npt.NDArray[np.int64], radius: float, size: tuple[int, int]
+) -> tuple[npt.NDArray[np.intp], Float64]:
+    """Which names find room, and their upper left corners (M, 2), pixels.
+
+    dots: (N, 2) pixels from the upper left, NaN where one cannot be seen. sizes: (N, 2) of the names.
+    None where more than `MOST_NAMES` dots are in the picture; each beside its dot, or above a place
+    without one (radius 0); none over another.
+    """
+    inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
+    if inside.sum() > MOST_NAMES:
+        return np.zeros(0, dtype=np.intp), np.zeros((0, 2))
+    reach = radius + GAP
+    taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in dots[inside]]
+    chosen, corners = [], []
+    for number in np.flatnonzero(inside):
+        (x, y), (wide, high) = dots[number], sizes[number]
+        above = [(min(max(x - wide / 2, 0.0), size[0] - wide), y - high)] if radius == 0 else []
+        for left, top in (
+            *above,
+            (x + reach, y - high / 2),
+            (x - reach - wide, y - high / 2),
+            (x - wide / 2, y - reach - high),
+            (x - wide / 2, y + reach),
+        ):
+            box = (left, top, left + wide, top + high)
+            within = left >= 0 and top >= 0 and box[2] <= size[0] and box[3] <= size[1]
+            if within and not any(_meet(box, other) for other in taken):
+                taken.append(box)
+                chosen.append(number)
+                corners.append((round(left), round(top)))
+                break
+    return np.array(chosen, dtype=np.intp), np.array(corners, dtype=np.float64).reshape(-1, 2)
+
+
+def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def _number(value: float) -> str:
+    return "0" if value == 0 else f"{value:.3g}"

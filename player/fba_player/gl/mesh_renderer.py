@@ -1,0 +1,219 @@
+"""Draws the parts of faces and bodies: their buffers and textures on the graphics card."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.gl.lod import distance
+from fba_player.gl.gpu.way import Way, release
+from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
+from fba_player.mesh.skin_relief import RELIEF, relief
+from fba_player.view.view import FaceMesh, FaceShape
+from fba_player.figure.texture_images import Pictures, halved
+
+Float64 = npt.NDArray[np.float64]
+
+MOST_SHAPES = 64
+"""Parts remembered on the graphics card; the longest unused goes first."""
+FAINTEST = 0.25
+"""Where a repeat of the skin's relief is this share of its size in pixels or less, it is not seen."""
+
+
+class FaceRenderer:
+    """Draws face meshes. deform: one of `fba_player.gl.gpu.choice.DEFORM`.
+
+    Owns what it allocates on the context; `close` gives it back.
+    """
+
+    def __init__(self, context: Any, deform: str = "auto") -> None:
+        self._gl = context
+        self.way = Way(context, deform)
+        """How the vertices come into the buffers."""
+        self._programs: dict[tuple[str, ...], Any] = {}
+        self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
+        self._reliefs: dict[int, Any] = {}
+        self._pixels: npt.NDArray[np.uint8] | None = None
+        self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
+
+    def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
+        """From where the next meshes are seen: eye (3,), (4, 4) world to clip space, size of a pixel at a
+        distance of 1."""
+        before = self._camera
+        self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
+        if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
+            for program in self._programs.values():
+                self._place(program)
+
+    def draw(self, meshes: list[FaceMesh]) -> None:
+        """Draw parts; those that can be seen through last."""
+        gl = self._gl
+        rest = []
+        for mesh in meshes:
+            if self._parts(mesh)["see_through"]:
+                rest.append(mesh)
+            else:
+                self._draw(mesh)
+        if rest:
+            gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
+            gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+            gl.fbo.depth_mask = False
+            for mesh in rest:
+                self._draw(mesh)
+            gl.fbo.depth_mask = True
+            gl.enable_only(gl.DEPTH_TEST)
+
+    def close(self) -> None:
+        """Free everything allocated on the graphics card."""
+        for _, parts in self._kept.values():
+            _release(parts)
+        self._kept.clear()
+        for part in (*self._reliefs.values(), *self._programs.values()):
+            part.release()
+        self._reliefs.clear()
+        self.way.close()
+        self._programs.clear()
+
+    def _program(self, words: tuple[str, ...]) -> Any:
+        if words not in self._programs:
+            self._programs[words] = load_program(self._gl, "face", *words)
+            self._place(self._programs[words])
+        return self._programs[words]
+
+    def _array(self, parts: dict[str, Any], words: tuple[str, ...]) -> Any:
+        """The part's vertices as the program takes them."""
+        if words not in parts["arrays"]:
+            attributes: list[tuple[Any, ...]] = [
+                (parts["positions"], "3f", "in_position"),
+                (parts["normals"], "3f", "in_normal"),
+                (parts["light"], "4f", "in_light"),
+            ]
+            if "TEXTURED" in words:
+                attributes.append((parts["still"], "4f 2f 1f", "in_colour", "in_texture", "in_sway"))
+            else:
+                attributes.append((parts["still"], "4f 8x 1f", "in_colour", "in_sway"))
+            if parts["across"] is not None:
+                attributes.append((parts["across"], "4f 4f", "in_across", "in_along"))
+            program, triangles = self._program(words), parts["triangles"]
+            parts["arrays"][words] = self._gl.vertex_array(program, attributes, index_buffer=triangles)
+        return parts["arrays"][words]
+
+    def _place(self, program: Any) -> None:
+        eye, matrix, pixel = self._camera
+        set_uniform(program, "eye", tuple(float(v) for v in eye))
+        if matrix:
+            set_uniform(program, "camera", matrix)
+        set_uniform(program, "pixel", pixel)
+
+    def _draw(self, mesh: FaceMesh) -> None:
+        parts, shape = self._parts(mesh), mesh.shape
+        self.way.write(mesh, parts)
+        away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
+        wide = self._camera[2] * away
+        picture = parts["pictures"].suited(wide)
+        repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
+        words = tuple(
+            word
+            for word, there in (
+                ("SMOOTH", shape.smooth),
+                ("HAIRS", shape.across is not None),
+                ("TEXTURED", picture is not None),
+                ("FINE", repeats is not None),
+            )
+            if there
+        )
+        program, array = self._program(words), self._array(parts, words)
+        _set_shape(program, shape)
+        _set_placing(program, mesh)
+        if picture is not None:
+            picture.use(0)
+        if repeats is not None:
+            repeats.use(1)
+        if shape.closed:
+            self._gl.enable(self._gl.CULL_FACE)
+        array.render()
+        if shape.closed:
+            self._gl.disable(self._gl.CULL_FACE)
+
+    def _parts(self, mesh: FaceMesh) -> dict[str, Any]:
+        key = id(mesh.shape)
+        if key in self._kept:
+            self._kept[key] = self._kept.pop(key)  # now the latest used
+            return self._kept[key][1]
+        while len(self._kept) >= MOST_SHAPES:
+            _release(self._kept.pop(next(iter(self._kept)))[1])
+        parts = self._uploaded(mesh)
+        self._kept[key] = (mesh.shape, parts)
+        return parts
+
+    def _uploaded(self, mesh: FaceMesh) -> dict[str, Any]:
+        gl, shape, count = self._gl, mesh.shape, len(mesh.places)
+        texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
+        still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
+        parts: dict[str, Any] = {
+            "positions": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
+            "normals": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
+            "light": gl.buffer(reserve=max(count, 1) * 16, dynamic=True),
+            "still": gl.buffer(np.ascontiguousarray(still, dtype="f4").tobytes()),
+            "triangles": gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()),
+        }
+        parts["across"] = None
+        if shape.across is not None:
+            parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
+        parts["arrays"] = {}
+        parts["pictures"] = Pictures(gl, shape, mesh.positions)
+        parts["see_through"] = shape.see_through
+        parts["lit"] = None
+        return parts
+
+    def _relief_texture(self, wide: float) -> Any:
+        """The relief for pixels as wide as this (m), or None where it is not seen."""
+        if self._pixels is None:
+            self._pixels = relief()
+        size = self._pixels.shape[0]
+        halvings = halved(RELIEF / size, wide, size)
+        if size / 2**halvings < FAINTEST * size:
+            return None
+        if halvings not in self._reliefs:
+            from PIL import Image
+
+            smaller = np.asarray(Image.fromarray(self._pixels).reduce(2**halvings))
+            texture = self._gl.texture(smaller.shape[1::-1], 3, smaller.tobytes())
+            texture.filter = (self._gl.LINEAR, self._gl.LINEAR)
+            self._reliefs[halvings] = texture
+        return self._reliefs[halvings]
+
+
+def _set_shape(program: Any, shape: FaceShape) -> None:
+    """What a program takes of a shape, unless it has just had it."""
+    if program.extra.get("shape") is shape:
+        return
+    program.extra["shape"] = shape
+    set_uniform(program, "scatter", shape.scatter)
+    set_uniform(program, "fine", shape.fine)
+    set_uniform(program, "two_sided", 1.0 if shape.two_sided else 0.0)
+    set_uniform(program, "relief", 1)
+
+
+def _set_placing(program: Any, mesh: FaceMesh) -> None:
+    """Where a mesh is and how it is turned, unless the program has just had the same for another part."""
+    placing = (mesh.matrix, mesh.turn, mesh.centre)
+    had = program.extra.get("placing")
+    if had is not None and all(one is other for one, other in zip(placing, had, strict=True)):
+        return
+    program.extra["placing"] = placing
+    set_uniform(program, "world", matrix_bytes(mesh.matrix))
+    set_uniform(program, "turn", tuple(mesh.turn.tolist()))
+    set_uniform(program, "centre", tuple(mesh.centre.tolist()))
+
+
+def _release(parts: dict[str, Any]) -> None:
+    release(parts)
+    for array in parts["arrays"].values():
+        array.release()
+    for name in ("positions", "normals", "light", "still", "triangles", "across"):
+        if parts[name] is not None:
+            parts[name].release()
+    parts["pictures"].close()

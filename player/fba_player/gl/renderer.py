@@ -1,0 +1,315 @@
+"""Draws a `View` with OpenGL 3.3 core: one program for meshes, one for capsules, one for eyes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.view.camera import Camera
+from fba_player.gl.ground_shadow import ShadowCaster
+from fba_player.gl.lod import Details
+from fba_player.gl.antialias_region import Steps, steps
+from fba_player.gl.annotation_renderer import ExtrasRenderer
+from fba_player.gl.mesh_renderer import FaceRenderer
+from fba_player.gl.gpu.way import Way
+from fba_player.gl.silhouette import Outliner
+from fba_player.mesh.primitives import capsule_mesh, sphere_mesh
+from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
+from fba_player.view.view import CAPSULE_FLOATS, Eye, FaceMesh, Mesh, MeshShape, View
+
+MOST_BLOBS = 8
+THROUGH = 0.16
+"""How much of a mark is seen through what hides it."""
+THINNEST = 0.9
+"""Radius in pixels that no mark falls below."""
+RAISED = 0.003
+"""Marks are drawn over what hides them by less than this (m)."""
+MOST_SHAPES = 32
+"""Meshes remembered on the graphics card; the longest unused goes first."""
+
+
+class Renderer:
+    """Draws views into whatever framebuffer is bound.
+
+    context: a moderngl context (OpenGL 3.3 or later). deform: who moves the vertices of figures, one of
+    `fba_player.gl.gpu.choice.DEFORM`. The renderer owns what it allocates there; `close` gives it back. Not
+    thread-safe, as OpenGL is not.
+    """
+
+    def __init__(self, context: Any, deform: str = "auto") -> None:
+        self._gl = context
+        self._programs = {
+            name: load_program(context, name)
+            for name in ("mesh", "capsule", "eye", "studio", "shadow", "cast")
+        }
+        self._faces = FaceRenderer(context, deform)
+        corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
+        square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
+        self._studio_buffer = context.buffer(corners.tobytes())
+        self._square = context.buffer(square.tobytes())
+        self._blobs = context.buffer(reserve=MOST_BLOBS * 16, dynamic=True)
+        self._shadow = context.vertex_array(
+            self._programs["shadow"], [(self._square, "2f", "in_corner"), (self._blobs, "4f/i", "in_blob")]
+        )
+        self._caster = ShadowCaster()
+        self._cast = context.vertex_array(self._programs["cast"], [(self._square, "2f", "in_corner")])
+        self._darkness: Any = None
+        self._backdrop: tuple[tuple[object, ...], Any, Any] | None = None
+        self._studio = context.vertex_array(
+            self._programs["studio"], [(self._studio_buffer, "2f", "in_corner")]
+        )
+        self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
+        self._capsule_parts = self._uploaded(*capsule_mesh())
+        self._capsules = self._capsule_array()
+        self._eye_parts = self._uploaded(*sphere_mesh())
+        self._eye = context.vertex_array(
+            self._programs["eye"],
+            [(self._eye_parts[0], "3f", "in_position")],
+            index_buffer=self._eye_parts[1],
+        )
+        self._outliner = Outliner()
+        self._details = Details()
+        self._extras = ExtrasRenderer(context)
+        self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
+        self._seen: tuple[object, ...] = ()
+        set_uniform(self._programs["capsule"], "opacity", 1.0)
+
+    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps | None:
+        """Clear the bound framebuffer and draw the view; size: its width and height in pixels.
+
+        Returns where its steps are, None for anywhere.
+        """
+        gl = self._gl
+        aspect = size[0] / max(size[1], 1)
+        seen = camera.view_matrix()
+        matrix, place = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]
+        pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
+
+        def draw_faces(faces: list[FaceMesh]) -> View:
+            drawn = replace(view, faces=self._details.suited(faces, place, pixel))
+            self._faces.begin(place, matrix, pixel)
+            self._faces.draw(drawn.faces)
+            return drawn
+
+        def trial(faces: list[FaceMesh]) -> None:
+            drawn = draw_faces(faces)
+            if not self._faces.way.on_gpu:
+                steps(drawn, matrix, size, self._outliner)
+
+        gl.viewport = (0, 0, *size)
+        self._faces.way.prepare(view.faces, trial)
+        gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
+        self._see(tuple(place.tolist()), matrix_bytes(matrix), pixel)
+        self._draw_studio(view, matrix, size, (float(camera.target[0]), float(camera.target[2])))
+        gl.enable_only(gl.DEPTH_TEST)
+        for mesh in view.meshes:
+            self._draw_mesh(mesh)
+        self._draw_capsules(view.capsules)
+        self._draw_marks(view.marks)
+        for ball in view.eyes:
+            self._draw_eye(ball)
+        drawn = draw_faces(view.faces)
+        if view.extras is not None:
+            self._extras.draw(view.extras, camera, size)
+            drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
+        if self._faces.way.on_gpu and (view.extras is None or not view.extras.is_fine):
+            return None  # a graphics card smooths all of it in less time than outlines take to be found
+        return steps(drawn, matrix, size, self._outliner)
+
+    def _see(self, *seen: object) -> None:
+        """From where everything is seen: eye, (4, 4) world to clip space, size of a pixel at 1."""
+        if seen == self._seen:
+            return
+        self._seen = seen
+        for program in self._programs.values():
+            for name, value in zip(("eye", "camera", "pixel"), seen, strict=True):
+                set_uniform(program, name, value)
+
+    @property
+    def way(self) -> Way:
+        """Where the last picture's figures were deformed, and why."""
+        return self._faces.way
+
+    def close(self) -> None:
+        """Free everything allocated on the graphics card."""
+        for _, parts in self._shapes.values():
+            for part in parts:
+                part.release()
+        self._shapes.clear()
+        self._faces.close()
+        if self._darkness is not None:
+            self._darkness.release()
+        self._cast.release()
+        self._extras.close()
+        for part in (
+            *(self._backdrop[:0:-1] if self._backdrop else ()), self._shadow, self._square, self._blobs,
+            self._studio, self._studio_buffer, self._capsules, self._instances, *self._capsule_parts,
+            self._eye, *self._eye_parts, *self._programs.values(),
+        ):  # fmt: skip
+            part.release()
+
+    def _uploaded(
+        self, vertices: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]
+    ) -> tuple[Any, Any]:
+        return self._gl.buffer(vertices.tobytes()), self._gl.buffer(triangles.tobytes())
+
+    def _capsule_array(self) -> Any:
+        return self._gl.vertex_array(
+            self._programs["capsule"],
+            [
+                (self._capsule_parts[0], "3f 1f", "in_sphere", "in_end"),
+                (self._instances, "4f 4f 4f 4f/i", "in_start", "in_finish", "in_front", "in_colour"),
+            ],
+            index_buffer=self._capsule_parts[1],
+        )
+
+    def _draw_studio(
+        self, view: View, matrix: npt.NDArray[np.float64], size: tuple[int, int], centre: tuple[float, float]
+    ) -> None:
+        """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs. centre: x
+        and z of where the ground is brightest."""
+        gl = self._gl
+        if view.background is not None:
+            gl.clear(*view.background, 1.0, depth=1.0)
+            self._draw_shadows(view)
+            return
+        target = gl.fbo
+        key = (size, view.ground, matrix.tobytes(), centre)
+        if self._backdrop is None or self._backdrop[0] != key:
+            texture, kept = self._kept_backdrop(size)
+            self._backdrop = (key, texture, kept)
+            program = self._programs["studio"]
+            set_uniform(program, "unproject", matrix_bytes(np.linalg.inv(matrix)))
+            set_uniform(program, "ground", 1.0 if view.ground else 0.0)
+            set_uniform(program, "centre", centre)
+            kept.use()
+            gl.viewport = (0, 0, *size)
+            gl.enable_only(gl.NOTHING)
+            self._studio.render()
+        gl.copy_framebuffer(target, self._backdrop[2])
+        target.use()
+        gl.viewport = (0, 0, *size)
+        self._draw_shadows(view)
+
+    def _draw_shadows(self, view: View) -> None:
+        """Soft shadows on the ground."""
+        gl = self._gl
+        blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
+        if not view.ground or not len(blobs):
+            return
+        gl.enable_only(gl.BLEND)
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+        middle = blobs[:, :2].mean(axis=0)
+        cast = self._caster.cast(view.faces, (float(middle[0]), float(middle[1]))) if view.faces else None
+        if cast is None:
+            self._blobs.write(blobs)
+            self._shadow.render(gl.TRIANGLE_STRIP, instances=len(blobs))
+            return
+        height, width = cast.darkness.shape
+        if self._darkness is None or self._darkness.size != (width, height):
+            if self._darkness is not None:
+                self._darkness.release()
+            self._darkness = gl.texture((width, height), 1, alignment=1)
+            self._darkness.filter = (gl.LINEAR, gl.LINEAR)
+            self._darkness.repeat_x = self._darkness.repeat_y = False
+        self._darkness.write(np.ascontiguousarray(cast.darkness), alignment=1)
+        self._darkness.use(0)
+        set_uniform(self._programs["cast"], "low", cast.low)
+        set_uniform(self._programs["cast"], "high", cast.high)
+        self._cast.render(gl.TRIANGLE_STRIP)
+
+    def _kept_backdrop(self, size: tuple[int, int]) -> tuple[Any, Any]:
+        if self._backdrop is not None:
+            if self._backdrop[0][0] == size:
+                return self._backdrop[1], self._backdrop[2]
+            self._backdrop[2].release()
+            self._backdrop[1].release()
+        buffer = self._gl.renderbuffer(size, 4)
+        return buffer, self._gl.framebuffer([buffer])
+
+    def _draw_mesh(self, mesh: Mesh) -> None:
+        positions, normals, array = self._shape_parts(mesh)
+        positions.orphan()
+        positions.write(np.ascontiguousarray(mesh.positions, dtype="f4"))
+        normals.orphan()
+        normals.write(np.ascontiguousarray(mesh.normals, dtype="f4"))
+        set_uniform(self._programs["mesh"], "world", matrix_bytes(mesh.matrix))
+        set_uniform(self._programs["mesh"], "two_sided", 1.0 if mesh.shape.two_sided else 0.0)
+        set_uniform(self._programs["mesh"], "raised", mesh.shape.raised)
+        array.render()
+
+    def _shape_parts(self, mesh: Mesh) -> tuple[Any, Any, Any]:
+        key = id(mesh.shape)
+        if key in self._shapes:
+            self._shapes[key] = self._shapes.pop(key)  # now the latest used
+        else:
+            while len(self._shapes) >= MOST_SHAPES:
+                for part in self._shapes.pop(next(iter(self._shapes)))[1]:
+                    part.release()
+            gl, shape = self._gl, mesh.shape
+            positions = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
+            normals = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
+            colours = gl.buffer(np.ascontiguousarray(shape.colours, dtype="f4").tobytes())
+            triangles = gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes())
+            array = gl.vertex_array(
+                self._programs["mesh"],
+                [
+                    (positions, "3f", "in_position"),
+                    (normals, "3f", "in_normal"),
+                    (colours, "4f", "in_colour"),
+                ],
+                index_buffer=triangles,
+            )
+            self._shapes[key] = (shape, [positions, normals, array, colours, triangles])
+        parts = self._shapes[key][1]
+        return parts[0], parts[1], parts[2]
+
+    def _draw_capsules(self, capsules: npt.NDArray[np.float32]) -> None:
+        if not len(capsules):
+            return
+        data = np.ascontiguousarray(capsules, dtype="f4")
+        if data.nbytes > self._instances.size:
+            self._capsules.release()
+            self._instances.release()
+            self._instances = self._gl.buffer(reserve=data.nbytes, dynamic=True)
+            self._capsules = self._capsule_array()
+        self._instances.orphan(max(self._instances.size, data.nbytes))
+        self._instances.write(data)
+        self._capsules.render(instances=len(data))
+
+    def _draw_marks(self, marks: npt.NDArray[np.float32]) -> None:
+        """Marks as capsules; those behind something faintly through it."""
+        if not len(marks):
+            return
+        gl = self._gl
+        set_uniform(self._programs["capsule"], "thinnest", THINNEST)
+        set_uniform(self._programs["capsule"], "raised", RAISED)
+        self._draw_capsules(marks)
+        gl.enable_only(gl.DEPTH_TEST | gl.BLEND | gl.CULL_FACE)
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+        gl.depth_func = ">"
+        gl.fbo.depth_mask = False
+        set_uniform(self._programs["capsule"], "opacity", THROUGH)
+        self._capsules.render(instances=len(marks))
+        set_uniform(self._programs["capsule"], "opacity", 1.0)
+        set_uniform(self._programs["capsule"], "thinnest", 0.0)
+        set_uniform(self._programs["capsule"], "raised", 0.0)
+        gl.fbo.depth_mask = True
+        gl.depth_func = "<"
+        gl.enable_only(gl.DEPTH_TEST)
+
+    def _draw_eye(self, ball: Eye) -> None:
+        program = self._programs["eye"]
+        set_uniform(program, "world", matrix_bytes(ball.matrix))
+        set_uniform(program, "iris", ball.iris)
+        set_uniform(program, "pupil", ball.pupil)
+        set_uniform(program, "lids", np.ascontiguousarray(ball.lids, dtype="f4").tobytes())
+        set_uniform(program, "head", matrix_bytes(ball.axes))
+        axes = ball.matrix[:3, :3] / max(float(np.linalg.norm(ball.matrix[:3, 0])), 1e-9)
+        set_uniform(program, "ball", matrix_bytes(axes))
+        set_uniform(program, "tint", ball.tint)
+        self._eye.render()

@@ -1,0 +1,249 @@
+"""Where the outlines of meshes run in a picture: there, and only there, steps are to be smoothed.
+
+Software OpenGL spends as long on looking for steps in a whole picture as on drawing a face.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled
+from fba_player.view.view import FaceMesh
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+TILE = 8
+"""Pixels: the picture is smoothed in tiles of this size that an outline runs through."""
+BESIDE = 1.5
+"""Pixels on each side of an outline where there may be steps."""
+
+
+class Edges:
+    """The edges of a triangulation: ends (E, 2), and the triangles on both sides (E, 2), -1 for none."""
+
+    def __init__(self, triangles: Int32) -> None:
+        corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        owner = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
+        ordered = np.sort(corners, axis=1)
+        order = np.lexsort((ordered[:, 1], ordered[:, 0]))
+        ordered, owner = ordered[order], owner[order]
+        first = np.ones(len(ordered), dtype=bool)
+        first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+        start = np.flatnonzero(first)
+        self.ends = np.ascontiguousarray(ordered[start], dtype=np.int32)
+        self.sides = np.full((len(start), 2), -1, dtype=np.int32)
+        self.sides[:, 0] = owner[start]
+        uses = np.diff(np.append(start, len(ordered)))
+        self.sides[uses == 2, 1] = owner[start[uses == 2] + 1]
+        # Copies: what cannot be written to is another type, and the loops would be compiled for both.
+        self.triangles = np.array(triangles, dtype=np.int32, order="C")
+        # Room to work in.
+        self.seen = np.empty((0, 3), dtype=np.float32)
+        self.facing = np.empty(len(triangles), dtype=np.int8)
+        self.sway: tuple[Float32, Float32] | None = None
+
+
+class Outliner:
+    """Finds outlines; remembers the edges of the shapes that it has seen.
+
+    `begin` a picture, `add` meshes, and take its `tiles`.
+    """
+
+    MOST_SHAPES = 64
+
+    def __init__(self) -> None:
+        self._edges: dict[int, tuple[object, Edges]] = {}
+        self._size = (1, 1)
+        self._marked = np.zeros((1, 1), dtype=np.uint8)
+
+    def begin(self, size: tuple[int, int]) -> None:
+        """A picture of this width and height in pixels, in which there is nothing yet."""
+        shape = (-(-size[1] // TILE), -(-size[0] // TILE))
+        if self._marked.shape != shape:
+            self._marked = np.zeros(shape, dtype=np.uint8)
+        self._marked[:] = 0
+        self._size = size
+
+    def add(self, mesh: FaceMesh, matrix: Float64) -> None:
+        """The outlines of a mesh. matrix: (4, 4), world to clip space."""
+        if not len(mesh.positions):
+            return
+        edges = self._edges_of(mesh)
+        clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
+        if edges.sway is None or edges.sway[0] is not mesh.shape.sway:
+            edges.sway = (mesh.shape.sway, np.array(mesh.shape.sway, dtype=np.float32, order="C"))
+        if len(edges.seen) != len(mesh.positions):
+            edges.seen = np.empty((len(mesh.positions), 3), dtype=np.float32)
+        places = np.ascontiguousarray(mesh.positions, dtype=np.float32)
+        _add(
+            places,
+            edges.sway[1],
+            np.asarray(mesh.turn, dtype=np.float64),
+            np.asarray(mesh.centre, dtype=np.float64),
+            clip,
+            self._size,
+            edges.seen,
+            edges.triangles,
+            edges.ends,
+            edges.sides,
+            edges.facing,
+            self._marked,
+        )
+
+    def tiles(self) -> Float32:
+        """(N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the picture."""
+        corners = np.empty((6 * _runs(self._marked, self._size, np.empty((0, 2), dtype=np.float32)), 2), "f4")
+        _runs(self._marked, self._size, corners)
+        return corners
+
+    def _edges_of(self, mesh: FaceMesh) -> Edges:
+        key = id(mesh.shape)
+        if key in self._edges:
+            self._edges[key] = self._edges.pop(key)  # now the latest used
+        else:
+            while len(self._edges) >= self.MOST_SHAPES:
+                del self._edges[next(iter(self._edges))]
+            self._edges[key] = (mesh.shape, Edges(mesh.shape.triangles))
+        return self._edges[key][1]
+
+
+@compiled
+def _add(
+    positions: Float32,
+    sway: Float32,
+    turn: Float64,
+    centre: Float64,
+    clip: Float64,
+    size: tuple[int, int],
+    seen: Float32,
+    triangles: Int32,
+    ends: Int32,
+    sides: Int32,
+    facing: npt.NDArray[np.int8],
+    marked: npt.NDArray[np.uint8],
+) -> None:
+    """Both in one: what is called from Python costs most."""
+    _project(positions, sway, turn, centre, clip, size, seen)
+    _outline(seen, triangles, ends, sides, size, facing, marked)
+
+
+@compiled
+def _project(
+    positions: Float32,
+    sway: Float32,
+    turn: Float64,
+    centre: Float64,
+    clip: Float64,
+    size: tuple[int, int],
+    seen: Float32,
+) -> None:
+    """Pixels x, y of vertices (V, 3), and w, below 0 behind the camera; turned as face.vert does."""
+    angle = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+    axis = turn / max(angle, 1e-12)
+    half_wide, half_high = 0.5 * size[0], 0.5 * size[1]
+    whole_sine, whole_cosine = np.sin(angle), np.cos(angle)
+    for i in range(len(positions)):
+        x, y, z = float(positions[i, 0]), float(positions[i, 1]), float(positions[i, 2])
+        if angle > 1e-6:
+            sine, cosine = whole_sine, whole_cosine
+            if sway[i] != 1.0:  # few: sines take longer than all else
+                sine, cosine = np.sin(angle * sway[i]), np.cos(angle * sway[i])
+            x, y, z = x - centre[0], y - centre[1], z - centre[2]
+            along = (x * axis[0] + y * axis[1] + z * axis[2]) * (1.0 - cosine)
+            cross_x = axis[1] * z - axis[2] * y
+            cross_y = axis[2] * x - axis[0] * z
+            cross_z = axis[0] * y - axis[1] * x
+            x = x * cosine + cross_x * sine + axis[0] * along + centre[0]
+            y = y * cosine + cross_y * sine + axis[1] * along + centre[1]
+            z = z * cosine + cross_z * sine + axis[2] * along + centre[2]
+        w = clip[3, 0] * x + clip[3, 1] * y + clip[3, 2] * z + clip[3, 3]
+        across = clip[0, 0] * x + clip[0, 1] * y + clip[0, 2] * z + clip[0, 3]
+        up = clip[1, 0] * x + clip[1, 1] * y + clip[1, 2] * z + clip[1, 3]
+        if not w > 1e-4:
+            seen[i, 2] = -1.0
+            continue
+        seen[i, 0] = half_wide * (1.0 + across / w)
+        seen[i, 1] = half_high * (1.0 + up / w)
+        seen[i, 2] = 1.0
+
+
+@compiled
+def _outline(
+    seen: Float32,
+    triangles: Int32,
+    ends: Int32,
+    sides: Int32,
+    size: tuple[int, int],
+    facing: npt.NDArray[np.int8],
+    marked: npt.NDArray[np.uint8],
+) -> None:
+    """Mark the tiles along every edge between what faces the camera and what does not, and along borders."""
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ax, ay = seen[a, 0], seen[a, 1]
+        area = (seen[b, 0] - ax) * (seen[c, 1] - ay) - (seen[c, 0] - ax) * (seen[b, 1] - ay)
+        facing[t] = 2 if abs(area) < 1e-6 else (1 if area > 0.0 else 0)  # 2: edge on, faces neither way
+    wide, high = float(size[0]), float(size[1])
+    for e in range(len(ends)):
+        a, b = ends[e, 0], ends[e, 1]
+        one = facing[sides[e, 0]]
+        if one == 2 or (sides[e, 1] >= 0 and (facing[sides[e, 1]] == one or facing[sides[e, 1]] == 2)):
+            continue
+        if seen[a, 2] < 0.0 or seen[b, 2] < 0.0:
+            continue
+        ax, ay = float(seen[a, 0]), float(seen[a, 1])
+        bx, by = float(seen[b, 0]), float(seen[b, 1])
+        outside = (
+            max(ax, bx) < -BESIDE
+            or max(ay, by) < -BESIDE
+            or min(ax, bx) > wide + BESIDE
+            or min(ay, by) > high + BESIDE
+        )
+        length = max(abs(bx - ax), abs(by - ay))
+        if outside or not length < 4.0 * (wide + high):
+            continue
+        left, right = int(max(min(ax, bx) - BESIDE, 0.0)), int(min(max(ax, bx) + BESIDE, wide - 1.0))
+        low, top = int(max(min(ay, by) - BESIDE, 0.0)), int(min(max(ay, by) + BESIDE, high - 1.0))
+        if right // TILE - left // TILE <= 1 and top // TILE - low // TILE <= 1:  # short, as most are
+            for row in range(low // TILE, top // TILE + 1):
+                for column in range(left // TILE, right // TILE + 1):
+                    marked[row, column] = 1
+            continue
+        steps = int(length / BESIDE) + 1
+        for step in range(steps + 1):
+            x, y = ax + (bx - ax) * step / steps, ay + (by - ay) * step / steps
+            left, right = int(max(x - BESIDE, 0.0)) // TILE, int(min(x + BESIDE, wide - 1.0)) // TILE
+            low, top = int(max(y - BESIDE, 0.0)) // TILE, int(min(y + BESIDE, high - 1.0)) // TILE
+            for row in range(low, top + 1):
+                for column in range(left, right + 1):
+                    marked[row, column] = 1
+
+
+@compiled
+def _runs(marked: npt.NDArray[np.uint8], size: tuple[int, int], corners: Float32) -> int:
+    """Write two triangles for each row of marked tiles side by side, where there is room; how many rows."""
+    count = 0
+    for row in range(marked.shape[0]):
+        column = 0
+        while column < marked.shape[1]:
+            if marked[row, column] == 0:
+                column += 1
+                continue
+            first = column
+            while column < marked.shape[1] and marked[row, column] != 0:
+                column += 1
+            if len(corners):
+                left, right = 2.0 * first * TILE / size[0] - 1.0, 2.0 * column * TILE / size[0] - 1.0
+                low, top = 2.0 * row * TILE / size[1] - 1.0, 2.0 * (row + 1) * TILE / size[1] - 1.0
+                at = 6 * count
+                corners[at, 0], corners[at, 1] = left, low
+                corners[at + 1, 0], corners[at + 1, 1] = right, low
+                corners[at + 2, 0], corners[at + 2, 1] = left, top
+                corners[at + 3, 0], corners[at + 3, 1] = left, top
+                corners[at + 4, 0], corners[at + 4, 1] = right, low
+                corners[at + 5, 0], corners[at + 5, 1] = right, top
+            count += 1
+    return count

@@ -1,0 +1,126 @@
+"""Meshes with fewer triangles, for what is small on the screen."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import is_compiled
+from fba.cache import kept
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
+"""Metres by which a coarser mesh may be off, as a root of mean squares."""
+FEWEST = 200
+"""Meshes of fewer triangles stay as they are."""
+MOST_PASSES = 40
+WORTH = 0.004
+"""A pass that takes away less than this share of the vertices is the last one."""
+MAKING = "2"
+"""Counts up with every change of what `coarser` gives: what was kept before is then made anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coarser:
+    """One mesh at several levels of detail, worked out on first use and kept on disk.
+
+    points: (V, N), for each vertex its places in all the poses that count, (3 x poses), and after them
+    whatever else is to be kept, each scaled so that a difference of 1 matters as much as a metre.
+    """
+
+    points: Float32
+    poses: int
+    triangles: Int32
+
+    def within(self, tolerance: float) -> Int32 | None:
+        """Triangles (F, 3) of the coarsest level that is off by no more than this (m), or None where there
+        is none: the mesh as it is."""
+        level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
+        if level < 0 or len(self.triangles) < FEWEST or not is_compiled():
+            return None
+        onto, first = self._drawn
+        place = np.arange(len(onto), dtype=np.int32)
+        goes = first <= level
+        for _ in range(MOST_PASSES * len(TOLERANCES)):  # no more steps than passes were made
+            if not goes[place].any():
+                break
+            place = np.where(goes[place], onto[place], place)
+        left = place[self.triangles]
+        flat = (left[:, 0] == left[:, 1]) | (left[:, 1] == left[:, 2]) | (left[:, 2] == left[:, 0])
+        return np.ascontiguousarray(left[~flat])
+
+    @cached_property
+    def _drawn(self) -> tuple[Int32, Int32]:
+        """As `coarser` gives it."""
+        digest = hashlib.sha256(MAKING.encode())
+        for array in (self.points, self.triangles):
+            digest.update(np.ascontiguousarray(array).data)
+
+        def make() -> list[Int32]:
+            return list(coarser(self.points.astype(np.float64), self.poses, self.triangles))
+
+        count = len(self.points)
+        onto, first = kept(f"coarse-{digest.hexdigest()[:32]}", ((count,), (count,)), make, np.int32)
+        if (onto < 0).any() or (onto >= count).any():
+            onto, first = make()
+        return onto, first
+
+
+def coarser(
+    points: Float64, poses: int, triangles: Int32, tolerances: Sequence[float] = TOLERANCES
+) -> tuple[Int32, Int32]:
+    """Which vertex each (V,) is drawn onto, and from which level on: the number of a tolerance (m, rising),
+    or how many there are where it stays. points: as of `Coarser`.
+
+    Borders keep their course, places where several vertices meet stay.
+    """
+    from fba_player.mesh import simplify_loops as loops
+
+    count, size = points.shape
+    left = np.ascontiguousarray(triangles, dtype=np.int32).copy()
+    start = np.zeros(count + 1, dtype=np.int64)
+    owners = np.empty(3 * len(left), dtype=np.int32)
+    loops.around(left, count, start, owners)
+    border = np.zeros(count, dtype=bool)
+    loops.borders(left, start, owners, border)
+    a, b = np.zeros((count, size, size)), np.zeros((count, size))
+    c, w = np.zeros(count), np.zeros(count)
+    loops.quadrics(points, left, start, owners, a, b, c, w)
+    locked = _shared_places(points[:, :3])
+    goal, cost = np.empty(count, dtype=np.int32), np.empty(count)
+    touched = np.empty(count, dtype=bool)
+    onto = np.arange(count, dtype=np.int32)
+    first = np.full(count, len(tolerances), dtype=np.int32)
+    for level, tolerance in enumerate(tolerances):
+        for _ in range(MOST_PASSES):
+            found = loops.candidates(
+                points, poses, left, start, owners, border, locked, a, b, c, w, tolerance**2, goal, cost
+            )
+            if not found:
+                break
+            chosen = np.flatnonzero(goal >= 0)
+            order = chosen[np.argsort(cost[chosen], kind="stable")]
+            done = loops.collapse(order, goal, left, start, owners, touched, onto, a, b, c, w)
+            first[(onto != np.arange(count)) & (first == len(tolerances))] = level
+            flat = (left[:, 0] == left[:, 1]) | (left[:, 1] == left[:, 2]) | (left[:, 2] == left[:, 0])
+            left = np.ascontiguousarray(left[~flat])
+            loops.around(left, count, start, owners)
+            if done < WORTH * len(left):
+                break
+    return onto, first
+
+
+def _shared_places(places: Float64) -> npt.NDArray[np.bool_]:
+    """(V,) vertices that stand where another one stands: a seam, which would gape."""
+    rounded = np.ascontiguousarray(np.round(places * 1e6).astype(np.int64))
+    _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
+    shared: npt.NDArray[np.bool_] = counts[inverse.ravel()] > 1
+    return shared

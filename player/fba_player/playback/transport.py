@@ -1,0 +1,369 @@
+"""Playing, pausing, seeking: where in the performance the player is, without a window or OpenGL.
+
+The clock is the wall clock, or that of the sound, times the speed. How often a picture is drawn plays no
+part: a slow machine shows fewer pictures, never slower motion.
+"""
+
+from __future__ import annotations
+
+import math
+import time as wall
+from collections.abc import Callable
+from typing import Protocol
+
+from fba_player.playback.playhead import Motion
+from fba_player.view.protocols import Times
+from fba_player.playback.timecode import clock_text, timecode
+
+SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
+"""The steps of `faster` and `slower`."""
+BUFFER = 0.25
+"""Seconds of a stream that still arrives which must be there before it plays, and plays on after a gap."""
+AT_ONCE = 0.1
+"""A mark set so shortly (s) before where the player is was meant to be there."""
+
+
+class Played(Times, Protocol):
+    """The frames of a performance that is played."""
+
+    interpolate: bool
+    """Whether what is shown between two frames lies between them."""
+
+    @property
+    def growing(self) -> bool:
+        """Whether more frames may arrive."""
+
+    @property
+    def arrived(self) -> int:
+        """Changes whenever some did, and when no more will."""
+
+
+class Transport:
+    """The position in a performance.
+
+    timeline: gives the start, the end and the frames' own times; it may grow (`fba_player.playback.live`). clock: seconds
+    from any origin, never going back; the process's monotonic clock by default, see `use_clock`. Times are
+    seconds of the animation.
+
+    Starts paused at the first frame. At the end it goes back to the start where `loop` is set, else it
+    stops on the last frame. Marks narrow both down: `mark_out` is where it turns back or stops, `mark_in`
+    where it then begins again; whoever seeks beyond `mark_out` plays to the end from there.
+
+    At the end of what has arrived of a stream, it holds the last frame until `BUFFER` seconds more are
+    there, and goes on with the next: nothing that arrives late is left out.
+    """
+
+    def __init__(
+        self, timeline: Played, *, loop: bool = True, clock: Callable[[], float] = wall.monotonic
+    ) -> None:
+        self._timeline = timeline
+        self._clock = clock
+        self._latency = 0.0
+        self._loop = loop
+        self._speed = 1.0
+        self._playing = False
+        self._waiting = False
+        self._mark_in: float | None = None
+        self._mark_out: float | None = None
+        self._arrived = timeline.arrived
+        self._motion = self._motion_from(clock(), self.start)
+
+    # ---- where it is
+
+    @property
+    def start(self) -> float:
+        """Time of the first frame."""
+        return float(self._timeline.start)
+
+    @property
+    def end(self) -> float:
+        """One frame period after the last frame, of those that have arrived."""
+        return max(float(self._timeline.end), self.start)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from start to end."""
+        return self.end - self.start
+
+    @property
+    def time(self) -> float:
+        """Where the player is now; while playing, it moves with the clock."""
+        return self._settle().time(self._clock())
+
+    @property
+    def clock(self) -> float:
+        """What the clock that it follows says, seconds from any origin."""
+        return self._clock()
+
+    @property
+    def frame(self) -> int:
+        """Position, in the animation, of the frame shown now or the last one before."""
+        return self._timeline.position(self.time)[0]
+
+    @property
+    def share(self) -> float:
+        """Where the player is, 0 the start, 1 the last frame or after."""
+        return self.share_of(self.time)
+
+    def share_of(self, time: float) -> float:
+        """Where a time is, 0 the start, 1 the last frame or after."""
+        whole = self._last_time() - self.start
+        return min(max((time - self.start) / whole, 0.0), 1.0) if whole > 0 else 0.0
+
+    @property
+    def motion(self) -> Motion:
+        """How the time follows the clock since the last look; another thread may ask for it."""
+        return self._motion
+
+    # ---- playing
+
+    @property
+    def playing(self) -> bool:
+        """Whether it plays; also while it waits for a stream to arrive."""
+        self._settle()
+        return self._playing
+
+    @property
+    def waiting(self) -> bool:
+        """Whether it holds the last frame until more of a stream has arrived."""
+        return self.playing and self._waiting
+
+    @property
+    def behind(self) -> float:
+        """Seconds from here to the last frame that has arrived."""
+        return max(self._last_time() - self.time, 0.0)
+
+    def play(self) -> None:
+        """Go on from here; from the start, or the mark, where the end, or its mark, has been reached."""
+        if self.playing:
+            return
+        here = self._motion.here
+        if (here >= self._last_time() and not self._timeline.growing) or here == self._mark_out:
+            here = self._low()
+        self._playing = True
+        self._move(here, later=True)
+
+    def pause(self) -> None:
+        """Stop here, without jumping anywhere."""
+        here = self.time
+        self._playing = False
+        self._move(here)
+
+    def stop(self) -> None:
+        """Stop here and stay: no jump to the start."""
+        self.pause()
+
+    def toggle(self) -> None:
+        """Play where paused, pause where playing."""
+        if self.playing:
+            self.pause()
+        else:
+            self.play()
+
+    # ---- going elsewhere
+
+    def seek(self, time: float) -> None:
+        """Go to a time, kept within start and end; goes on playing where it was."""
+        if not math.isfinite(time):
+            raise ValueError(f"cannot seek to {time} seconds")
+        self._settle()
+        self._move(min(max(time, self.start), self.end), later=True)
+
+    def seek_share(self, share: float) -> None:
+        """Go to a share of the whole, 0 the start, 1 the last frame."""
+        self.seek(self.start + min(max(share, 0.0), 1.0) * (self._last_time() - self.start))
+
+    def step(self, frames: int) -> None:
+        """Pause, and go this many frames on (or back): to the frame's own time."""
+        self.pause()
+        before, _, share = self._timeline.position(self._motion.here)
+        if frames < 0 and share > 0:
+            frames += 1  # first back to the frame whose time has been passed
+        target = min(max(before + frames, 0), self._timeline.frames - 1)
+        self._move(float(self._timeline.time_of(target)))
+
+    def first(self) -> None:
+        """Go to the first frame."""
+        self.seek(self.start)
+
+    def last(self) -> None:
+        """Go to the last frame; in a stream that still arrives, `BUFFER` before it."""
+        self.seek(self._last_time() - (BUFFER if self._timeline.growing and self._playing else 0.0))
+
+    # ---- speed, loop, marks, interpolation
+
+    @property
+    def speed(self) -> float:
+        """Seconds of the animation a second of the clock."""
+        return self._speed
+
+    def faster(self) -> None:
+        """The next higher speed, up to 4."""
+        self.set_speed(next((s for s in SPEEDS if s > self.speed + 1e-9), SPEEDS[-1]))
+
+    def slower(self) -> None:
+        """The next lower speed, down to 0.1."""
+        self.set_speed(next((s for s in reversed(SPEEDS) if s < self.speed - 1e-9), SPEEDS[0]))
+
+    def set_speed(self, speed: float) -> None:
+        """Wall seconds become this many seconds of the animation; 0.1 to 4, else ValueError."""
+        if not SPEEDS[0] <= speed <= SPEEDS[-1]:
+            raise ValueError(f"the speed must lie between {SPEEDS[0]} and {SPEEDS[-1]}, not {speed}")
+        here = self.time
+        self._speed = float(speed)
+        self._move(here)
+
+    @property
+    def loop(self) -> bool:
+        """Whether it begins again at the end, or at `mark_out`."""
+        return self._loop
+
+    @loop.setter
+    def loop(self, loop: bool) -> None:
+        here = self.time
+        self._loop = bool(loop)
+        self._move(here)
+
+    def toggle_loop(self) -> None:
+        """Loop or not."""
+        self.loop = not self.loop
+
+    @property
+    def mark_in(self) -> float | None:
+        """Where a loop begins, seconds; None for the start. One set at or after `mark_out` clears that."""
+        return self._mark_in
+
+    @mark_in.setter
+    def mark_in(self, time: float | None) -> None:
+        here = self.time
+        self._mark_in = self._checked_mark(time, self.start, self._last_time())
+        if self._mark_in is not None and self._mark_out is not None and self._mark_out <= self._mark_in:
+            self._mark_out = None
+        self._move(here)
+
+    @property
+    def mark_out(self) -> float | None:
+        """Where a loop ends, seconds; None for the end. One set at or before `mark_in` clears that.
+
+        Set where the player is while it plays, it turns back or stops at once.
+        """
+        return self._mark_out
+
+    @mark_out.setter
+    def mark_out(self, time: float | None) -> None:
+        here = self.time
+        self._mark_out = out = self._checked_mark(time, self.start, self._stop())
+        if self._mark_in is not None and out is not None and out <= self._mark_in:
+            self._mark_in = None
+        if out is not None and self._playing and out <= here < out + AT_ONCE:
+            here = out
+        self._move(here)
+
+    def clear_marks(self) -> None:
+        """The whole performance again."""
+        here = self.time
+        self._mark_in = self._mark_out = None
+        self._move(here)
+
+    @property
+    def interpolate(self) -> bool:
+        """Whether what is shown between two frames lies between them; False: the frame last passed."""
+        return self._timeline.interpolate
+
+    @interpolate.setter
+    def interpolate(self, interpolate: bool) -> None:
+        self._timeline.interpolate = bool(interpolate)
+
+    def use_clock(self, clock: Callable[[], float] = wall.monotonic, latency: float = 0.0) -> None:
+        """Follow another clock from now on, without a jump.
+
+        latency: seconds that playing waits before it starts, here or elsewhere, so that sound which a
+        device still has to be given begins with the picture and whole.
+        """
+        here = self.time
+        self._clock = clock
+        self._latency = latency
+        self._motion = self._motion_from(clock(), here)
+
+    # ---- for people
+
+    def text(self) -> str:
+        """Time, frame and speed, for people: "0:01.240 / 0:04.000   frame 31 / 100   1x"."""
+        time = self.time
+        parts = [
+            f"{clock_text(time - self.start)} / {clock_text(self.duration)}",
+            f"frame {self._timeline.position(time)[0] + 1} / {self._timeline.frames}",
+            f"{self.speed:g}x",
+        ]
+        if self.loop:
+            parts.append("loop")
+        return "   ".join(parts)
+
+    def timecode(self, time: float | None = None) -> str:
+        """Time code "h:mm:ss:ff" of a time, by default of now, in the stream's own times.
+
+        Where the stream carries time codes, its frames' times follow them, so this is what it says. Hours,
+        minutes and seconds are those of the time itself, at any rate; ff counts the frame periods that have
+        begun in that second, from 00.
+        """
+        return timecode(self.time if time is None else time, self._timeline.rate)
+
+    # ---- inside
+
+    def _last_time(self) -> float:
+        return float(self._timeline.time_of(self._timeline.frames - 1))
+
+    def _stop(self) -> float:
+        """Where the last frame has had its time; in a stream that still arrives, its last frame."""
+        return self._last_time() if self._timeline.growing else self.end
+
+    def _low(self) -> float:
+        return self.start if self._mark_in is None else self._mark_in
+
+    def _checked_mark(self, time: float | None, low: float, high: float) -> float | None:
+        if time is None:
+            return None
+        if not math.isfinite(time):
+            raise ValueError(f"a mark must be a finite number of seconds, not {time}")
+        return min(max(float(time), low), high)
+
+    def _motion_from(self, clock: float, here: float) -> Motion:
+        out = self._mark_out
+        inside = out is not None and here <= out
+        stop = out if inside and out is not None else self._stop()
+        return Motion(
+            since=clock,
+            here=here,
+            speed=self._speed,
+            playing=self._playing and not self._waiting,
+            stop=stop,
+            low=self._low(),
+            high=self._stop() if out is None else out,
+            rest=stop if inside else self._last_time(),
+            loop=self._loop and (inside or not self._timeline.growing),
+        )
+
+    def _move(self, here: float, *, later: bool = False) -> None:
+        now = self._clock()
+        self._motion = self._motion_from(now + self._latency if later else max(now, self._motion.since), here)
+
+    def _settle(self) -> Motion:
+        """Deal with an end that has been passed, and with frames that have arrived."""
+        arrived = self._timeline.arrived
+        if arrived != self._arrived:
+            self._arrived = arrived
+            self._motion = self._motion_from(self._motion.since, self._motion.here)
+        now = self._clock()
+        if self._motion.over(now):
+            motion, here = self._motion, self._motion.time(now)
+            if not (motion.loop and motion.high > motion.low):
+                at_mark = self._mark_out is not None and here <= self._mark_out
+                self._waiting = self._timeline.growing and not at_mark
+                self._playing = self._waiting
+            self._motion = self._motion_from(now, here)
+        elif self._waiting and (
+            not self._timeline.growing or self._last_time() - self._motion.here >= BUFFER
+        ):
+            self._waiting = False
+            self._motion = self._motion_from(now, self._motion.here)
+        return self._motion

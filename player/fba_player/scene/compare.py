@@ -1,0 +1,283 @@
+"""Several performances in one picture: side by side, or one over the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.scene.layout import Drawing, caption, joined, moved
+from fba_player.view.camera import PRESETS, Camera, Subject
+from fba_player.scene.compare_timeline import CompareTimeline
+from fba_player.scene.differences import Differences, differences
+from fba_player.scene.scene import Scene
+from fba_player.view.view import View, srgb
+from fba_player.view.protocols import InTime
+from fba_player.view.switches import Switches
+
+if TYPE_CHECKING:
+    from fba.animation import Animation
+    from fba.face.model import FaceModel
+    from fba_player.figure.face import FaceFigure
+
+Float64 = npt.NDArray[np.float64]
+
+ARRANGEMENTS = ("side", "over")
+"""Beside each other, or each over the first as a drawing of feature points and bones in a colour."""
+COLOURS = ("#2f9bff", "#ff5a36", "#39c26b", "#c266ff", "#f2b500")
+"""Of the drawings over the first, one after the other (sRGB)."""
+APART = 1.12
+"""Distance of two figures side by side, in their widths."""
+FIELD_OF_VIEW = 14.0
+"""Degrees: from further away than one figure alone, so that all are seen from the same side."""
+SHOULDERS = 0.25
+"""Half the width (m) of a body of which only the upper part is in view."""
+ABOVE = 0.96
+"""Height of a caption above the middle of a head, in half heads."""
+
+
+class CompareScene(InTime[CompareTimeline]):
+    """Several scenes shown together, at the same times; a `Showable` as `Scene` is.
+
+    scenes: at least one. arrangement: "side" or "over"; may be set at any time. names: captions of the
+    figures side by side, by default the animations' own; "" for none. Where a scene has no body and another
+    has one, its head stands as high as that one's.
+
+    Beside each other means beside each other as the named view sees them: `camera` decides.
+    """
+
+    def __init__(
+        self, scenes: Sequence[Scene], *, arrangement: str = "side", names: Sequence[str] | None = None
+    ) -> None:
+        if not scenes:
+            raise ValueError("nothing to show: there is no scene")
+        self.scenes = tuple(scenes)
+        self.names = tuple(names) if names is not None else tuple(scene.title for scene in scenes)
+        if len(self.names) != len(self.scenes):
+            raise ValueError(f"{len(self.scenes)} scenes, but {len(self.names)} names")
+        self.timeline = CompareTimeline([scene.timeline for scene in scenes])
+        self.arrangement = arrangement
+        self._yaw = 0.0
+        self._drawings = [_drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
+        self._apart: float | None = None
+        self._differences: dict[tuple[int, int], Differences] = {}
+
+    # ---- what the window and recordings want of a scene
+
+    @property
+    def arrangement(self) -> str:
+        """ "side" or "over"."""
+        return self._arrangement
+
+    @arrangement.setter
+    def arrangement(self, name: str) -> None:
+        if name not in ARRANGEMENTS:
+            raise ValueError(f"no arrangement {name!r}; there are {', '.join(ARRANGEMENTS)}")
+        self._arrangement = name
+
+    @property
+    def animation(self) -> Animation:
+        """The first one's."""
+        return self.scenes[0].animation
+
+    @property
+    def model(self) -> FaceModel:
+        """The first one's face."""
+        return self.scenes[0].model
+
+    @property
+    def figure(self) -> FaceFigure:
+        """The first one's face as it is shown."""
+        return self.scenes[0].figure
+
+    @property
+    def title(self) -> str:
+        """Their names."""
+        return " | ".join(name for name in self.names if name)
+
+    @property
+    def switches(self) -> Switches:
+        """What is drawn of all of them; set by `show`."""
+        return self.scenes[0].switches
+
+    def show(self, name: str, on: object = True) -> None:
+        """Set a switch of all of them; ValueError for what does not exist."""
+        for scene in self.scenes:
+            scene.show(name, on)
+
+    @property
+    def view(self) -> str:
+        """What they are shown as: "figure" or "points"."""
+        return self.scenes[0].view
+
+    @view.setter
+    def view(self, name: str) -> None:
+        for scene in self.scenes:
+            scene.view = name
+
+    @property
+    def has_body(self) -> bool:
+        """Whether one of them has a body."""
+        return any(scene.has_body for scene in self.scenes)
+
+    @property
+    def subject(self) -> Subject:
+        """What a camera is to have in view of all of them."""
+        return self._all([scene.subject for scene in self.scenes])
+
+    @property
+    def face_subject(self) -> Subject:
+        """All heads."""
+        return self._all([scene.face_subject for scene in self.scenes])
+
+    @property
+    def gesture_subject(self) -> Subject | None:
+        """All of them from the hips up, where that shows all that moves; else None."""
+        found = [scene.gesture_subject if scene.has_body else scene.subject for scene in self.scenes]
+        return self._all([one for one in found if one is not None]) if all(found) and self.has_body else None
+
+    def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
+        """A camera that has all of them in view; they are then side by side as it sees them.
+
+        preset: see `Scene.camera`.
+        """
+        if preset is not None and preset not in PRESETS:
+            raise ValueError(f"no camera preset {preset!r}; there are {', '.join(PRESETS)}")
+        own = self.scenes[0].camera(preset, aspect)
+        if self._arrangement == "side" and len(self.scenes) > 1:
+            own = replace(own, field_of_view=FIELD_OF_VIEW)
+        self._yaw = own.yaw
+        upper = [scene.gesture_subject or scene.face_subject for scene in self.scenes if scene.has_body]
+        still = all(scene.gesture_subject for scene in self.scenes if scene.has_body)
+        if not self.has_body or preset == "body" or (preset is None and not still):
+            subjects = [scene.subject for scene in self.scenes]
+            self._apart = None
+        elif preset is None:
+            subjects = [scene.gesture_subject or scene.subject for scene in self.scenes]
+            self._apart = max(SHOULDERS * 1.3, max(one.half_width for one in upper) * 0.8)
+        else:
+            subjects = [scene.face_subject for scene in self.scenes]
+            self._apart = SHOULDERS
+        return own.fit(self._all(subjects), aspect)
+
+    def travel(self, time: float) -> tuple[float, float, float]:
+        """How far a following camera has gone: as the first one asks for."""
+        return self.scenes[0].travel(self.timeline.own_time(0, time))
+
+    def at(self, time: float) -> View:
+        """Everything to be drawn at a time; ValueError for one that is not finite."""
+        times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
+        if self._arrangement == "over":
+            return self._over(times)
+        views = []
+        gone = np.array(self.scenes[0].travel(times[0]))
+        for number, (scene, own) in enumerate(zip(self.scenes, times, strict=True)):
+            view = moved(scene.at(own), self._place(number) + gone - np.array(scene.travel(own)))
+            if self.names[number] and len(self.scenes) > 1:
+                view = _captioned(view, self.names[number], self._caption_place(number) + gone)
+            views.append(view)
+        return joined(views)
+
+    def still(self, faps: npt.NDArray[np.float32]) -> View:
+        """The first one alone for FAPs (68,)."""
+        return self.scenes[0].still(faps)
+
+    # ---- comparing
+
+    def differences(self, second: int = 1) -> Differences:
+        """What another one shows minus what the first shows; worked out once, anew where more has arrived.
+
+        ValueError where there is no other.
+        """
+        key = (second, self.timeline.arrived)
+        if key not in self._differences:
+            found = differences(self.timeline, second)
+            self._differences = {k: v for k, v in self._differences.items() if k[1] == key[1]} | {key: found}
+        return self._differences[key]
+
+    # ---- inside
+
+    def _over(self, times: list[float]) -> View:
+        base = self.scenes[0].at(times[0])
+        gone = np.array(self.scenes[0].travel(times[0]))
+        views = [base]
+        for number, (scene, own) in enumerate(list(zip(self.scenes, times, strict=True))[1:], 1):
+            kept, scene.view = scene.view, "points"
+            try:
+                drawn = self._drawings[number - 1](scene.at(own), _eyes(scene))
+            finally:
+                scene.view = kept
+            views.append(moved(drawn, self._height(number) + gone - np.array(scene.travel(own))))
+        return joined(views)
+
+    def _right(self) -> Float64:
+        """(3,) to the right of the picture, on the ground."""
+        yaw = math.radians(self._yaw)
+        return np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+
+    def _place(self, number: int) -> Float64:
+        """(3,) by which a figure stands elsewhere than alone."""
+        if self._arrangement == "over":
+            return self._height(number)
+        widths = [self._half_width(scene) for scene in self.scenes]
+        along = sum(widths[:number]) - sum(widths[number + 1 :])
+        return np.asarray(self._right() * along * APART + self._height(number))
+
+    def _half_width(self, scene: Scene) -> float:
+        """The room that one takes: all the same, but heads less than whole bodies."""
+        if self._apart is not None:
+            return self._apart
+        kin = [one.subject.half_width for one in self.scenes if one.has_body == scene.has_body]
+        return max(*kin, SHOULDERS) if self.has_body else max(kin)
+
+    def _height(self, number: int) -> Float64:
+        """(3,) that brings a head alone up to the heads on bodies."""
+        scene = self.scenes[number]
+        whole = next((one for one in self.scenes if one.has_body), None)
+        if scene.has_body or whole is None:
+            return np.zeros(3)
+        return np.subtract(whole.face_subject.centre, scene.face_subject.centre)
+
+    def _caption_place(self, number: int) -> Float64:
+        head = self.scenes[number].face_subject
+        x, y, z = head.centre
+        return np.asarray(np.array([x, y + head.half_height * ABOVE, z]) + self._place(number))
+
+    def _all(self, subjects: list[Subject]) -> Subject:
+        """One subject around them, where they stand."""
+        right = self._right()
+        places = [np.array(one.centre) + self._place(n) for n, one in enumerate(subjects)]
+        along = [float(place @ right) for place in places]
+        widths = [
+            max(one.half_width, (self._apart or 0.0) * 0.7, SHOULDERS if self.has_body else 0.0)
+            for one in subjects
+        ]
+        low = min(a - width for a, width in zip(along, widths, strict=True))
+        high = max(a + width for a, width in zip(along, widths, strict=True))
+        bottom = min(float(p[1]) - s.half_height for p, s in zip(places, subjects, strict=True))
+        room = 1.05 if any(self.names) and self._arrangement == "side" else 1.0  # for captions
+        top = max(float(p[1]) + s.half_height * room for p, s in zip(places, subjects, strict=True))
+        middle = np.mean(places, axis=0)
+        middle = middle + right * ((low + high) / 2 - float(middle @ right))
+        centre = (float(middle[0]), (bottom + top) / 2, float(middle[2]))
+        return Subject(centre, (top - bottom) / 2, (high - low) / 2)
+
+
+def _drawing(colour: str) -> Drawing:
+    red, green, blue = (int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5))
+    return Drawing(srgb(colour), (red, green, blue))
+
+
+def _eyes(scene: Scene) -> int:
+    return len(scene.figure.eyes(np.zeros(68, dtype=np.float32), np.eye(4)))
+
+
+def _captioned(view: View, text: str, place: Float64) -> View:
+    words = caption(text, place)
+    if view.extras is None:
+        return replace(view, extras=words)
+    return replace(view, extras=replace(view.extras, dots=(*view.extras.dots, *words.dots)))

@@ -1,0 +1,144 @@
+"""Several performances on one time base."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.playback.timeline import FRAME_ROUNDING, Timeline
+
+FINEST = 1_000_000
+"""Frames a second beyond which rates that differ are not brought to a common one."""
+
+
+class CompareTimeline:
+    """The frames of all, at their own times.
+
+    Where two have no time in common, as recordings with time codes of different hours, each begins with the
+    first one. What is counted as a frame is every moment at which one of them has a frame. rate, faps and
+    baps are those of the first. A `fba_player.view.protocols.Course`.
+    """
+
+    def __init__(self, timelines: Sequence[Timeline]) -> None:
+        if not timelines:
+            raise ValueError("nothing to compare: there is no timeline")
+        self.timelines = tuple(timelines)
+        self.later = _later(self.timelines)
+        """Seconds by which each is shown later than its own times say, exact."""
+        self._merged: tuple[int, Fraction, npt.NDArray[np.int64]] | None = None
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames a second of the first."""
+        return self.timelines[0].rate
+
+    @property
+    def start(self) -> Fraction:
+        """Where the earliest begins."""
+        return min(one.start + later for one, later in self._shown())
+
+    @property
+    def end(self) -> Fraction:
+        """Where the latest ends."""
+        return max(one.end + later for one, later in self._shown())
+
+    @property
+    def duration(self) -> Fraction:
+        """Seconds from start to end."""
+        return self.end - self.start
+
+    @property
+    def frames(self) -> int:
+        """Moments at which at least one has a frame."""
+        return len(self._frames()[1])
+
+    @property
+    def growing(self) -> bool:
+        """Whether one of them is still arriving."""
+        return any(one.growing for one in self.timelines)
+
+    @property
+    def arrived(self) -> int:
+        """Changes whenever more of one has arrived."""
+        return sum(one.arrived for one in self.timelines)
+
+    @property
+    def interpolate(self) -> bool:
+        """Whether what is shown between two frames lies between them; of all."""
+        return self.timelines[0].interpolate
+
+    @interpolate.setter
+    def interpolate(self, interpolate: bool) -> None:
+        for one in self.timelines:
+            one.interpolate = interpolate
+
+    def own_time(self, number: int, time: float) -> float:
+        """Seconds, in the times of that performance, at which it is when the time is that of all."""
+        return time - float(self.later[number])
+
+    def time_of(self, frame: int) -> Fraction:
+        """Exact time of a frame, counted from 0 over all of them."""
+        rate, index = self._frames()
+        return Fraction(int(index[frame])) / rate
+
+    def position(self, time: float) -> tuple[int, int, float]:
+        """(frame, next frame, share of the next) at a time; ValueError for one that is not finite."""
+        if not math.isfinite(time):
+            raise ValueError(f"the time must be a finite number of seconds, not {time}")
+        rate, index = self._frames()
+        at = time * rate.numerator / rate.denominator
+        if abs(at - round(at)) < FRAME_ROUNDING * float(rate / self.rate):
+            at = float(round(at))
+        last = len(index) - 1
+        before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), last)
+        after = min(before + 1, last)
+        gap = int(index[after]) - int(index[before])
+        return before, after, min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
+
+    def faps(self, time: float) -> npt.NDArray[np.float32]:
+        """(68,) of the first."""
+        return self.timelines[0].faps(self.own_time(0, time))
+
+    def baps(self, time: float) -> npt.NDArray[np.float64]:
+        """(296,) of the first."""
+        return self.timelines[0].baps(self.own_time(0, time))
+
+    def times(self) -> npt.NDArray[np.float64]:
+        """(T,) seconds of all frames."""
+        rate, index = self._frames()
+        return index * rate.denominator / rate.numerator
+
+    def _shown(self) -> zip[tuple[Timeline, Fraction]]:
+        return zip(self.timelines, self.later, strict=True)
+
+    def _frames(self) -> tuple[Fraction, npt.NDArray[np.int64]]:
+        """A rate at which every frame has a whole number, and those numbers, ascending."""
+        arrived = self.arrived
+        if self._merged is None or self._merged[0] != arrived:
+            parts = [one.rate for one in self.timelines] + [1 / later for later in self.later if later]
+            rate = Fraction(
+                math.lcm(*(abs(part).numerator for part in parts)),
+                math.gcd(*(abs(part).denominator for part in parts)),
+            )
+            if rate > FINEST:
+                rate = Fraction(FINEST)
+            found = []
+            for one, later in self._shown():
+                step, first = rate / one.rate, later * rate
+                index = one.animation.index * step.numerator // step.denominator
+                found.append(index + first.numerator // first.denominator)
+            self._merged = (arrived, rate, np.unique(np.concatenate(found)))
+        return self._merged[1:]
+
+
+def _later(timelines: tuple[Timeline, ...]) -> tuple[Fraction, ...]:
+    first = timelines[0]
+    together = [one.start < first.end and first.start < one.end for one in timelines]
+    return tuple(
+        Fraction(0) if meets else first.start - one.start
+        for one, meets in zip(timelines, together, strict=True)
+    )

@@ -1,0 +1,93 @@
+"""By how much two performances differ, parameter by parameter, on a common time base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.parameters import baps, faps
+from fba_player.scene.compare_timeline import CompareTimeline
+
+MOST_FRAMES = 20_000
+"""Of longer performances, so many moments evenly chosen are looked at."""
+
+
+@dataclass(frozen=True)
+class Largest:
+    """A parameter that differs. kind: "fap" or "bap". most: the largest difference, in its unit, at `time`
+    seconds; rms: over all moments."""
+
+    kind: str
+    number: int
+    name: str
+    unit: str
+    most: float
+    time: float
+    rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """The second performance minus the first, at every moment at which either has a frame.
+
+    times: float64 (T,) seconds, those that both have. faps: float32 (T, 68) in the FAP's unit, a fraction
+    of the face's measures as in the stream; baps: float64 (T, 296), 1e-5 rad or mm. Values are those shown:
+    kept where nothing was sent, between frames interpolated. Zeros where one has no face, or no body.
+    """
+
+    times: npt.NDArray[np.float64]
+    faps: npt.NDArray[np.float32]
+    baps: npt.NDArray[np.float64]
+
+    @cached_property
+    def fap_units(self) -> list[str]:
+        """Of each of the 68 FAPs: "MNS", "1e-5 rad" ...; "" for the first two."""
+        return ["1e-5 rad" if fap.unit == "AU" else fap.unit for fap in faps()]
+
+    @cached_property
+    def bap_units(self) -> list[str]:
+        """Of each of the 296 BAPs: "1e-5 rad" or "mm"."""
+        return [bap.unit for bap in baps()]
+
+    def largest(self, count: int = 10) -> list[Largest]:
+        """The parameters that differ most, in units of their own quantiser step, the worst first."""
+        found = []
+        columns = [("fap", fap.number, fap.name, fap.step) for fap in faps()]
+        columns += [("bap", bap.number, bap.name, bap.step_iso) for bap in baps()]
+        for kind, number, name, step in columns:
+            values, units = (self.faps, self.fap_units) if kind == "fap" else (self.baps, self.bap_units)
+            course = values[:, number - 1].astype(np.float64)
+            if not course.any():
+                continue
+            at = int(np.abs(course).argmax())
+            item = Largest(
+                kind, number, name, units[number - 1], float(abs(course[at])), float(self.times[at]),
+                float(np.sqrt(np.mean(course**2))),
+            )  # fmt: skip
+            found.append((item.most / max(step, 1), item))
+        found.sort(key=lambda pair: -pair[0])
+        return [item for _, item in found[:count]]
+
+
+def differences(timeline: CompareTimeline, second: int = 1) -> Differences:
+    """Differences of the first performance to another, by its number. ValueError where there is none."""
+    if not 0 < second < len(timeline.timelines):
+        raise ValueError(f"there is no performance {second} to compare: {len(timeline.timelines)} are shown")
+    one, other = timeline.timelines[0], timeline.timelines[second]
+    bounds = [
+        (shown.time_of(0) + later, shown.time_of(shown.frames - 1) + later)
+        for shown, later in ((one, timeline.later[0]), (other, timeline.later[second]))
+    ]
+    low, high = (float(v) for v in (max(b[0] for b in bounds), min(b[1] for b in bounds)))
+    times = timeline.times()
+    times = times[(times >= low - 1e-9) & (times <= high + 1e-9)]
+    if len(times) > MOST_FRAMES:
+        times = times[np.linspace(0, len(times) - 1, MOST_FRAMES).astype(int)]
+    faces, bodies = one.many(times - float(timeline.later[0]))
+    other_faces, other_bodies = other.many(times - float(timeline.later[second]))
+    face = one.animation.face is not None and other.animation.face is not None
+    body = one.animation.body is not None and other.animation.body is not None
+    return Differences(times, (other_faces - faces) * face, (other_bodies - bodies) * body)

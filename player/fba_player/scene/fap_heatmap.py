@@ -1,0 +1,127 @@
+"""How far a FAP moves every vertex of a face, as colour."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.parameters import FAP_COUNT, faps
+from fba_player.view.annotations import Legend
+from fba_player.figure.face import FaceFigure
+from fba_player.view.world_positions import swayed
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape, rotation_vector
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+STEPS, ANGLE = 100, 10_000
+"""The value of the FAP that is looked at: of distances, about a tenth of the unit; of angles, 0.1 rad."""
+GLOSS = 0.15
+SHADES = 33
+"""Colours of a legend."""
+LEAST = 1e-6
+"""What moves by less than this (m) does not move."""
+
+
+class Influence:
+    """What one FAP does to a face. number: 3..68. measured at `value`, which is positive."""
+
+    def __init__(self, figure: FaceFigure, number: int) -> None:
+        self._figure = figure
+        self.fap = faps()[number - 1]
+        self.value = ANGLE if self.fap.unit == "AU" else STEPS
+        self._values = np.zeros(FAP_COUNT, dtype=np.float32)
+        self._values[number - 1] = self.value
+        self.distances = self._measured()
+        self.most = float(self.distances.max(initial=0.0))
+        self._shapes: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
+        self._balls: dict[int, MeshShape] = {}
+
+    @property
+    def legend(self) -> Legend:
+        """What the colours mean, in millimetres."""
+        unit = "0.1 rad" if self.fap.unit == "AU" else f"+{self.value} steps of {self.fap.unit}/1024"
+        moved = f"mm moved by {unit}" if self.most > LEAST else "moves no vertex of this face"
+        stops = tuple(tuple(float(v) for v in row) for row in shown(np.linspace(0, 1, SHADES)))
+        return Legend(self.fap.label, moved, self.most * 1000, stops)  # type: ignore[arg-type]
+
+    def painted(self, meshes: list[FaceMesh]) -> list[FaceMesh]:
+        """The meshes in these colours; what is no part of the face, as a body, in that of 0."""
+        return [replace(mesh, shape=self._shape(mesh)) for mesh in meshes]
+
+    def eyes(self, eyes: list[Eye]) -> list[Mesh]:
+        """Eyeballs in these colours."""
+        vertices, _ = sphere_mesh()
+        found = []
+        for number, eye in enumerate(eyes):
+            if number not in self._balls:
+                self._balls[number] = self._ball(number, vertices)
+            found.append(Mesh(self._balls[number], vertices, vertices, eye.matrix))
+        return found
+
+    def _measured(self) -> Float32:
+        """(V,) metres between the neutral face and that with the FAP, the neck's bend in it."""
+        figure = self._figure
+        neutral, moved = figure.pose(np.zeros_like(self._values)).positions, figure.pose(self._values)
+        turn = rotation_vector(moved.turn[:3, :3])
+        placed = swayed(moved.positions, figure.sway, turn, figure.centre)
+        distances: Float32 = np.linalg.norm(placed - neutral, axis=1).astype(np.float32)
+        return distances
+
+    def _shape(self, mesh: FaceMesh) -> FaceShape:
+        shape = mesh.shape
+        if shape not in self._shapes:
+            colours = np.full((len(mesh.positions), 4), GLOSS, dtype=np.float32)
+            colours[:, :3] = self._colours(self._of(shape, len(mesh.positions)))
+            self._shapes[shape] = replace(
+                shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None, coarser=None
+            )
+        return self._shapes[shape]
+
+    def _of(self, shape: FaceShape, count: int) -> Float32:
+        try:
+            rows = self._figure.rows(shape.name)
+        except KeyError:
+            return np.zeros(count, dtype=np.float32)
+        own = self.distances[rows]
+        return own if len(own) == count else np.zeros(count, dtype=np.float32)
+
+    def _ball(self, number: int, vertices: Float32) -> MeshShape:
+        """An eyeball whose every place has the colour of its own movement."""
+        still = self._figure.eyes(np.zeros_like(self._values), np.eye(4))[number].matrix
+        moved = self._figure.eyes(self._values, np.eye(4))[number].matrix
+        away = np.linalg.norm(vertices @ (moved - still)[:3, :3].T + (moved - still)[:3, 3], axis=1)
+        colours = np.full((len(vertices), 4), GLOSS, dtype=np.float32)
+        colours[:, :3] = self._colours(away.astype(np.float32))
+        return MeshShape(sphere_mesh()[1], colours, two_sided=True)
+
+    def _colours(self, distances: Float32) -> Float64:
+        share = distances / max(self.most, LEAST)
+        share[distances <= LEAST] = 0.0
+        return _linear(shown(share))
+
+
+def shown(shares: npt.NDArray[np.floating]) -> Float64:
+    """(N, 3) colours as they are shown (sRGB, 0..1) for shares 0..1 of the largest movement."""
+    table = _table()
+    columns = [np.interp(shares, table[:, 0], table[:, column]) for column in (1, 2, 3)]
+    return np.stack(columns, axis=-1)
+
+
+@cache
+def _table() -> Float64:
+    text = (files(__package__) / "influence.csv").read_text(encoding="utf-8")
+    rows = list(csv.reader(text.splitlines()))[1:]
+    return np.array(rows, dtype=np.float64)
+
+
+def _linear(colours: Float64) -> Float64:
+    """sRGB to linear light."""
+    return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)

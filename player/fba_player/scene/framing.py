@@ -1,0 +1,71 @@
+"""What a camera is to have in view of a moving body, and whether it has to follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.view.camera import Subject
+
+Float64 = npt.NDArray[np.float64]
+
+BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
+"""Somebody who stands at the origin."""
+HIPS = 0.78
+STANDING = 0.12
+"""Legs that move less than this (m) stand still."""
+MOST_TRAVEL = 4.0
+"""A performance that moves further than this (m) is followed by the camera instead of fitted whole."""
+NEAR = 0.12
+"""Who goes about by less than this (m) stays at one distance."""
+LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
+
+
+@dataclass(frozen=True)
+class Extent:
+    """Where a performance takes place.
+
+    follows: it goes too far to be seen whole. legs_move: by more than `STANDING`.
+    """
+
+    subject: Subject
+    follows: bool
+    legs_move: bool
+
+    @property
+    def upper_half(self) -> Subject:
+        """From the hips up."""
+        whole = self.subject
+        top = whole.centre[1] + whole.half_height
+        bottom = min(HIPS, top - 0.8)
+        x, _, z = whole.centre
+        half_width = min(whole.half_width, 0.55)
+        return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, half_width, whole.half_depth)
+
+
+def body_extent(places: Float64, names: tuple[str, ...]) -> Extent:
+    """What joints at places (T, J, 3), metres, the root first, go through in T moments."""
+    legs = places[:, [names.index(name) for name in LEGS if name in names]]
+    legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > STANDING)
+    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    if not np.isfinite(high - low).all() or (high - low).max() > MOST_TRAVEL:
+        x, y, z = (float(v) for v in places[0, 0])
+        subject = Subject((x, y - 0.09, z), BODY_SUBJECT.half_height, BODY_SUBJECT.half_width)
+        return Extent(subject, follows=True, legs_move=legs_move)
+    low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, 0.14, 0.10])
+    low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + _aside(low, high))
+    x, y, z = (float(v) for v in (low + high) / 2)
+    wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
+    tall = max(float(high[1] - low[1]) / 2 * 1.06, 0.9)
+    path = places[:, 0, [0, 2]]
+    towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from whatever side the camera looks
+    subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - NEAR, 0.0))
+    return Extent(subject, follows=False, legs_move=legs_move)
+
+
+def _aside(low: Float64, high: Float64) -> Float64:
+    """Shift that keeps the floor below a body that stands elsewhere than at the origin."""
+    middle = (low + high) / 2
+    return np.array([middle[0], 0.0, middle[2]])

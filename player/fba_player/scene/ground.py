@@ -1,0 +1,50 @@
+"""The ground under a figure: soft shadows on it, and a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.view.camera import Subject
+from fba_player.view.annotations import Grid
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+SHADOWS = (
+    ("HumanoidRoot", 0.55, 0.42, 0.97),
+    ("l_midtarsal", 0.20, 0.55, 0.03),
+    ("r_midtarsal", 0.20, 0.55, 0.03),
+    ("l_subtalar", 0.16, 0.40, 0.04),
+    ("r_subtalar", 0.16, 0.40, 0.04),
+)
+"""Joints that have a shadow: its radius, its darkness, and the joint's height at rest."""
+REACH = 7.0
+"""A grid is seen this many steps around its centre."""
+
+
+def shadows(joints: Float64, names: tuple[str, ...]) -> Float32:
+    """(K, 4) soft blobs under the hips and both feet, fainter the higher these are; see `View.blobs`."""
+    found = []
+    for name, radius, darkness, rest in SHADOWS:
+        x, y, z = joints[list(names).index(name), :3, 3]
+        height = max(float(y) - rest, 0.0)
+        found.append((x, z, radius * (1 + height), darkness / (1 + 4 * height)))
+    return np.array(found, dtype=np.float32)
+
+
+def no_shadows() -> Float32:
+    """(0, 4)."""
+    return np.zeros((0, 4), dtype=np.float32)
+
+
+def body_grid(joints: Float64) -> Grid:
+    """Metres on the floor, around where somebody stands."""
+    return Grid(0.0, 1.0, (float(joints[0, 0, 3]), float(joints[0, 2, 3])), REACH)
+
+
+def face_grid(subject: Subject, lowest: float, scale: float) -> Grid:
+    """Tenths of a metre under a head whose lowest vertex has that y. scale: 1 for an adult's."""
+    x, _, z = subject.centre
+    step = 10.0 ** round(np.log10(max(scale, 1e-9)) - 1)
+    return Grid(lowest, step, (x, z), step * 2 * REACH)

@@ -1,0 +1,135 @@
+"""Views moved, tinted and put together: several performances in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.view.annotations import Dots, Extras, Lines
+from fba_player.view.view import MeshShape, View, translation
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Colour = tuple[float, float, float]
+
+JOINT = 1e-3
+"""Capsules shorter than this (m) are joints, not bones."""
+BONE_WIDTH, BONE_LIFT = 2.6, 0.3
+"""Bones as lines: pixels of a picture 720 high, and metres of flesh through which they are seen."""
+LINE_LIFT = 0.02
+"""Metres by which another face may hide the lines of a face."""
+
+
+def moved(view: View, offset: Float64) -> View:
+    """The view, everything in it moved by (3,) metres."""
+    if not offset.any():
+        return view
+    shift = translation(offset)
+    flat = np.array([offset[0], offset[2], 0.0, 0.0], dtype=np.float32)
+    return replace(
+        view,
+        meshes=[replace(mesh, matrix=shift @ mesh.matrix) for mesh in view.meshes],
+        faces=[replace(mesh, matrix=shift @ mesh.matrix) for mesh in view.faces],
+        eyes=[replace(eye, matrix=shift @ eye.matrix) for eye in view.eyes],
+        capsules=_moved_capsules(view.capsules, offset),
+        marks=_moved_capsules(view.marks, offset),
+        blobs=view.blobs + flat if len(view.blobs) else view.blobs,
+        extras=None if view.extras is None else _moved_extras(view.extras, offset),
+    )
+
+
+def joined(views: Sequence[View]) -> View:
+    """All of them in one picture; the background, the grid and the legend are those of the first."""
+    first = views[0]
+    extras = [view.extras for view in views if view.extras is not None]
+    return replace(
+        first,
+        meshes=[mesh for view in views for mesh in view.meshes],
+        faces=[mesh for view in views for mesh in view.faces],
+        eyes=[eye for view in views for eye in view.eyes],
+        capsules=np.concatenate([view.capsules for view in views]),
+        marks=np.concatenate([view.marks for view in views]),
+        blobs=np.concatenate([view.blobs for view in views]),
+        ground=any(view.ground for view in views),
+        extras=replace(
+            extras[0],
+            lines=tuple(lines for one in extras for lines in one.lines),
+            dots=tuple(dots for one in extras for dots in one.dots),
+            shells=tuple(shell for one in extras for shell in one.shells),
+        )
+        if extras
+        else None,
+    )
+
+
+class Drawing:
+    """A view of feature points and bones as a drawing in one colour, that goes over another figure.
+
+    colour: linear light; ink: the same as it is shown. Shapes are kept, as renderers want them.
+    """
+
+    def __init__(self, colour: Colour, ink: Colour) -> None:
+        self._colour = colour
+        self._ink = ink
+        self._shapes: dict[int, tuple[MeshShape, MeshShape]] = {}
+
+    def __call__(self, view: View, eyeballs: int) -> View:
+        """eyeballs: so many of the view's capsules, the first ones, are left out."""
+        bones = view.capsules[eyeballs:]
+        ends = np.stack([bones[:, 0:3], bones[:, 4:7]], axis=1)
+        long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > JOINT
+        lines = Lines(ends[long], (*self._ink, 0.95), BONE_WIDTH, BONE_LIFT)
+        return View(
+            meshes=[replace(mesh, shape=self._tinted(mesh.shape)) for mesh in view.meshes],
+            marks=self._painted(view.marks),
+            blobs=view.blobs,
+            ground=view.ground,
+            extras=Extras(lines=(lines,)) if long.any() else None,
+        )
+
+    def _tinted(self, shape: MeshShape) -> MeshShape:
+        if id(shape) not in self._shapes:
+            colours = np.empty_like(shape.colours)
+            colours[:] = (*self._colour, 0.0)
+            tinted = replace(shape, colours=colours, raised=max(shape.raised, LINE_LIFT))
+            self._shapes[id(shape)] = (shape, tinted)
+        return self._shapes[id(shape)][1]
+
+    def _painted(self, capsules: Float32) -> Float32:
+        painted = capsules.copy()
+        painted[:, 12:15] = self._colour
+        return painted
+
+
+def caption(text: str, place: Float64) -> Extras:
+    """A word at a place, in the picture's plane."""
+    at = np.asarray(place, dtype=np.float32)[None]
+    return Extras(dots=(Dots(at, (1.0, 1.0, 1.0, 1.0), 0.0, 1.0, (text,), np.zeros((1, 3), np.float32)),))
+
+
+def _moved_capsules(capsules: Float32, offset: Float64) -> Float32:
+    if not len(capsules):
+        return capsules
+    shifted = capsules.copy()
+    shifted[:, 0:3] += offset.astype(np.float32)
+    shifted[:, 4:7] += offset.astype(np.float32)
+    return shifted
+
+
+def _moved_extras(extras: Extras, offset: Float64) -> Extras:
+    shift, by = translation(offset), offset.astype(np.float32)
+    grid = extras.grid
+    if grid is not None:
+        centre = (grid.centre[0] + float(offset[0]), grid.centre[1] + float(offset[2]))
+        grid = replace(grid, height=grid.height + float(offset[1]), centre=centre)
+    lines: tuple[Lines, ...] = tuple(replace(one, ends=one.ends + by) for one in extras.lines)
+    return replace(
+        extras,
+        lines=lines,
+        dots=tuple(replace(one, places=one.places + by) for one in extras.dots),
+        shells=tuple(replace(mesh, matrix=shift @ mesh.matrix) for mesh in extras.shells),
+        grid=grid,
+    )

@@ -1,0 +1,273 @@
+"""What is shown at time t: an animation, its face, its body, and where a camera should look."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba_player.view.camera import Camera, Subject
+from fba_player.scene.framing import Extent, body_extent
+from fba_player.scene.ground import no_shadows, shadows
+from fba_player.view.view import View
+from fba_player.view.protocols import InTime
+from fba_player.view.switches import SWITCHES, Switches
+from fba_player.playback.timeline import Timeline
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyModel
+    from fba.face.model import FaceModel
+    from fba_player.scene.display_options import Dressing
+    from fba_player.figure.face import FaceFigure
+    from fba_player.figure.person import Person
+    from fba_player.scene.feature_points_view import PointView
+
+__all__ = ["LOOKS", "SWITCHES", "Scene", "default_camera"]
+
+Float64 = npt.NDArray[np.float64]
+
+SAMPLES = 48
+"""Moments at which the extent of a moving body is looked up to fit the camera."""
+LOOKS = ("figure", "points")
+"""What a scene may be shown as: a person, or feature points and bones."""
+
+
+class Scene(InTime[Timeline]):
+    """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
+
+    animation: at least one frame, else ValueError. model: the face, by default the built-in head; one that is
+    not in metres is shown as large as a person, with an FbaWarning, and what it lacks is told likewise. body:
+    what BAPs move, by default the built-in person; ModelError where it has no place for a face. axes: name
+    of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or "points",
+    the face as its feature points with lines through them and the body as its bones; it may be set at any
+    time, ValueError where it is something else. timeline: what is shown when, by default
+    `Timeline(animation, model)`; one that grows shows a stream while it arrives.
+
+    `show` sets its `switches`, at any time. What is drawn is worked out on first use. A `Showable`.
+    """
+
+    def __init__(
+        self,
+        animation: Animation,
+        model: FaceModel | None = None,
+        *,
+        body: BodyModel | None = None,
+        axes: str = "iso",
+        view: str = "figure",
+        timeline: Timeline | None = None,
+    ) -> None:
+        if not len(animation):
+            raise ValueError("nothing to show: the animation has no frames")
+        self.animation = animation
+        self.model = _default_model() if model is None else _usable(model)
+        self.timeline = timeline or Timeline(animation, self.model)
+        self.switches = Switches()
+        self.view = view
+        self._figure: FaceFigure | None = None
+        self._point_view: PointView | None = None
+        self._person: Person | None = None
+        self._dressing: Dressing | None = None
+        self._extent: Extent | None = None
+        self._fitted = 0  # frames there were when the extent was looked up
+        if animation.body is not None:
+            from fba.body import BapSolver
+            from fba.body.model import BodyModel
+            from fba_player.scene.bones import Bones
+
+            self._body = body or BodyModel.default()
+            self._skeleton = self._body.skeleton
+            self._solver = BapSolver(self._skeleton, axes)
+            self._bones = Bones(self._skeleton)
+
+    @property
+    def view(self) -> str:
+        """What the scene is shown as: "figure" or "points"."""
+        return self._view
+
+    @view.setter
+    def view(self, name: str) -> None:
+        if name not in LOOKS:
+            raise ValueError(f"no view {name!r}; there are {', '.join(LOOKS)}")
+        self._view = name
+
+    def show(self, name: str, on: object = True) -> None:
+        """Set a switch: True or False, a choice's word, or a FAP by name or number; see `SWITCHES`.
+
+        Raises ValueError for a switch that does not exist or a value that it cannot have.
+        """
+        self.switches.show(name, on)
+
+    @property
+    def title(self) -> str:
+        """The animation's name."""
+        return self.animation.name
+
+    @property
+    def figure(self) -> FaceFigure:
+        """The face that is shown; built on first use."""
+        if self._figure is None:
+            from fba_player.figure.face import FaceFigure
+
+            self._figure = FaceFigure(self.model)
+        return self._figure
+
+    @property
+    def person(self) -> Person:
+        """The body that is shown, with the face on it; built on first use. Only where there is a body."""
+        if self._person is None:
+            from fba_player.figure.person import Person
+
+            self._person = Person(self._body, self.figure)
+        return self._person
+
+    @property
+    def has_body(self) -> bool:
+        """Whether a body is shown."""
+        return self.animation.body is not None
+
+    @property
+    def subject(self) -> Subject:
+        """What a camera is to have in view over the whole performance."""
+        return self._framed().subject if self.has_body else self.figure.subject
+
+    @property
+    def gesture_subject(self) -> Subject | None:
+        """The body from the hips up, where the legs stand still and the face is animated; else None."""
+        if not self.has_body or self.animation.face is None or self._framed().legs_move:
+            return None
+        return self._framed().upper_half
+
+    @property
+    def face_subject(self) -> Subject:
+        """The head alone, where the performance begins."""
+        face = self.figure.subject
+        if not self.has_body:
+            return face
+        faps, joints = self._posed(float(self.start))
+        matrix = self._face_matrix(joints) @ self.figure.pose(faps).turn
+        x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3]
+        return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
+
+    def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
+        """A camera that has everything in view: the named preset, or the one that suits the content.
+
+        "body" fits the whole body; the other presets look at the face, from the front, at three quarters
+        or in profile, also where there is a body. ValueError for another name.
+        """
+        if preset is None:
+            return default_camera(self, aspect)
+        whole = self.has_body and preset == "body"
+        return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
+
+    def of(self, faps: npt.NDArray[np.float32], baps: Float64) -> View:
+        """What is drawn for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), whatever is played.
+
+        baps count only where the animation has a body.
+        """
+        return self._shown(faps, self._solver.pose(baps) if self.has_body else None)
+
+    def still(self, faps: npt.NDArray[np.float32]) -> View:
+        """The face for FAPs (68,) as they are shown, in the body's posture at the start."""
+        return self._shown(faps, self._posed(float(self.start))[1])
+
+    def at(self, time: float) -> View:
+        """Everything to be drawn at a time in seconds; before the start or after the end, its frames.
+
+        Raises ValueError for a time that is not finite.
+        """
+        return self._shown(*self._posed(time))
+
+    def _shown(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+        view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
+        if not self.switches.changed:
+            return view
+        from fba_player.scene.display_options import Dressing, Posture
+
+        if self._dressing is None:
+            self._dressing = Dressing(self.figure, self._bones if self.has_body else None)
+        return self._dressing.dressed(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
+
+    def _person_or_head(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+        """The view as a figure."""
+        if joints is None:
+            world = np.eye(4)
+            return View(eyes=self.figure.eyes(faps, world), faces=self.figure.meshes(faps, world))
+        turned = self.person.joints(faps, joints)
+        return View(
+            eyes=self.person.eyes(faps, turned),
+            faces=self.person.meshes(faps, turned),
+            blobs=shadows(joints, self._skeleton.names),
+            ground=True,
+        )
+
+    def _points(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+        """The view as feature points and bones."""
+        if self._point_view is None:
+            from fba_player.scene.feature_points_view import PointView
+
+            self._point_view = PointView(self.figure)
+        shown, matrix = self._point_view, self._face_matrix(joints)
+        capsules = shown.eyeballs(faps, matrix)
+        if joints is not None:
+            capsules = np.concatenate([capsules, self._bones.capsules(joints)])
+        return View(
+            meshes=shown.meshes(faps, matrix),
+            capsules=capsules,
+            marks=shown.marks(faps, matrix),
+            faces=shown.ghost(faps, matrix, on_body=joints is not None),
+            blobs=no_shadows() if joints is None else shadows(joints, self._skeleton.names),
+            ground=joints is not None,
+        )
+
+    def travel(self, time: float) -> tuple[float, float, float]:
+        """How far a following camera has gone at a time: (x, y, z), metres; zeros where it stands still."""
+        if not self.has_body or not self._framed().follows:
+            return (0.0, 0.0, 0.0)
+        joints = self._posed(time)[1]
+        assert joints is not None
+        centre = self.subject.centre
+        return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
+
+    def _posed(self, time: float) -> tuple[npt.NDArray[np.float32], Float64 | None]:
+        faps = self.timeline.faps(time)
+        if not self.has_body:
+            return faps, None
+        return faps, self._solver.pose(self.timeline.baps(time))
+
+    def _face_matrix(self, joints: Float64 | None) -> Float64:
+        """Frame of the face model, without the head's own turn, into the world."""
+        return np.eye(4) if joints is None else self.person.frame(joints)
+
+    def _framed(self) -> Extent:
+        frames = self.timeline.frames
+        if self._extent is None or frames >= 2 * self._fitted:  # much more of a stream has arrived
+            self._fitted = frames
+            chosen = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
+            baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in chosen])
+            self._extent = body_extent(self._solver.pose(baps)[:, :, :3, 3], self._skeleton.names)
+        return self._extent
+
+
+def _usable(model: FaceModel) -> FaceModel:
+    from fba_player.figure.model_units import usable
+
+    return usable(model)
+
+
+def _default_model() -> FaceModel:
+    from fba.face.model import FaceModel
+
+    return FaceModel.default()
+
+
+def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:
+    """The view that suits the content.
+
+    A body whole; from the hips up where it has a face that moves and its legs stand still; a face alone
+    from slightly aside.
+    """
+    if scene.has_body:
+        return Camera.preset("body", scene.gesture_subject or scene.subject, aspect)
+    return Camera(yaw=14.0, pitch=2.0).fit(scene.subject, aspect)

@@ -1,0 +1,85 @@
+"""Edges and normals of what a view shows, as lines."""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.view.annotations import Colour, Lines
+from fba_player.view.world_positions import directions, places
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape
+
+Float32 = npt.NDArray[np.float32]
+Int32 = npt.NDArray[np.int32]
+
+WIRE: Colour = (0.03, 0.05, 0.08, 0.8)
+WIRE_LIFT = 0.0012
+NORMAL_LENGTH = 0.007
+"""Metres on a face whose eyes are as far apart as an adult's."""
+NORMAL_CELL = 0.0045
+"""One normal is drawn in every cube of so many metres."""
+NORMAL_OPACITY = (0.95, 0.55)
+"""At its foot and at its tip."""
+RINGS = (14, 20)
+"""Of an eyeball, which has no mesh when it is drawn."""
+
+
+class Wireframe:
+    """Lines along edges and normals; what does not change is worked out once a shape."""
+
+    def __init__(self) -> None:
+        self._edges: WeakKeyDictionary[FaceShape | MeshShape, Int32] = WeakKeyDictionary()
+        self._thinned: WeakKeyDictionary[FaceShape, npt.NDArray[np.intp]] = WeakKeyDictionary()
+        vertices, triangles = sphere_mesh(*RINGS)
+        self._ball = vertices[unique_edges(triangles)]
+
+    def edges(self, faces: list[FaceMesh], meshes: list[Mesh], eyes: list[Eye], scale: float) -> Lines:
+        """Every edge once; scale: size of the face, 1 for an adult's."""
+        found = [np.zeros((0, 2, 3), dtype=np.float32)]
+        found += [places(mesh)[self._of(mesh.shape)] for mesh in faces]
+        found += [_moved(mesh.positions, mesh.matrix)[self._of(mesh.shape)] for mesh in meshes]
+        found += [_moved(self._ball, eye.matrix) for eye in eyes]
+        return Lines(np.concatenate(found), WIRE, 1.0, WIRE_LIFT * scale)
+
+    def normals(self, faces: list[FaceMesh], scale: float) -> Lines:
+        """A line on every vertex, or on some of many; red, green and blue say along x, y and z."""
+        ends, colours = [np.zeros((0, 2, 3), np.float32)], [np.zeros((0, 2, 4), np.float32)]
+        for mesh in faces:
+            if mesh.shape not in self._thinned:
+                self._thinned[mesh.shape] = _thinned(mesh, NORMAL_CELL * scale)
+            rows = self._thinned[mesh.shape]
+            foot, way = places(mesh)[rows], directions(mesh)[rows]
+            ends.append(np.stack([foot, foot + way * np.float32(NORMAL_LENGTH * scale)], axis=1))
+            shade = np.ones((len(rows), 2, 4), dtype=np.float32)
+            shade[..., :3] = (way * 0.5 + 0.5)[:, None]
+            shade[..., 3] = NORMAL_OPACITY
+            colours.append(shade)
+        return Lines(np.concatenate(ends), np.concatenate(colours), 1.2, WIRE_LIFT * scale)
+
+    def _of(self, shape: FaceShape | MeshShape) -> Int32:
+        if shape not in self._edges:
+            self._edges[shape] = unique_edges(shape.triangles)
+        return self._edges[shape]
+
+
+def unique_edges(triangles: Int32) -> Int32:
+    """(E, 2) edges of triangles (F, 3), each once, the smaller index first."""
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    found: Int32 = np.unique(edges, axis=0).astype(np.int32)
+    return found
+
+
+def _thinned(mesh: FaceMesh, cell: float) -> npt.NDArray[np.intp]:
+    """The first vertex that triangles use in every cell of that many metres."""
+    used = np.unique(mesh.shape.triangles)
+    cells = np.floor(mesh.positions[used] / max(cell, 1e-9)).astype(np.int64)
+    first: npt.NDArray[np.intp] = np.unique(cells, axis=0, return_index=True)[1]
+    return used[np.sort(first)].astype(np.intp)
+
+
+def _moved(positions: Float32, matrix: npt.NDArray[np.float64]) -> Float32:
+    moved: Float32 = (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+    return moved

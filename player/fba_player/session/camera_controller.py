@@ -1,0 +1,160 @@
+"""Where the camera is now: moved by hand at once, brought to a preset smoothly, following who walks away."""
+
+from __future__ import annotations
+
+import math
+import time as wall
+from collections.abc import Callable
+from dataclasses import replace
+
+from fba_player.view.camera import Camera
+from fba_player.view.protocols import Showable
+
+GLIDE = 0.35
+"""Seconds that a change of view takes."""
+NOWHERE = (0.0, 1.0)
+LEAST_FREE = 0.2
+"""Share of the width between two columns for which a view is still made."""
+
+
+class Viewpoint:
+    """The camera of a scene over time.
+
+    scene: gives presets and how far a performance has travelled. aspect: width / height of the picture,
+    which presets fit. camera: the first view, or the name of one; by default the one that suits the
+    content. clock: seconds, for tests.
+
+    covered: share of the picture's height that is hidden at the bottom; named views fit above it. What is
+    hidden at the sides, `uncover` says: the picture then moves between that, whatever the view.
+    """
+
+    def __init__(
+        self,
+        scene: Showable,
+        aspect: float,
+        camera: Camera | str | None = None,
+        *,
+        clock: Callable[[], float] = wall.monotonic,
+    ) -> None:
+        self.scene = scene
+        self.aspect = aspect
+        self.covered = 0.0
+        self.follow = True
+        self._chosen = camera
+        self._clock = clock
+        self._from = self._to = self.beginning
+        self._until = -math.inf
+        self._named = camera if not isinstance(camera, Camera) else ""
+        self._fitted_to = (aspect, self._to)
+        self._sides = (0.0, 0.0)
+        self._before = self._aside = NOWHERE
+        self._aside_until = -math.inf
+
+    @property
+    def camera(self) -> Camera:
+        """The camera now; setting it cuts to the new one."""
+        share = self._eased(self._until)
+        return self._to if share >= 1.0 else self._from.between(self._to, share)
+
+    @camera.setter
+    def camera(self, camera: Camera) -> None:
+        self._from = self._to = camera
+        self._until = -math.inf
+
+    @property
+    def gliding(self) -> bool:
+        """Whether it is on its way to another view."""
+        return self._clock() < max(self._until, self._aside_until)
+
+    @property
+    def beginning(self) -> Camera:
+        """The first view, for the picture as it is now."""
+        return self._chosen if isinstance(self._chosen, Camera) else self.fitted(self._chosen)
+
+    def fitted(self, preset: str | None) -> Camera:
+        """A named view, or None for the one that suits the content, above what is covered."""
+        free = 1.0 - min(max(self.covered, 0.0), 0.5)
+        camera = self.scene.camera(preset, self.aspect / free)
+        camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
+        self._fitted_to = (self.aspect, camera)
+        return camera
+
+    def refit(self) -> None:
+        """The picture may have another shape now: a named view that nobody has moved fits it again."""
+        aspect, camera = self._fitted_to
+        if self.aspect == aspect:
+            return
+        if self._named != "" and self._to == camera:
+            self.camera = self.fitted(self._named)
+            self._aside = self._between(*self._sides)
+        self._fitted_to = (self.aspect, self._fitted_to[1])
+
+    def glide(self, camera: Camera) -> None:
+        """Go to another view smoothly."""
+        self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE
+
+    def preset(self, name: str) -> None:
+        """Go to a named view; ValueError for a name that does not exist."""
+        self.glide(self.fitted(name))
+        self._named = name
+
+    def uncover(self, left: float, right: float, *, smoothly: bool = True) -> None:
+        """These shares of the picture's width are hidden: who is seen stands between them, whole."""
+        if (left, right) == self._sides:
+            return
+        self._before = self._aside_now()
+        self._sides = (left, right)
+        self._aside = self._between(left, right)
+        self._aside_until = self._clock() + GLIDE if smoothly else -math.inf
+
+    def reset(self) -> None:
+        """Go back to the view of the beginning."""
+        self.follow = True
+        self.glide(self.beginning)
+        self._named = self._chosen if not isinstance(self._chosen, Camera) else ""
+
+    def whole(self, time: float) -> Camera:
+        """The camera that shows the scene at a time in seconds, where nothing is hidden at the sides."""
+        return self._moved(self.camera, time, 1.0) if self.follow else self.camera
+
+    def at(self, time: float) -> Camera:
+        """The camera that shows the scene at a time in seconds, between what is hidden at the sides."""
+        aside, further = self._aside_now()
+        if (aside, further) == NOWHERE:
+            return self.whole(time)
+        up = -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)  # the middle of what is free stays
+        return self.whole(time).zoom(further).pan(-aside * self.aspect, up)
+
+    def toggle_follow(self, time: float) -> None:
+        """Follow a performance that walks away, or stay; the picture at `time` does not jump."""
+        self.camera = self._moved(self.camera, time, 1.0 if self.follow else -1.0)
+        self.follow = not self.follow
+
+    def _eased(self, until: float) -> float:
+        """How far a change is that ends then: from 0 to 1, beginning and ending slowly."""
+        share = min(max(1.0 - (until - self._clock()) / GLIDE, 0.0), 1.0)
+        return share * share * (3 - 2 * share)
+
+    def _aside_now(self) -> tuple[float, float]:
+        share = self._eased(self._aside_until)
+        a, b = (
+            before + (after - before) * share for before, after in zip(self._before, self._aside, strict=True)
+        )
+        return (a, b) if share < 1.0 else self._aside
+
+    def _between(self, left: float, right: float) -> tuple[float, float]:
+        """By which share of the width the middle moves, and how much further away the camera goes."""
+        free = max(1.0 - left - right, LEAST_FREE)
+        if self._named == "" or free >= 1.0:
+            return (left - right) / 2, 1.0
+        aspect = self.aspect / (1.0 - min(max(self.covered, 0.0), 0.5))
+        narrow = self.scene.camera(self._named, aspect * free).distance
+        whole = self.scene.camera(self._named, aspect).distance  # last: scenes stand as this camera sees them
+        return (left - right) / 2, max(narrow / whole, 1.0)
+
+    def _moved(self, camera: Camera, time: float, way: float) -> Camera:
+        travel = self.scene.travel(time)
+        if not any(travel):
+            return camera
+        x, y, z = (a + way * b for a, b in zip(camera.target, travel, strict=True))
+        return replace(camera, target=(x, y, z))

@@ -1,0 +1,137 @@
+"""Pictures and films of what a window shows, kept as files in the current folder."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import FbaError
+from fba_player.sound.recorded_sound import FilmSound
+from fba_player.export.image_files import write_picture
+from fba_player.export.recorder import Recorder
+from fba_player.session.session import Session
+
+UInt8 = npt.NDArray[np.uint8]
+
+RATE = 30
+"""Frames a second of a film of the window."""
+
+
+class Keeper:
+    """Fulfils the wishes of a session for pictures and films.
+
+    folder: where they go, by default the current one. Names are the file's with the frame's number; none
+    is ever overwritten.
+    """
+
+    def __init__(self, session: Session, folder: str | os.PathLike[str] | None = None) -> None:
+        self.session = session
+        self.folder = Path(folder) if folder is not None else Path()
+        self._recorder: Recorder | None = None
+        self._sound: FilmSound | None = None
+        self._begun = 0.0
+
+    @property
+    def recording(self) -> bool:
+        """Whether a film is being made."""
+        return self._recorder is not None
+
+    def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
+        """Keep a picture, uint8 (H, W, 4), as a PNG file; None where it failed, which the user is told."""
+        path = self._name(f"-{self.session.transport.frame + 1:04d}", ".png")
+        try:
+            write_picture(path, pixels, transparent=transparent)
+        except (OSError, FbaError) as error:
+            self.session.say(f"The picture could not be kept: {error}", "error", 8.0)
+            return None
+        self.session.say(f"Kept as {path}")
+        return path
+
+    def toggle_recording(self) -> None:
+        """Begin a film of what is seen, or finish it."""
+        if self._recorder is not None:
+            self._finish()
+            return
+        path = self._name("-film", ".mp4")
+        sound = self._heard()
+        try:
+            self._recorder = Recorder(path, self.session.size, rate=RATE, audio=sound)
+        except (OSError, FbaError, ValueError) as error:
+            if sound is not None:
+                sound.close()
+            self.session.say(f"No film can be recorded: {error}", "error", 8.0)
+            return
+        self._sound = sound
+        self._begun = self.session.clock()
+        self.session.recording = 0.0
+
+    def moment(self) -> None:
+        """The next picture shows where the transport is now."""
+        if self._recorder is None:
+            return
+        self.session.recording = self.session.clock() - self._begun
+        if self._sound is not None:
+            self._sound.advance(self.session.recording)
+
+    def picture(self, read: Callable[[], UInt8]) -> None:
+        """The picture of the last `moment` is there; `read` gives it, uint8 (H, W, 4), where it is needed."""
+        seconds = self.session.recording
+        if self._recorder is None or seconds is None or not self._recorder.wants(seconds):
+            return
+        try:
+            self._recorder.add(read(), seconds, wait=False)
+        except (OSError, FbaError) as error:
+            self._recorder = self._sound = self.session.recording = None
+            self.session.say(f"The film was given up: {error}", "error", 8.0)
+
+    def close(self) -> Path | None:
+        """Finish a film that is still being made; raises what went wrong, as nobody can be told later."""
+        if self._recorder is None:
+            return None
+        recorder, sound = self._recorder, self._sound
+        self._recorder = self._sound = self.session.recording = None
+        if sound is not None:
+            sound.advance(self.session.clock() - self._begun)
+            sound.end()
+        return recorder.close()
+
+    def _heard(self) -> FilmSound | None:
+        """The sound of the film that begins; None where there is none, which the user is told if need be."""
+        session = self.session
+        if session.sound is None:
+            return None
+        if session.audio is not None and session.audio.muted:
+            session.say("The sound is off: the film is silent until it is on (V)", "warning")
+        try:
+            return FilmSound(
+                session.sound,
+                session.transport,
+                offset=lambda: session.sound_offset,
+                muted=lambda: session.audio is not None and session.audio.muted,
+            )
+        except (OSError, FbaError) as error:
+            session.say(f"The film is silent: {error}", "warning", 8.0)
+            return None
+
+    def _finish(self) -> None:
+        try:
+            path = self.close()
+        except (OSError, FbaError) as error:
+            self.session.say(f"The film was given up: {error}", "error", 8.0)
+            return
+        if path is not None:
+            self.session.say(f"Kept as {path}")
+
+    def _name(self, what: str, suffix: str) -> Path:
+        """A name that no file has."""
+        stem = Path(self.session.source.name or "fba").stem
+        stem = re.sub(r"[^\w. -]", "_", stem)[:60].strip(" .") or "fba"
+        path, number = self.folder / f"{stem}{what}{suffix}", 2
+        while path.exists():
+            path, number = self.folder / f"{stem}{what}-{number}{suffix}", number + 1
+        return path

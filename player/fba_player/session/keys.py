@@ -1,0 +1,67 @@
+"""The keys and what they do: one table, for the window, the help and the documentation."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A row of the table.
+
+    keys: as shown to people ("F12", "Ctrl+S"); any of them does. action: see `fba_player.session.actions`. held:
+    whether it goes on while the key is held. group, does: for the help. shown: the keys for people, "Esc, Q".
+    """
+
+    keys: tuple[str, ...]
+    action: str
+    held: bool
+    group: str
+    does: str
+    shown: str
+
+
+@cache
+def keys() -> tuple[Key, ...]:
+    """All rows, in the order of the help."""
+    return tuple(
+        Key(
+            keys=tuple(row["keys"].split()),
+            action=row["action"],
+            held=bool(row["held"]),
+            group=row["group"],
+            does=row["does"],
+            shown=", ".join(_shown(key) for key in row["keys"].split()),
+        )
+        for row in _rows("keys.csv")
+    )
+
+
+@cache
+def mouse() -> tuple[tuple[str, str], ...]:
+    """(what the mouse does, what comes of it), for the help."""
+    return tuple((row["mouse"], row["does"]) for row in _rows("mouse.csv"))
+
+
+@cache
+def by_name() -> dict[str, Key]:
+    """Rows by the name of a key as the window gives it: "space", "shift+f12", "ctrl+s"."""
+    return {name.lower(): row for row in keys() for name in row.keys}
+
+
+@cache
+def key_of(action: str) -> str:
+    """The first key of an action, as shown to people; "" where none is set."""
+    return next((_shown(row.keys[0]) for row in keys() if row.action == action), "")
+
+
+def _shown(key: str) -> str:
+    return key if len(key) == 1 else "+".join(part[:1].upper() + part[1:] for part in key.split("+"))
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    text = (files(__package__) / name).read_text(encoding="utf-8")
+    return list(csv.DictReader(text.splitlines()))

@@ -1,0 +1,122 @@
+"""Performing by hand over what is played: the puppet, the take that is recorded, and takes shown again."""
+
+from __future__ import annotations
+
+import os
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.tracks import BodyTrack, FaceTrack
+from fba_player.session.puppet import Baps, Faps, Puppet
+from fba_player.session.takes import TakeRecorder, Takes, take_rate
+from fba_player.playback.timeline import Timeline
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from fba_player.session.session import Session
+
+NEUTRAL_SECONDS = 10
+WHAT = "the last take"
+
+
+class Performer:
+    """The puppet of a session and its takes. folder: where takes are saved, by default the current one.
+
+    It changes what the session shows from `attach` on.
+    """
+
+    def __init__(self, session: Session, folder: str | os.PathLike[str] | None = None) -> None:
+        self.session = session
+        self.puppet = Puppet(getattr(getattr(session.scene, "model", None), "definitions", None))
+        self.takes = Takes(folder)
+        self._recorder: TakeRecorder | None = None
+        self._shown: Timeline | None = None
+        self._begun = 0.0
+
+    def attach(self) -> None:
+        """From now on it has a say in what is shown."""
+        if self._hook not in self.session.before_frame:
+            self.session.before_frame.append(self._hook)
+
+    @property
+    def recording(self) -> float | None:
+        """Seconds recorded so far; None where nothing is being recorded."""
+        return None if self._recorder is None else self._recorder.seconds
+
+    @property
+    def showing(self) -> bool:
+        """Whether the last take is being shown."""
+        return self._shown is not None
+
+    def record(self) -> None:
+        """Begin a take: what is shown is sampled, as time goes by, whether something plays or not."""
+        self.stop()
+        scene: Any = self.session.scene
+        face = scene.animation.face is not None or not scene.has_body or self._face_moved()
+        self._recorder = TakeRecorder(take_rate(scene.timeline.rate), face=face, body=scene.has_body)
+        self._begin()
+
+    def show(self) -> None:
+        """Show the last take instead of everything else, once."""
+        self.stop()
+        if self.takes.last is not None:
+            self._shown = Timeline(self.takes.last)
+            self._begin()
+
+    def stop(self) -> None:
+        """End the take that is being recorded, or the one that is shown."""
+        recorder, self._recorder, self._shown = self._recorder, None, None
+        self.session.rolling.discard("take")
+        if recorder is not None and len(recorder):
+            self.takes.add(recorder.take(f"take {len(self.takes) + 1}"))
+            self.session.unsaved.add(WHAT)
+
+    def undo(self) -> None:
+        """Forget the last take."""
+        self.stop()
+        self.takes.undo()
+        self.session.unsaved.discard(WHAT)
+
+    def save(self, name: str) -> tuple[Path, str]:
+        """Write the last take, with the BAP steps of what is played; returns and raises as `Takes.save`."""
+        saved = self.takes.save(name, bap_steps=self.session.source.bap_steps)
+        self.session.unsaved.discard(WHAT)
+        return saved
+
+    def _begin(self) -> None:
+        self._begun = self.session.clock()
+        self.session.rolling.add("take")
+        self.attach()
+
+    def _hook(self, faps: Faps, baps: Baps) -> None:
+        seconds = self.session.clock() - self._begun
+        if self._shown is not None:
+            if seconds > self._shown.duration:
+                self.stop()
+            else:
+                faps[:] = self._shown.faps(seconds)
+                baps[:] = self._shown.baps(seconds)
+                self.puppet.shown = (faps.copy(), baps.copy())
+                return
+        self.puppet(faps, baps)
+        if self._recorder is not None:
+            self._recorder.add(seconds, faps, baps)
+            if self._recorder.full:
+                self.stop()
+                self.session.say("The take has become too long, and was ended", "warning")
+
+    def _face_moved(self) -> bool:
+        puppet = self.puppet
+        return bool(puppet.speaks or puppet.feels or puppet.fap_moved.any())
+
+
+def neutral(*, body: bool = False, name: str = "puppet") -> Animation:
+    """A face that does nothing, with a body that stands or without: something to puppeteer."""
+    count = 25 * NEUTRAL_SECONDS
+    face = FaceTrack(np.zeros((count, 68), np.int32), np.zeros((count, 68), bool))
+    stands = BodyTrack(np.zeros((count, 296), np.int32), np.zeros((count, 296), bool)) if body else None
+    return Animation(Fraction(25), np.arange(count), face, stands, name)

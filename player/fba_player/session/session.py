@@ -1,0 +1,260 @@
+"""What is going on in a window: what is shown, where it is, what the user has chosen and asked for.
+
+Panels read and change this; it knows no imgui and no OpenGL.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time as wall
+import warnings
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.view.camera import Camera
+from fba_player.view.view import View
+from fba_player.view.protocols import Showable
+from fba_player.view.switches import SWITCHES, Switch
+from fba_player.playback.transport import Transport
+from fba_player.session.keys import by_name
+from fba_player.session.source import Source
+from fba_player.session.camera_controller import Viewpoint
+
+if TYPE_CHECKING:
+    from fba_player.sound.player import Audio
+
+Faps = npt.NDArray[np.float32]
+Baps = npt.NDArray[np.float64]
+PathLike = str | os.PathLike[str]
+Hook = Callable[[Faps, Baps], None]
+
+NOTICE_SECONDS = 4.0
+LEAVING = 6.0
+"""Seconds in which closing once more closes."""
+NOTICE_GOES = 0.5
+"""Seconds before its end from which on a notice fades."""
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """A word to the user: text; kind "done", "warning" or "error"; until, on the session's clock.
+
+    about: what it tells of; a newer word about the same takes its place.
+    """
+
+    text: str
+    kind: str
+    until: float
+    about: str
+
+
+@dataclass
+class Selection:
+    """The FAPs and BAPs that the user has chosen, by number, in the order of choosing."""
+
+    faps: list[int] = field(default_factory=list)
+    baps: list[int] = field(default_factory=list)
+
+    def toggle(self, kind: str, number: int) -> None:
+        """Choose a "fap" or "bap", or no longer."""
+        chosen = self.faps if kind == "fap" else self.baps
+        if number in chosen:
+            chosen.remove(number)
+        else:
+            chosen.append(number)
+
+
+class Session:
+    """Everything the panels share.
+
+    scene, transport, viewpoint: what is shown, when, and from where. source: where it comes from.
+    selection: chosen FAPs and BAPs. open: names of the panels that are open. bare: everything but the
+    picture is hidden. size: of the picture in pixels; scale: pixels a point of the display.
+
+    before_frame: functions called as hook(faps, baps) before each picture with what is shown next, FAPs
+    (68,) float32 and BAPs (296,) float64 (zeros where there is no body), to change in place.
+
+    wishes: what the window is to do after this picture; see `wish`. recording: seconds recorded so far,
+    None where nothing is being recorded. values: faps and baps of the last picture, after the hooks.
+    sound: the file that belongs to what is played, whether a device makes it heard (audio) or not; it begins
+    sound_offset seconds after the first frame, see `shift_sound`.
+    rolling: names of what changes the picture by itself, or counts on being drawn. unsaved: what would be
+    lost with the window, see `leave`. dropped: files to be opened after it, see `drop`. popup: whether a list
+    is open over the picture; False closes it.
+    """
+
+    def __init__(
+        self,
+        scene: Showable,
+        transport: Transport | None = None,
+        *,
+        source: Source | None = None,
+        camera: Camera | str | None = None,
+        size: tuple[int, int] = (1280, 720),
+        scale: float = 1.0,
+        clock: Callable[[], float] = wall.monotonic,
+    ) -> None:
+        self.scene = scene
+        timeline: Any = scene.timeline
+        self.transport = transport or Transport(timeline)
+        self.source = source or Source(scene)
+        self.size = size
+        self.scale = scale
+        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=clock)
+        self.selection = Selection()
+        self.open: set[str] = set()
+        self.bare = False
+        self.closing = False
+        self.before_frame: list[Hook] = []
+        self.wishes: deque[str] = deque()
+        self.recording: float | None = None
+        self.rolling: set[str] = set()
+        self.unsaved: set[str] = set()
+        self.dropped: tuple[Path, ...] = ()
+        self.whole_screen = False
+        self.popup = False
+        self.audio: Audio | None = None
+        self.sound: PathLike | None = None
+        self.sound_offset = 0.0
+        self.values: tuple[Faps, Baps] = (np.zeros(68, np.float32), np.zeros(296))
+        self.clock = clock
+        self.last_input = clock()
+        self._notices: list[Notice] = []
+        self._asked = -math.inf
+
+    def toggle_panel(self, name: str) -> None:
+        """Open a panel, or close it. Where all is hidden, show it."""
+        if self.bare:
+            self.bare = False
+            self.open.add(name)
+        else:
+            self.open ^= {name}
+
+    def say(self, text: str, kind: str = "done", seconds: float = NOTICE_SECONDS, *, about: str = "") -> None:
+        """Show a short text for some seconds; kind "done", "warning" or "error".
+
+        It takes the place of an older one about the same, by default of the same text.
+        """
+        about = about or text
+        self._notices = [one for one in self.notices() if one.about != about][-2:]
+        self._notices.append(Notice(text, kind, self.clock() + seconds, about))
+
+    def notices(self) -> list[Notice]:
+        """What is to be shown now, oldest first."""
+        now = self.clock()
+        self._notices = [one for one in self._notices if one.until > now]
+        return list(self._notices)
+
+    def wish(self, what: str) -> None:
+        """Ask the window for "screenshot", "transparent", "record" or "fullscreen"."""
+        self.wishes.append(what)
+
+    def escape(self) -> None:
+        """Close the list that is open, else leave the full screen, else the window."""
+        if self.popup:
+            self.popup = False
+        elif self.whole_screen:
+            self.wish("fullscreen")
+        else:
+            self.leave()
+
+    def leave(self) -> None:
+        """Close the window; where something is not saved, only when asked a second time."""
+        if self.unsaved and self.clock() > self._asked:
+            self._asked = self.clock() + LEAVING
+            what = " and ".join(sorted(self.unsaved))
+            self.say(f"Not saved: {what}. Once more to close without", "warning", LEAVING, about="leave")
+            return
+        self.closing = True
+
+    def drop(self, paths: tuple[Path, ...]) -> None:
+        """Files were dropped onto the window: close it for them, unless one cannot be read."""
+        from fba.errors import FbaError
+        from fba.formats import read
+
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # whoever opens them says it
+                for path in paths:
+                    read(path)
+        except (FbaError, OSError) as error:
+            self.say(f"Cannot be opened: {error}", "error", 8.0, about="drop")
+            return
+        self.leave()
+        if self.closing:
+            self.dropped = paths
+
+    def touched(self) -> None:
+        """The user moved the mouse or pressed something: what hides itself comes back."""
+        self.last_input = self.clock()
+
+    @property
+    def idle(self) -> float:
+        """Seconds since the user did something."""
+        return self.clock() - self.last_input
+
+    @property
+    def restless(self) -> bool:
+        """Whether the picture changes without the user's doing."""
+        going = self.clock() + NOTICE_GOES
+        leaving = any(notice.until < going for notice in self._notices)
+        filming = self.recording is not None
+        moving = self.transport.playing or self.viewpoint.gliding
+        return moving or bool(self.rolling) or filming or leaving
+
+    def shift_sound(self, seconds: float) -> None:
+        """Let the sound begin this much later than now, or earlier where negative."""
+        self.sound_offset = round(self.sound_offset + seconds, 6)
+        if self.audio is not None:
+            self.audio.offset = self.sound_offset
+
+    def view(self, time: float) -> View:
+        """What is drawn at a time, after `before_frame`."""
+        timeline: Any = self.scene.timeline
+        of: Callable[[Faps, Baps], View] | None = getattr(self.scene, "of", None)
+        if not self.before_frame or of is None:
+            return self.scene.at(time)
+        faps, baps = timeline.faps(time).copy(), timeline.baps(time).copy()
+        for hook in tuple(self.before_frame):
+            hook(faps, baps)
+        self.values = (faps, baps)
+        return of(faps, baps)
+
+    def toggle_view(self) -> None:
+        """Feature points and bones instead of the figure, or back; nothing where there is no such view."""
+        if hasattr(self.scene, "view"):
+            self.scene.view = "figure" if self.scene.view == "points" else "points"
+
+    def switch_table(self) -> Mapping[str, Switch]:
+        """The scene's switches by name; empty where it has none."""
+        return SWITCHES if hasattr(self.scene, "switches") else {}
+
+    def switch_key(self, switch: Switch) -> str:
+        """The key of a switch; "" where it has none, or where the window needs that key itself."""
+        return "" if switch.key.lower() in by_name() else switch.key
+
+    def switch_keys(self) -> list[tuple[str, str]]:
+        """(key, what it switches) of all switches that have a key."""
+        table = self.switch_table().values()
+        return [(self.switch_key(one), one.label) for one in table if self.switch_key(one)]
+
+    def press_switch(self, key: str) -> bool:
+        """Turn the switch of a key over; False where no switch has it."""
+        for name, switch in self.switch_table().items():
+            if self.switch_key(switch).lower() == key:
+                self.touched()
+                self.scene.switches.press(name)
+                self.say(f"{switch.label}: {self.scene.switches.text(name)}", about=name)
+                return True
+        return False
+
+    def camera(self, time: float) -> Camera:
+        """The camera at a time."""
+        return self.viewpoint.at(time)

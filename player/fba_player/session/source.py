@@ -1,0 +1,130 @@
+"""Where what is shown comes from, and what its file holds."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time as wall
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fba.animation import Animation
+from fba.errors import FbaError
+from fba_player.session.timeline_trace import trace_of_motion, trace_of_planes
+
+if TYPE_CHECKING:
+    from fba.codec import StreamInfo
+    from fba_player.view.protocols import Showable
+    from fba_player.session.timeline_trace import Trace
+
+REFRESH = 0.2
+"""Seconds between looks at what has arrived of a stream."""
+
+
+class Source:
+    """The file behind a scene.
+
+    path: None where there is none. bap_steps: with which it was decoded. warnings: what was said while it
+    was read. `info` is what it holds: at first what the scene itself tells, once `look` is done also
+    planes, bits and damage.
+    """
+
+    def __init__(
+        self,
+        scene: Showable,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        bap_steps: str = "iso",
+        warnings: tuple[str, ...] = (),
+    ) -> None:
+        self.path = path
+        self.bap_steps = bap_steps
+        self.warnings = list(warnings)
+        self._scene = scene
+        self._probed: StreamInfo | None = None
+        self._own: StreamInfo | None = None
+        self._of = ("animation", 0)
+        animation = getattr(scene, "animation", None)
+        several = hasattr(scene, "scenes")
+        self._live: Callable[[], StreamInfo] | None = None if several else getattr(animation, "info", None)
+        self._told = -REFRESH
+        self._traced: StreamInfo | None = None
+        self._trace: Trace | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def name(self) -> str:
+        """The file's name, or the scene's."""
+        return os.path.basename(os.fspath(self.path)) if self.path is not None else self._scene.title
+
+    @property
+    def info(self) -> StreamInfo:
+        """What it holds; the same object until something changes."""
+        if self._probed is not None:
+            return self._probed
+        own, timeline, now = self._own, self._scene.timeline, wall.monotonic()
+        if own is None or own.frames != timeline.frames:
+            growing = bool(getattr(timeline, "growing", False))
+            if own is None or not growing or now - self._told >= REFRESH:
+                self._own, self._told = self._of_scene(), now
+        assert self._own is not None
+        return self._own
+
+    def look(self, *, wait: bool = False) -> None:
+        """Read what the file holds, in the background unless `wait`: the window need not wait for it."""
+        if self._thread is not None:
+            return
+        self._thread = threading.Thread(target=self._probe, name="fba source", daemon=True)
+        self._thread.start()
+        if wait:
+            self._thread.join()
+
+    @property
+    def looking(self) -> bool:
+        """Whether that is still going on."""
+        return self._thread is not None and self._thread.is_alive()
+
+    @property
+    def trace(self) -> Trace | None:
+        """What is behind the timeline, once `look` has found it: the planes' bits, or how much moves."""
+        if self._live is not None and self._traced is not self.info:
+            self._traced = self.info
+            self._trace = trace_of_planes(self._traced)
+        return self._trace
+
+    def _of_scene(self) -> StreamInfo:
+        from fba.codec import StreamInfo
+
+        if self._live is not None:
+            return self._live()
+        animation, times = getattr(self._scene, "animation", None), self._scene.timeline
+        if isinstance(animation, Animation) and len(animation) == times.frames:
+            return StreamInfo.of_animation(animation, *self._of)
+        return StreamInfo(
+            format="stream",
+            size=0,
+            rate=times.rate,
+            frames=times.frames,
+            duration=times.duration,
+            start=times.start,
+            skipped=0,
+            face=None,
+            body=None,
+        )
+
+    def _probe(self) -> None:
+        from fba.formats import format_of, probe
+
+        try:
+            if self.path is not None and (found := format_of(self.path).name) == "fba":
+                self._probed = probe(self.path, bap_steps=self.bap_steps)
+            elif self.path is not None:  # what was read of it counts: at the rate that was asked for
+                self._of = (found, os.stat(self.path).st_size)
+                self._own = None
+        except (FbaError, OSError) as error:
+            self.warnings.append(f"what the file holds cannot be read: {error}")
+        trace = trace_of_planes(self.info)
+        animation = getattr(self._scene, "animation", None)
+        if trace is None and isinstance(animation, Animation):
+            trace = trace_of_motion(animation)
+        self._trace = trace

@@ -1,0 +1,240 @@
+"""Any stretch of an audio file, decoded when it is asked for: an hour of sound needs no hour's memory."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import DisplayError, FbaWarning, FormatError
+from fba.atomic_path import PathLike
+
+Int16 = npt.NDArray[np.int16]
+
+CHANNELS = 2
+RATES = (8000, 192_000)
+"""Sound outside these is resampled to `USUAL_RATE`."""
+USUAL_RATE = 48_000
+RUN_UP = 0.5
+"""Seconds decoded before the place that is wanted: MP3 and AAC frames need the ones before them."""
+GAP = 0.02
+"""Seconds by which a file's own times may leave its count of samples before they are believed."""
+MOST_AT_ONCE = 1 << 24
+"""Samples; one piece of a file that decodes to more is damaged."""
+
+
+def av_version(av: Any) -> int:
+    """The major version of PyAV, of which several from 12 on are supported."""
+    return int(av.__version__.split(".")[0])
+
+
+def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
+    """The opened `av` container and its first audio stream; FormatError where there is none to decode."""
+    # Tags may be in any encoding. From version 19 on, PyAV takes them as they are and has no argument for it.
+    tags = {"metadata_errors": "replace"} if av_version(av) < 19 else {}
+    try:
+        empty = not path.stat().st_size
+        container = None if empty else av.open(str(path), **tags)
+    except (av.error.FFmpegError, OSError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FormatError(f"cannot be read as sound: {reason}", path=path) from error
+    if container is None:
+        raise FormatError("is empty (0 bytes), not a sound file", path=path)
+    if not container.streams.audio:
+        container.close()
+        raise FormatError("holds no sound", path=path)
+    stream = container.streams.audio[0]
+    if stream.codec_context is None:
+        container.close()
+        raise FormatError("holds sound in a coding that is not known here", path=path)
+    return container, stream
+
+
+class SoundFile:
+    """The first sound of an audio or video file, as stereo samples at one rate.
+
+    path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rate: samples a second, the file's own
+    where devices play it, or where it is one of `rates`. duration: seconds as the file says itself, None
+    where it does not. Mono goes to both sides; more than two channels are mixed down.
+
+    Not for several threads at once. Raises FormatError where it cannot be read or holds no sound.
+    """
+
+    _container: Any = None
+    _stream: Any = None
+
+    def __init__(self, path: PathLike, rates: Collection[int] = ()) -> None:
+        try:
+            import av
+        except ImportError as error:
+            raise DisplayError(
+                f"sound needs the Python package av (PyAV), which cannot be imported: {error}. "
+                "Install it with: pip install av"
+            ) from error
+        self._av = av
+        self.path = Path(path)
+        self._damaged = False
+        self._rates = rates
+        self._open()
+        self.rate = self._rate(int(self._stream.rate or 0))
+        length, base = self._stream.duration, self._stream.time_base
+        whole = self._container.duration
+        if length is None or not base:
+            self.duration = None if whole is None else max(float(whole / av.time_base), 0.0)
+        else:
+            self.duration = max(float(length * base), 0.0)
+        self._first = 0  # sample that the first part since the last seek begins with
+        self._parts: Iterator[Int16] = iter(())
+        self._next: int | None = None  # sample that the next part begins with
+        self._rest: Int16 = np.zeros((0, CHANNELS), dtype=np.int16)
+        if not len(self.read(0, 1)):
+            self.close()
+            raise FormatError("holds no sound that can be decoded", path=path)
+
+    def read(self, start: int, count: int) -> Int16:
+        """Samples int16 (count, 2) from a sample on; fewer, or none, where the sound ends."""
+        start, missing = max(start, 0), max(count, 0)
+        at = self._next
+        if at is None or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP * self.rate:
+            at = self._seek(start)
+        found: list[Int16] = []
+        while missing > 0:
+            self._rest = self._rest[max(start - at + len(self._rest), 0) :]
+            if not len(self._rest):
+                part = next(self._parts, None)
+                if part is None:
+                    break
+                self._rest, at = part, at + len(part)
+                continue
+            taken = self._rest[:missing]
+            self._rest = self._rest[len(taken) :]
+            found.append(taken)
+            start, missing = start + len(taken), missing - len(taken)
+        self._next = at
+        return np.concatenate([np.zeros((0, CHANNELS), dtype=np.int16), *found])
+
+    def close(self) -> None:
+        """Close the file; safe to call twice."""
+        self._parts = iter(())
+        if self._container is not None:
+            self._container.close()
+
+    def __enter__(self) -> SoundFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _open(self) -> None:
+        if self._container is not None:
+            self._container.close()
+        self._container, self._stream = open_sound(self._av, self.path)
+
+    def _rate(self, rate: int) -> int:
+        if rate < 1:
+            raise FormatError(f"says {rate} samples a second", path=self.path)
+        fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
+        return rate if fits else USUAL_RATE
+
+    def _seek(self, start: int) -> int:
+        """Let `_parts` begin at or before a sample; the one it begins with."""
+        self._rest = self._rest[:0]
+        before = max(start / self.rate - RUN_UP, 0.0)
+        stream = self._stream
+        if self._next is not None or before > 0:  # not for a file that has just been opened
+            try:
+                offset = round(before / stream.time_base) + (stream.start_time or 0)
+                self._container.seek(offset, stream=stream)
+            except (self._av.error.FFmpegError, OverflowError):
+                self._open()  # it cannot seek: from its beginning
+        self._first = start
+        self._parts = self._decoded()
+        self._rest = next(self._parts, self._rest)
+        return self._first + len(self._rest)
+
+    def _decoded(self) -> Iterator[Int16]:
+        """Parts (N, 2) one after the other from where the container is; the first one's place is `_first`."""
+        stream = self._stream
+        convert = _Converter(self._av, self.rate, mono=stream.channels == 1)
+        begun, at = stream.start_time or 0, None
+        for frame in self._frames():
+            told = None
+            if frame.pts is not None and frame.time_base:
+                told = round(float((frame.pts - begun) * frame.time_base) * self.rate)
+            if at is None:
+                at = self._first = told or 0
+            elif told is not None and GAP * self.rate < told - at < MOST_AT_ONCE:
+                yield np.zeros((told - at, CHANNELS), dtype=np.int16)
+                at = told
+            frame.pts = None
+            try:
+                parts = convert(frame)
+            except (self._av.error.FFmpegError, ValueError) as error:
+                self._warn(error)
+                continue
+            for part in parts:
+                at += len(part)
+                yield part
+        if at is not None:
+            yield from convert(None)
+
+    def _frames(self) -> Iterator[Any]:
+        """Decoded frames; what is damaged is left out, with a warning the first time."""
+        error_type = self._av.error.FFmpegError
+        packets = self._container.demux(self._stream)
+        while True:
+            try:
+                packet = next(packets, None)
+            except error_type as error:
+                self._warn(error)
+                return
+            if packet is None:
+                return
+            try:
+                frames = packet.decode()
+            except error_type as error:
+                if not isinstance(error, EOFError):
+                    self._warn(error)
+                continue
+            for frame in frames:
+                if 0 < frame.samples <= MOST_AT_ONCE:
+                    yield frame
+
+    def _warn(self, error: Exception) -> None:
+        if not self._damaged:
+            self._damaged = True
+            warnings.warn(
+                f"{self.path}: part of the sound is damaged and left out: {error}", FbaWarning, stacklevel=2
+            )
+
+
+class _Converter:
+    """Decoded frames as samples (N, 2) at one rate; frames may change their own format."""
+
+    def __init__(self, av: Any, rate: int, *, mono: bool) -> None:
+        self._av = av
+        self._rate = rate
+        self._sides = 1 if mono else CHANNELS  # mixing would make mono softer
+        self._resampler = self._made()
+
+    def __call__(self, frame: Any) -> list[Int16]:
+        """The samples of a frame, or what is still held back for None."""
+        try:
+            pieces = self._resampler.resample(frame)
+        except ValueError:  # another format than before
+            held = self._resampler.resample(None)
+            self._resampler = self._made()
+            pieces = held + self._resampler.resample(frame)
+        found = []
+        for piece in pieces:
+            samples = np.asarray(piece.to_ndarray(), dtype=np.int16).reshape(-1, self._sides)
+            found.append(np.broadcast_to(samples, (len(samples), CHANNELS)))
+        return found
+
+    def _made(self) -> Any:
+        layout = "mono" if self._sides == 1 else "stereo"
+        return self._av.AudioResampler(format="s16", layout=layout, rate=self._rate)

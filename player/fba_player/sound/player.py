@@ -1,0 +1,195 @@
+"""Sound beside the picture: the device's clock leads, and what it is given follows the transport.
+
+A device counts the samples it plays, and that count is the clock of the transport. What the device asks
+for next will be heard at a known reading of that clock, so it gets the sound of the time that the transport
+will show then: pausing, seeking, looping and speeds need no code of their own, and nothing can drift.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time as wall
+import warnings
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import Any
+
+from fba.errors import FbaWarning
+from fba_player.sound.soundtrack import beside
+from fba_player.sound.read_ahead import SoundBlocks
+from fba_player.sound.device_clock import SoundClock
+from fba_player.sound.audio_file import CHANNELS, SoundFile
+from fba_player.sound.mixer import SoundMixer
+from fba_player.playback.transport import Transport
+from fba.atomic_path import PathLike
+
+__all__ = ["Audio", "beside", "open_audio"]
+
+PERIOD, PERIODS = 0.04, 3
+"""Seconds that a device asks for at a time, and how many of them it holds."""
+AHEAD = (0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5)
+"""Seconds after which a sample will be wanted."""
+
+
+class NoDeviceError(Exception):
+    """No sound can be played here; the text says why."""
+
+
+class Audio:
+    """An audio file, heard while a transport plays; a context manager.
+
+    path: anything that FFmpeg reads. transport: follows the device's clock from now on. offset: seconds by
+    which the sound begins after the first frame, or before it where negative. backend: "null" for a device
+    that nobody hears, for tests; None for what the system has.
+
+    Raises FormatError where the file cannot be read or holds no sound, NoDeviceError where there is no
+    device. Use `open_audio`, which goes on without sound there.
+    """
+
+    def __init__(
+        self, path: PathLike, transport: Transport, *, offset: float = 0.0, backend: str | None = None
+    ) -> None:
+        self.path = Path(path)
+        self.transport = transport
+        file = SoundFile(path)
+        self.duration = file.duration
+        self.rate = file.rate
+        self.clock = SoundClock(file.rate, (PERIODS - 1) * PERIOD)
+        self._offset = offset
+        self._blocks = SoundBlocks(file, self._wanted)
+        self._mixer = SoundMixer(self._blocks.take, file.rate, lambda: transport.motion, self._origin)
+        self._device: Any = None
+        try:
+            self._device = _device(file.rate, backend)
+            self.backend = str(self._device.backend)
+            given = self._given()
+            next(given)
+            self._device.start(given)
+        except Exception as error:
+            self.close()
+            raise NoDeviceError(", ".join(str(one) for one in error.args) or type(error).__name__) from error
+        transport.use_clock(self.clock, self.clock.latency)
+
+    @property
+    def offset(self) -> float:
+        """Seconds by which the sound begins after the first frame; it may be set while it is heard."""
+        return self._offset
+
+    @offset.setter
+    def offset(self, offset: float) -> None:
+        self._offset = float(offset)
+        self._mixer.origin = self._origin
+
+    @property
+    def _origin(self) -> float:
+        return self.transport.start + self._offset
+
+    @property
+    def volume(self) -> float:
+        """Loudness, 0 to 1."""
+        return self._mixer.volume
+
+    @volume.setter
+    def volume(self, volume: float) -> None:
+        self._mixer.volume = min(max(float(volume), 0.0), 1.0)
+
+    @property
+    def muted(self) -> bool:
+        """Whether nothing is heard, whatever the volume."""
+        return self._mixer.muted
+
+    @muted.setter
+    def muted(self, muted: bool) -> None:
+        self._mixer.muted = bool(muted)
+
+    def close(self) -> None:
+        """Stop the sound; the transport goes on with the wall clock. Safe to call twice."""
+        if self._device is not None:
+            self._device.close()
+            self._device = None
+            self.transport.use_clock(wall.monotonic)
+        self._blocks.close()
+
+    def __enter__(self) -> Audio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _given(self) -> Generator[bytes, int, None]:
+        """What the device gets; runs in its thread."""
+        samples = yield b""
+        while True:
+            first = self.clock.taken(samples)
+            samples = yield self._mixer.fill(first, samples).tobytes()
+
+    def _wanted(self) -> Iterator[int]:
+        """Samples that will be heard soon, the next one first."""
+        motion, now = self.transport.motion, self.clock()
+        for ahead in AHEAD:
+            yield int((motion.time(now + ahead) - self._origin) * self.rate)
+        yield int((motion.here - self._origin) * self.rate + AHEAD[1] * self.rate)
+
+
+def open_audio(
+    path: PathLike, transport: Transport, *, offset: float = 0.0, backend: str | None = None
+) -> Audio | None:
+    """`Audio`; or None, with an FbaWarning, where there is no sound device: the wall clock goes on then.
+
+    Raises FormatError where the file cannot be read or holds no sound.
+    """
+    try:
+        return Audio(path, transport, offset=offset, backend=backend)
+    except NoDeviceError as error:
+        warnings.warn(
+            f"{os.path.basename(os.fspath(path))} is not heard: no sound device can be used ({error}); "
+            "the picture follows the wall clock",
+            FbaWarning,
+            stacklevel=2,
+        )
+        return None
+
+
+def _device(rate: int, backend: str | None) -> Any:
+    try:
+        import miniaudio
+    except ImportError as error:
+        raise NoDeviceError(f"the package miniaudio is missing; pip install miniaudio: {error}") from error
+    silent = miniaudio.Backend.NULL
+    with _quiet():
+        device = miniaudio.PlaybackDevice(
+            output_format=miniaudio.SampleFormat.SIGNED16,
+            nchannels=CHANNELS,
+            sample_rate=rate,
+            buffersize_msec=round(PERIOD * 1000),
+            callback_periods=PERIODS,
+            backends=[silent] if backend == "null" else None,
+            app_name="fba",
+        )
+    if backend != "null" and str(device.backend).lower() == "null":
+        device.close()
+        raise NoDeviceError("the system has none")
+    return device
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Libraries for sound on Linux write pages to standard error where there is no device."""
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    try:
+        kept = os.dup(2)
+    except OSError:  # there is no standard error
+        yield
+        return
+    try:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 2)
+        os.close(nowhere)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

@@ -1,0 +1,105 @@
+"""The sound of a film of a window: what is heard while it is recorded, pauses and jumps among it."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.sound.soundtrack import AAC_RATES, BLOCK
+from fba_player.sound.audio_file import CHANNELS, SoundFile
+from fba_player.sound.mixer import SoundMixer
+from fba_player.playback.transport import Transport
+from fba.atomic_path import PathLike
+
+Int16 = npt.NDArray[np.int16]
+
+PIECE = 1.0
+"""Seconds mixed at once, at most."""
+
+
+class FilmSound:
+    """Samples for a film, from where a transport is at each of its moments; a `fba_player.sound.soundtrack.FilmedSound`.
+
+    path: an audio file. transport: what is played; `offset` gives the seconds by which the sound begins after
+    the first frame. muted: whether nothing is to be heard now.
+
+    The window's thread calls `advance` and `end`, the encoder's `frames`. It needs no sound device. Raises
+    FormatError where the file cannot be read.
+    """
+
+    def __init__(
+        self,
+        path: PathLike,
+        transport: Transport,
+        *,
+        offset: Callable[[], float] = lambda: 0.0,
+        muted: Callable[[], bool] = lambda: False,
+    ) -> None:
+        import av
+
+        self.path = Path(path)
+        self._av = av
+        self._file = SoundFile(path, rates=AAC_RATES)
+        self.rate = self._file.rate
+        self.channels, self.layout = CHANNELS, "stereo"
+        self._transport, self._offset, self._muted = transport, offset, muted
+        self._mixer = SoundMixer(self._take, self.rate, lambda: transport.motion, transport.start)
+        self._mixed: deque[Int16] = deque()
+        self._lock = threading.Lock()
+        self._done = 0
+        self._ended = False
+
+    def advance(self, seconds: float) -> None:
+        """The film is so many seconds long now, and the transport is where it then is."""
+        now = self._transport.clock
+        self._mixer.origin = self._transport.start + self._offset()
+        self._mixer.muted = self._muted()
+        missing = round(seconds * self.rate) - self._done
+        while missing > 0:
+            count = min(missing, round(PIECE * self.rate))
+            samples = self._mixer.fill(now - missing / self.rate, count)
+            with self._lock:
+                self._mixed.append(samples)
+            self._done += count
+            missing -= count
+
+    def end(self) -> None:
+        """No more will come: what the film still lacks is silence."""
+        self._ended = True
+
+    def frames(self, samples: int) -> Iterator[Any]:
+        """As many of the next samples as are there, as `av.AudioFrame`s ("fltp") without times."""
+        while samples > 0:
+            with self._lock:
+                part = self._mixed.popleft() if self._mixed else None
+            if part is None:
+                if not self._ended:
+                    return
+                part = np.zeros((min(samples, BLOCK), CHANNELS), dtype=np.int16)
+            if len(part) > min(samples, BLOCK):
+                with self._lock:
+                    self._mixed.appendleft(part[min(samples, BLOCK) :])
+                part = part[: min(samples, BLOCK)]
+            samples -= len(part)
+            block = np.ascontiguousarray(part.T, dtype=np.float32) / np.float32(32768)
+            frame = self._av.AudioFrame.from_ndarray(block, format="fltp", layout=self.layout)
+            frame.sample_rate = self.rate
+            yield frame
+
+    def close(self) -> None:
+        """Close the file; safe to call twice."""
+        self._file.close()
+
+    def _take(self, start: int, count: int) -> Int16:
+        """Samples int16 (count, 2); silence outside."""
+        taken = np.zeros((count, CHANNELS), dtype=np.int16)
+        first = min(max(-start, 0), count)
+        found = self._file.read(start + first, count - first)
+        taken[first : first + len(found)] = found
+        return taken

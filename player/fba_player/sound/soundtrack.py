@@ -1,0 +1,121 @@
+"""The sound that goes with a film: any part of an audio file, sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import FormatError
+from fba_player.sound.audio_file import open_sound
+from fba.atomic_path import PathLike
+
+Float32 = npt.NDArray[np.float32]
+
+AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
+BLOCK = 1024
+"""Samples at a time; AAC's own."""
+
+
+class FilmedSound(Protocol):
+    """What the sound track of a film is made of: samples as far as they are known."""
+
+    rate: int
+    channels: int
+    layout: str
+
+    def frames(self, samples: int) -> Iterator[Any]:
+        """The next samples, or as many of them as are there, as `av.AudioFrame`s ("fltp") without times."""
+
+    def close(self) -> None:
+        """Give back what it holds; safe to call twice."""
+
+
+def beside(path: PathLike) -> Path | None:
+    """The WAV file of the same name beside a stream, where there is one."""
+    stream = Path(path)
+    for suffix in (".wav", ".WAV", ".Wav"):
+        found = stream.with_suffix(suffix)
+        if found != stream and found.is_file():
+            return found
+    return None
+
+
+class Soundtrack:
+    """Samples of an audio file from a moment on, then silence.
+
+    path: anything that FFmpeg reads. start: seconds in the file; where it is negative, silence comes
+    first. rate: samples a second, the file's own where AAC knows it, else 48000. One or two channels.
+
+    Raises FormatError where it cannot be read or holds no sound.
+    """
+
+    def __init__(self, path: PathLike, start: Fraction) -> None:
+        from fba_player.export.mp4 import import_av
+
+        self._av = import_av()
+        self._path = Path(path)
+        self._container, stream = open_sound(self._av, self._path)
+        self.rate = stream.rate if stream.rate in AAC_RATES else 48000
+        self.channels = 1 if stream.channels == 1 else 2
+        self.layout = "mono" if self.channels == 1 else "stereo"
+        self._silence = max(round(-start * self.rate), 0)
+        self._skip = max(round(start * self.rate), 0)
+        self._stream = stream
+        self._parts = self._samples()
+        self._rest: Float32 = np.zeros((self.channels, 0), dtype=np.float32)
+
+    def close(self) -> None:
+        """Close the file; safe to call twice."""
+        self._parts.close()
+        self._container.close()
+
+    def frames(self, samples: int) -> Iterator[Any]:
+        """The next samples as `av.AudioFrame`s ("fltp") of at most `BLOCK` samples, without times."""
+        for start in range(0, samples, BLOCK):
+            block = self.take(min(BLOCK, samples - start))
+            frame = self._av.AudioFrame.from_ndarray(block, format="fltp", layout=self.layout)
+            frame.sample_rate = self.rate
+            yield frame
+
+    def take(self, samples: int) -> Float32:
+        """The next samples: float32 (channels, samples), -1..1; zeros after the end of the file."""
+        while self._rest.shape[1] < samples:
+            part = next(self._parts, None)
+            if part is None:
+                missing = samples - self._rest.shape[1]
+                part = np.zeros((self.channels, missing), dtype=np.float32)
+            self._rest = np.concatenate([self._rest, part], axis=1)
+        taken, self._rest = self._rest[:, :samples], self._rest[:, samples:]
+        return np.ascontiguousarray(taken)
+
+    def _samples(self) -> Any:
+        while self._silence > 0:
+            count = min(self._silence, BLOCK)
+            self._silence -= count
+            yield np.zeros((self.channels, count), dtype=np.float32)
+        resampler = self._av.AudioResampler(format="fltp", layout=self.layout, rate=self.rate)
+        for frame in self._decoded(resampler):
+            if self._skip >= frame.samples:
+                self._skip -= frame.samples
+                continue
+            yield frame.to_ndarray()[:, self._skip :]
+            self._skip = 0
+
+    def _decoded(self, resampler: Any) -> Iterator[Any]:
+        try:
+            for frame in self._container.decode(self._stream):
+                frame.pts = None  # sound is what follows: times of damaged files do not matter
+                yield from resampler.resample(frame)
+            yield from resampler.resample(None)
+        except (self._av.error.FFmpegError, ValueError) as error:  # or its format changes on the way
+            raise FormatError(f"the sound is damaged: {error}", path=self._path) from error
+
+
+def check(path: PathLike) -> None:
+    """Raise FormatError where a file cannot be read as sound."""
+    Soundtrack(path, Fraction(0)).close()

@@ -1,0 +1,172 @@
+"""All that is over the picture: the imgui context, the bar, the panels. Draws in a window or into memory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import imgui, implot
+
+from fba_player.session.controls import Controls
+from fba_player.ui import theme
+from fba_player.ui.bar import Bar
+from fba_player.ui.hud import draw_buttons, draw_name, draw_notices, draw_recording
+from fba_player.ui.imgui_renderer import ImguiRenderer
+from fba_player.ui.panels.registry import make_panels
+from fba_player.ui.panel_windows import Places
+from fba_player.session.session import Session
+
+HIDES = 3.0
+"""Seconds without the mouse after which the bar hides itself while playing."""
+FADE = 0.25
+FRAMES_AFTER = 3
+"""Pictures that imgui needs after an input until all has settled."""
+FAR = -3.0e38
+
+
+class Gui:
+    """The panels of one session on a moderngl context; see `draw`. `close` gives everything back.
+
+    hides: whether the bar hides itself while playing. Raises RuntimeError where this build of imgui
+    cannot be used.
+    """
+
+    def __init__(self, context: Any, session: Session, *, hides: bool = True) -> None:
+        self.session = session
+        self.controls = Controls(session)
+        self.hides = hides
+        self._context: Any = imgui.create_context()
+        imgui.set_current_context(self._context)
+        self._plots = implot.create_context()
+        io = imgui.get_io()
+        io.set_ini_filename(None)
+        io.config_windows_move_from_title_bar_only = True
+        io.config_input_trickle_event_queue = True
+        theme.apply_theme()
+        self._renderer = ImguiRenderer(context)
+        self.bar = Bar(self._renderer)
+        self.panels = make_panels()
+        self._places = Places()
+        self._open: set[str] = set()
+        self._cover()
+        session.viewpoint.camera = session.viewpoint.beginning
+        self._button = -1
+        self._listed = False
+        self.shown = 1.0
+        """How much of the bar is there, 0 to 1."""
+
+    @property
+    def io(self) -> imgui.IO:
+        """Where input goes, in points: `add_mouse_pos_event` and its like."""
+        imgui.set_current_context(self._context)
+        return imgui.get_io()
+
+    @property
+    def cursor(self) -> str:
+        """What the mouse looks like over what is under it: imgui's name, such as "arrow"."""
+        imgui.set_current_context(self._context)
+        shape = imgui.get_mouse_cursor()
+        return imgui.MouseCursor_(shape).name or "arrow"
+
+    def draw(self, delta: float) -> None:
+        """Draw over the bound framebuffer, of the session's size; delta: seconds since the last time.
+
+        Input over the picture moves the camera.
+        """
+        session = self.session
+        io = self.io
+        implot.set_current_context(self._plots)
+        scale = session.scale
+        display = (session.size[0] / scale, session.size[1] / scale)
+        io.display_size = imgui.ImVec2(*display)
+        io.display_framebuffer_scale = imgui.ImVec2(scale, scale)
+        io.delta_time = min(max(delta, 1e-4), 0.25)
+        self._cover()
+        session.viewpoint.refit()
+        imgui.new_frame()
+        if imgui.get_frame_count() > 2:  # before, imgui does not know what is where
+            self._mouse(io)
+        if not session.bare:
+            self._draw_all(display, io)
+        if session.recording is None:  # a film does not move because a panel is opened
+            sides = (0.0, 0.0) if session.bare else self._places.sides
+            session.viewpoint.uncover(*sides, smoothly=self.hides)
+        draw_notices(session, display, self.bar.height(display) * self.shown if not session.bare else 0.0)
+        self._popups()
+        imgui.render()
+        self._renderer.draw(imgui.get_draw_data())
+
+    def close(self) -> None:
+        """Give everything back; safe to call twice."""
+        if self._context is None:
+            return
+        imgui.set_current_context(self._context)
+        for panel in self.panels:
+            panel.closed(self.session)
+        self._renderer.close()
+        implot.destroy_context(self._plots)
+        imgui.destroy_context(self._context)
+        self._context = None
+
+    def _popups(self) -> None:
+        """Whether a list is open, which the session may have closed."""
+        flags = imgui.PopupFlags_
+        there = imgui.is_popup_open("", flags.any_popup_id | flags.any_popup_level)
+        if there and self._listed and not self.session.popup:
+            imgui.internal.close_popup_to_level(0, True)
+            there = False
+        self._listed = self.session.popup = there
+
+    def _cover(self) -> None:
+        """Tell the camera how much of the picture the bar takes."""
+        session = self.session
+        wide, high = (pixels / session.scale for pixels in session.size)
+        session.viewpoint.covered = 0.0 if session.bare else self.bar.height((wide, high)) / max(high, 1.0)
+
+    def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:
+        session = self.session
+        self._hide(io)
+        below = self.bar.height(display)
+        taken = draw_recording(session)
+        if self.shown > 0:
+            imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
+            self.bar.draw(session, display)
+            there = [panel for panel in self.panels if panel.available(session)]
+            draw_name(session, display, taken, draw_buttons(session, there, display) - 20)
+            imgui.pop_style_var()
+        gone = self._open - session.open
+        self._places.forget(gone)
+        for panel in self.panels:
+            if panel.name in gone:
+                panel.closed(session)
+            elif panel.name in session.open and not panel.available(session):
+                session.open.discard(panel.name)
+                session.say(f"{panel.title}: there is nothing to show here", "warning")
+        there = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
+        self._places.draw(there, session, display, below)
+        self._open = set(session.open)
+
+    def _hide(self, io: imgui.IO) -> None:
+        session = self.session
+        busy = imgui.is_any_item_active() or (io.want_capture_mouse and session.idle < 10 * HIDES)
+        away = self.hides and session.transport.playing and session.idle > HIDES and not busy
+        step = io.delta_time / FADE
+        self.shown = max(self.shown - step, 0.0) if away else min(self.shown + 2 * step, 1.0)
+
+    def _mouse(self, io: imgui.IO) -> None:
+        """The mouse over the picture, where no panel is under it."""
+        controls, scale = self.controls, self.session.scale
+        x, y = io.mouse_pos.x * scale, io.mouse_pos.y * scale
+        if controls.holding:
+            controls.move(x, y)
+            if not imgui.is_mouse_down(self._button):
+                controls.release()
+        elif not io.want_capture_mouse:
+            for button, name in enumerate(("left", "right", "middle")):
+                if imgui.is_mouse_clicked(button):
+                    self._button = button
+                    controls.press(name, x, y)
+                    break
+            if imgui.is_mouse_double_clicked(0):
+                self.session.viewpoint.reset()
+            if io.mouse_wheel:
+                controls.scroll(io.mouse_wheel)

@@ -1,0 +1,85 @@
+"""F1: what keys and mouse do."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from fba_player.ui import theme
+from fba_player.session.keys import keys, mouse
+from fba_player.ui.panels.panel import Panel, heading
+from fba_player.session.session import Session
+
+WIDE = 296.0
+"""Points that a column needs."""
+KEY = 104.0
+"""Points of it for the keys."""
+
+
+class HelpPanel(Panel):
+    """All keys, from the table of keys, those of switches, and the mouse; in columns where they fit."""
+
+    name, title, label = "help", "Keys and mouse", "Help"
+    side = "middle"
+    width, height = 1240.0, 520.0
+
+    def draw(self, session: Session) -> None:
+        """Draw it."""
+        groups = _groups(session)
+        columns = min(int(imgui.get_content_region_avail().x // WIDE), 4)
+        imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
+        if columns > 1 and imgui.begin_table("columns", columns):
+            imgui.table_next_row()
+            for chosen in _columns(columns):
+                imgui.table_next_column()
+                for name in chosen:
+                    _group(name, groups.get(name, []))
+            imgui.end_table()
+        elif columns <= 1:
+            for name, rows in groups.items():
+                _group(name, rows)
+        imgui.pop_style_var()
+
+
+def _columns(count: int) -> list[list[str]]:
+    """The names of the groups in so many columns, 2 to 4."""
+    if count == 2:
+        return [["Play", "Keep", "Window"], ["View", "Switches", "Mouse"]]
+    if count == 3:
+        return [["Play"], ["View", "Switches", "Keep"], ["Window", "Mouse"]]
+    return [["Play"], ["View", "Switches", "Keep"], ["Window"], ["Mouse"]]
+
+
+def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
+    """(keys, what they do) by the name of their group."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for row in keys():
+        found.setdefault(row.group, []).append((row.shown, row.does))
+    found["Switches"] = session.switch_keys()
+    found["Mouse"] = list(mouse())
+    return found
+
+
+def _group(name: str, rows: list[tuple[str, str]]) -> None:
+    if not rows:
+        return
+    heading(name)
+    imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY)
+    imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
+    for key, does in rows:
+        _line(key, does)
+    imgui.end_table()
+
+
+def _line(key: str, does: str) -> None:
+    imgui.table_next_row()
+    imgui.table_next_column()
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(key)
+    imgui.pop_text_wrap_pos()
+    imgui.table_next_column()
+    imgui.push_style_color(imgui.Col_.text, theme.FAINT)
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(does)
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()

@@ -1,0 +1,72 @@
+"""The puppeteer's visemes and expressions."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
+from fba_player.session.performer import Performer
+from fba_player.session.puppet import Expression, Viseme
+from fba_player.ui import theme
+from fba_player.ui.panels.panel import heading
+
+
+def speech(performer: Performer) -> None:
+    """Two visemes and how they mix."""
+    heading("Visemes")
+    puppet, now = performer.puppet, performer.puppet.viseme
+    first = _choice("first##viseme", VISEMES, now.select1)
+    second = _choice("second##viseme", VISEMES, now.select2)
+    imgui.set_next_item_width(-100)
+    _, blend = imgui.slider_int("share of first", now.blend, 0, INTENSITY_MAX, "%d",
+                                imgui.SliderFlags_.always_clamp)  # fmt: skip
+    if (first, second, blend) != (now.select1, now.select2, now.blend):
+        puppet.viseme = Viseme(first, second, blend)
+    if _release("viseme", there=puppet.speaks):
+        puppet.viseme = Viseme()
+
+
+def mood(performer: Performer) -> None:
+    """Two expressions and how strong they are."""
+    heading("Expressions")
+    puppet, now = performer.puppet, performer.puppet.expression
+    chosen = []
+    for word, which, strong in (
+        ("first", now.select1, now.intensity1),
+        ("second", now.select2, now.intensity2),
+    ):
+        select = _choice(f"{word}##expression", EXPRESSIONS, which)
+        imgui.set_next_item_width(-100)
+        _, intensity = imgui.slider_int(f"intensity##{word}", strong, 0, INTENSITY_MAX, "%d",
+                                        imgui.SliderFlags_.always_clamp)  # fmt: skip
+        chosen += [select, intensity]
+    if chosen != [now.select1, now.intensity1, now.select2, now.intensity2]:
+        puppet.expression = Expression(*chosen)
+    if _release("expression", there=puppet.feels):
+        puppet.expression = Expression()
+    imgui.dummy((1, 4))
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_colored(
+        theme.FAINT,
+        "A viseme takes the place of what the mouth does; expressions are added to what is played. "
+        "Sliders win over both.",
+    )
+    imgui.pop_text_wrap_pos()
+
+
+def _release(what: str, *, there: bool) -> bool:
+    """A button that is always at its place, so that nothing moves away from under the mouse."""
+    imgui.begin_disabled(not there)
+    pressed = imgui.button(f"Release##{what}")
+    imgui.end_disabled()
+    return bool(pressed and there)
+
+
+def _choice(label: str, names: tuple[str, ...], now: int) -> int:
+    imgui.set_next_item_width(-100)
+    if imgui.begin_combo(label, f"{now} {names[now]}" if now else "none"):
+        for number, name in enumerate(names):
+            if imgui.selectable(f"{number} {name}" if number else "none", number == now)[0]:
+                now = number
+        imgui.end_combo()
+    return now

@@ -1,0 +1,29 @@
+"""The panels that there are, in the order of their buttons."""
+
+from __future__ import annotations
+
+from fba_player.ui.panels.camera_panel import CameraPanel
+from fba_player.ui.panels.curves_panel import CurvesPanel
+from fba_player.ui.panels.differences_panel import DifferencesPanel
+from fba_player.ui.panels.file_panel import FilePanel
+from fba_player.ui.panels.help_panel import HelpPanel
+from fba_player.ui.panels.panel import Panel
+from fba_player.ui.panels.puppet_panel import PuppetPanel
+from fba_player.ui.panels.rate_panel import RatePanel
+from fba_player.ui.panels.view_panel import ViewPanel
+
+PANELS: tuple[type[Panel], ...] = (
+    FilePanel,
+    ViewPanel,
+    CameraPanel,
+    CurvesPanel,
+    RatePanel,
+    PuppetPanel,
+    DifferencesPanel,
+    HelpPanel,
+)
+
+
+def make_panels() -> list[Panel]:
+    """One object of each."""
+    return [kind() for kind in PANELS]

@@ -1,0 +1,66 @@
+"""F3: what is shown, and how: the scene's switches."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
+from fba_player.view.switches import Switch, Switches
+from fba_player.ui.panels.panel import Panel, heading, tooltip
+from fba_player.session.session import Session
+
+
+class ViewPanel(Panel):
+    """Each switch of the scene as what suits it: a tick, a choice, a FAP."""
+
+    name, title, label = "view", "View", "View"
+    width, height, fitted, least = 300.0, 430.0, True, 190.0
+
+    def draw(self, session: Session) -> None:
+        scene = session.scene
+        if hasattr(scene, "view"):
+            heading("Shown as")
+            for number, (name, text) in enumerate((("figure", "figure"), ("points", "points and bones"))):
+                if number:
+                    imgui.same_line()
+                if imgui.radio_button(text, scene.view == name):
+                    scene.view = name
+        table = session.switch_table()
+        if not table:
+            return
+        heading("Switches")
+        switches = scene.switches
+        for switch in table.values():
+            if switch.kind == "flag":
+                changed, on = imgui.checkbox(switch.label, bool(switches[switch.name]))
+                if changed:
+                    scene.show(switch.name, on)
+            elif switch.kind == "choice":
+                _choice(switch, switches)
+            else:
+                _fap(switch, switches)
+            tooltip(switch.description, session.switch_key(switch))
+        if switches.changed and imgui.button("As at the beginning", (-1, 0)):
+            for name in switches.changed:
+                scene.show(name, table[name].default)
+
+
+def _choice(switch: Switch, switches: Switches) -> None:
+    imgui.set_next_item_width(132)
+    if imgui.begin_combo(switch.label, str(switches[switch.name])):
+        for word in switch.choices:
+            if imgui.selectable(word, switches[switch.name] == word)[0]:
+                switches.show(switch.name, word)
+        imgui.end_combo()
+
+
+def _fap(switch: Switch, switches: Switches) -> None:
+    imgui.set_next_item_width(132)
+    if imgui.begin_combo(switch.label, switches.text(switch.name)):
+        if imgui.selectable("off", switches[switch.name] is None)[0]:
+            switches.show(switch.name, None)
+        for number in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1):
+            chosen = switches[switch.name] == number
+            if imgui.selectable(f"{number} {faps()[number - 1].name}", chosen)[0]:
+                switches.show(switch.name, number)
+        imgui.end_combo()

@@ -1,0 +1,149 @@
+"""Pictures of the window with its panels, without a window: for tests and for the documentation.
+
+python -m fba_player.ui.window_picture talk.fba -o window.png --panels file,view --time 1.5
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba_player.gl.context import offscreen_context
+from fba_player.gl.renderer import Renderer
+from fba_player.gl.framebuffer import Target
+from fba_player.session.session import Session
+
+UInt8 = npt.NDArray[np.uint8]
+
+SETTLES = 4
+"""Pictures until panels have found their size and place."""
+
+
+class Studio:
+    """A window's inside without the window: `draw` shows a session as its window would.
+
+    Raises DisplayError where there is no OpenGL, ImportError where there is no imgui.
+    """
+
+    def __init__(self, session: Session) -> None:
+        from fba_player.ui.gui import Gui
+
+        self.session = session
+        self._gl: Any = offscreen_context()
+        self._target: Target | None = None
+        self._renderer: Renderer | None = None
+        self._screen: Any = None
+        self._colour: Any = None
+        try:
+            with self._gl:
+                self._renderer = Renderer(self._gl)
+                self.gui = Gui(self._gl, session, hides=False)
+        except Exception:
+            self.close()
+            raise
+
+    def draw(self, pictures: int = 1, delta: float = 1 / 60) -> UInt8:
+        """Draw so many pictures, `delta` seconds apart; the last as uint8 (H, W, 4), top row first.
+
+        Those before the last are only for the panels to settle: the scene is not drawn in them.
+        """
+        session = self.session
+        with self._gl:
+            if self._target is None or self._target.size != session.size:
+                self._resize()
+            for number in range(pictures):
+                if number == pictures - 1:
+                    self._draw_scene()
+                self._screen.use()
+                self.gui.draw(delta)
+            data = self._screen.read(components=4)
+        width, height = session.size
+        return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]
+
+    def close(self) -> None:
+        """Give everything back; safe to call twice."""
+        if self._gl is None:
+            return
+        with self._gl:
+            for part in (getattr(self, "gui", None), self._renderer, self._target):
+                if part is not None:
+                    part.close()
+            self._release_screen()
+        self._gl.release()
+        self._gl = None
+
+    def __enter__(self) -> Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _draw_scene(self) -> None:
+        assert self._target is not None
+        assert self._renderer is not None
+        session = self.session
+        time = session.transport.time
+        self._target.begin()
+        within = self._renderer.draw(session.view(time), session.camera(time), session.size)
+        self._target.finish(self._screen, within)
+
+    def _resize(self) -> None:
+        if self._target is not None:
+            self._target.close()
+        self._release_screen()
+        self._target = Target(self._gl, self.session.size, samples=0)
+        self._colour = self._gl.renderbuffer(self.session.size, 4)
+        self._screen = self._gl.framebuffer([self._colour])
+
+    def _release_screen(self) -> None:
+        if self._screen is not None:
+            self._screen.release()
+            self._colour.release()
+            self._screen = None
+
+
+def picture(session: Session, panels: tuple[str, ...] = ()) -> UInt8:
+    """The session's window with these panels open: uint8 (H, W, 4), top row first."""
+    session.source.look(wait=True)
+    session.open |= set(panels)
+    with Studio(session) as studio:
+        return studio.draw(SETTLES).copy()
+
+
+def main(arguments: list[str]) -> int:
+    """The command; see the module's text."""
+    import argparse
+
+    from PIL import Image
+
+    import fba
+    from fba_player.scene.scene import Scene
+    from fba_player.session.source import Source
+
+    parser = argparse.ArgumentParser(prog="python -m fba_player.ui.window_picture", description=__doc__)
+    parser.add_argument("file")
+    parser.add_argument("-o", "--output", required=True)
+    parser.add_argument("--panels", default="", help="names with commas between them")
+    parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--scale", type=float, default=1.0)
+    parser.add_argument("--time", type=float, default=0.0)
+    parser.add_argument("--marks", help="IN,OUT in seconds")
+    parser.add_argument("--fps")
+    given = parser.parse_args(arguments)
+    wide, high = (int(part) for part in given.size.split("x"))
+    animation = fba.read(given.file, **({"fps": given.fps} if given.fps else {}))
+    scene = Scene(animation)
+    session = Session(scene, source=Source(scene, given.file), size=(wide, high), scale=given.scale)
+    session.transport.seek(given.time)
+    if given.marks:
+        session.transport.mark_in, session.transport.mark_out = (float(m) for m in given.marks.split(","))
+    chosen = tuple(name for name in given.panels.split(",") if name)
+    Image.fromarray(picture(session, chosen)).convert("RGB").save(given.output)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,245 @@
+"""What a scene hands to a renderer: meshes, capsules and eyes in the world, at one moment.
+
+The seam between "what is shown" (`Scene`) and "how" (`Renderer`): a face mesh or a skinned body is one
+more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres; the ground is y = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from fba_player.mesh.simplify import Coarser
+    from fba_player.view.annotations import Extras
+    from fba_player.mesh.texture_image import FacePicture
+    from fba_player.mesh.lazy_vertices import Places, Whole
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.intp]
+
+CAPSULE_FLOATS = 16
+"""A capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshShape:
+    """What does not change from frame to frame; keep the object, renderers remember it.
+
+    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light 0..1,
+    the fourth how glossy. two_sided: False where the inside is to look dark, as that of a mouth. raised:
+    above 0 for thin lines on another mesh: they are drawn over what hides them by less (m), and never
+    thinner than about a pixel.
+    """
+
+    triangles: npt.NDArray[np.int32]
+    colours: Float32
+    two_sided: bool = False
+    raised: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A mesh in one pose: positions and normals float32 (V, 3), matrix (4, 4) into the world."""
+
+    shape: MeshShape
+    positions: Float32
+    normals: Float32
+    matrix: Float64
+
+
+@dataclass(frozen=True, eq=False)
+class FaceShape:
+    """What does not change in a part of a face; keep the object, renderers remember it.
+
+    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light, the
+    fourth how glossy. sway: float32 (V,), 1 where it goes with the head, 0 where it stands, as shoulders
+    do. texcoords: float32 (V, 2), origin at the picture's top left. picture: what
+    the colours are multiplied with. scatter: how far light wanders below the surface: 1 skin, 0 cloth.
+    fine: strength of the skin's relief, and how often it repeats over the picture. two_sided: False where
+    the inside is to look dark. across: float32 (V, 8), of single hairs: from the vertex opposite to each,
+    half the hair's width there (m), direction to the tip, and 1 or -1 on its two sides; hairs are never
+    drawn thinner than a pixel, but fainter. closed: nobody sees into it, so its inside is not drawn.
+    name, kind: of the part that it was made from, "" where there is none. coarser: the same with fewer
+    triangles, for when it is small on the screen; None where it is always drawn as it is. smooth: False where
+    its triangles are so large that their light changes visibly within them.
+    """
+
+    triangles: npt.NDArray[np.int32]
+    colours: Float32
+    sway: Float32
+    texcoords: Float32 | None = None
+    picture: FacePicture | None = None
+    scatter: float = 0.0
+    fine: tuple[float, float] = (0.0, 1.0)
+    two_sided: bool = False
+    across: Float32 | None = None
+    closed: bool = False
+    name: str = ""
+    kind: str = ""
+    coarser: Coarser | None = None
+    smooth: bool = True
+
+    @property
+    def see_through(self) -> bool:
+        """Whether it is to be drawn over what is behind: its picture is not everywhere, or it is of hairs."""
+        return (self.picture is not None and not self.picture.opaque) or self.across is not None
+
+
+@dataclass(frozen=True, eq=False)
+class FaceMesh:
+    """A part of a face in one pose.
+
+    places: positions and normals, float32 (V, 3), without the head's rotation. reaching: float32 (V, 4),
+    0..1, what reaches each vertex past the rest of the face: of the key light, of the open sky, through
+    the skin from behind, of the rim light; or what gives that for chosen vertices (N,), or for None, all.
+    matrix: (4, 4) into the world. turn: (3,) axis of the head's rotation times its angle, about centre (3,),
+    in the frame of the positions. away: from the camera that it is drawn for, in its own unit; None where
+    that is not known. Arrays are not written to any more: renderers know what they have by its identity.
+    """
+
+    shape: FaceShape
+    places: Places
+    reaching: Float32 | Callable[[Rows | None], Float32]
+    matrix: Float64
+    turn: Float64
+    centre: Float64
+    away: float | None = None
+
+    @property
+    def positions(self) -> Float32:
+        """float32 (V, 3), worked out for all of the figure with the first that is asked for."""
+        return self.places.positions
+
+    @property
+    def normals(self) -> Float32:
+        """float32 (V, 3), likewise."""
+        return self.places.normals
+
+    def afresh(self, wholes: dict[int, Whole]) -> FaceMesh:
+        """The same, with nothing worked out yet; wholes: see `Places.afresh`."""
+        return replace(self, places=self.places.afresh(wholes))
+
+    @cached_property
+    def light(self) -> Float32:
+        """What reaches each vertex: float32 (V, 4)."""
+        return self.reaching(None) if callable(self.reaching) else self.reaching
+
+    def light_at(self, rows: Rows) -> Float32:
+        """The same for chosen vertices: float32 (N, 4)."""
+        return self.reaching(rows) if callable(self.reaching) else self.reaching.take(rows, axis=0)
+
+
+class ChosenLight:
+    """What reaches chosen vertices (N,), worked out where it is asked for; of: what gives it."""
+
+    def __init__(self, of: Callable[[Rows | None], Float32], rows: Rows) -> None:
+        self.of = of
+        self._rows = rows
+        self._found: Float32 | None = None
+
+    def __call__(self, rows: Rows | None) -> Float32:
+        """float32 (M, 4) at some of them, (M,), or at all; of all the same array each time."""
+        if self._found is None:
+            self._found = self.of(self._rows)
+        return self._found if rows is None else self._found.take(rows, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class Eye:
+    """An eyeball. matrix (4, 4): its frame (looking along +z, radius 1) into the world.
+
+    iris, pupil: their radii as fractions of the eyeball's. lids: (4, 3), middles of the upper and the
+    lower lid's margin, outer and inner corner, from the eyeball's centre in the axes of the head, as
+    fractions of its radius: they shade it. axes: (3, 3), the head's in the world, in columns. tint: of
+    the iris, linear light.
+    """
+
+    matrix: Float64
+    iris: float
+    pupil: float
+    lids: Float64
+    axes: Float64
+    tint: tuple[float, float, float] = (0.075, 0.105, 0.10)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Everything to be drawn at one moment.
+
+    capsules: float32 (N, 16), see `CAPSULE_FLOATS`. marks: the same, but what hides them lets them shine
+    through a little. blobs: float32 (K, 4), soft shadows on the ground:
+    x, z, radius, darkness. ground: whether there is a ground. background: colour behind everything (sRGB,
+    0..1, as shown) instead of the studio. extras: what is drawn over the figure, see `fba_player.view.annotations`.
+    """
+
+    meshes: list[Mesh] = field(default_factory=list)
+    capsules: Float32 = field(default_factory=lambda: np.zeros((0, CAPSULE_FLOATS), dtype=np.float32))
+    marks: Float32 = field(default_factory=lambda: np.zeros((0, CAPSULE_FLOATS), dtype=np.float32))
+    eyes: list[Eye] = field(default_factory=list)
+    faces: list[FaceMesh] = field(default_factory=list)
+    blobs: Float32 = field(default_factory=lambda: np.zeros((0, 4), dtype=np.float32))
+    ground: bool = False
+    background: tuple[float, float, float] | None = None
+    extras: Extras | None = None
+
+
+def spheres(places: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:
+    """(N, 16) capsules that are spheres: places (N, 3) and radii (N,), metres; colour and gloss."""
+    centres = np.asarray(places, dtype=np.float32)
+    found = np.zeros((len(centres), CAPSULE_FLOATS), dtype=np.float32)
+    found[:, 0:3] = centres
+    found[:, 4:7] = centres + np.array([0.0, 2e-5, 0.0], dtype=np.float32)  # an axis needs some length
+    found[:, 3] = found[:, 7] = radii
+    found[:, 8:12] = (0.0, 0.0, 1.0, 1.0)
+    found[:, 12:16] = colour
+    return found
+
+
+def srgb(text: str) -> tuple[float, float, float]:
+    """A colour written "#rrggbb" in sRGB, as linear light."""
+    values = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values)
+    return red, green, blue
+
+
+def rotation_vector(matrix: Float64) -> Float64:
+    """(3,) axis of a rotation (3, 3) times its angle, 0..pi."""
+    # The quaternion, by its largest component: exact near half a turn too.
+    trace = float(np.trace(matrix))
+    squares = np.array([trace, *np.diag(matrix)])
+    largest = int(squares.argmax())
+    if largest == 0:
+        q = np.array([
+            1 + trace,
+            matrix[2, 1] - matrix[1, 2],
+            matrix[0, 2] - matrix[2, 0],
+            matrix[1, 0] - matrix[0, 1],
+        ])  # fmt: skip
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = np.zeros(4)
+        q[0] = matrix[k, j] - matrix[j, k]
+        q[1 + i] = 1 + 2 * matrix[i, i] - trace
+        q[1 + j], q[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
+    q = q / np.linalg.norm(q)
+    sine = float(np.linalg.norm(q[1:]))
+    if sine < 1e-12:
+        return np.zeros(3)
+    angle = 2 * np.arctan2(sine, abs(q[0])) * (1 if q[0] >= 0 else -1)
+    vector: Float64 = q[1:] / sine * angle
+    return vector
+
+
+def translation(offset: npt.ArrayLike) -> Float64:
+    """(4, 4) matrix of a shift."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix

@@ -1,0 +1,41 @@
+"""Whether there is a display for a window: glfw, the library that opens it, knows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fba.errors import DisplayError
+from fba_player.gl.system_libraries import cure
+
+HOW_WITHOUT = (
+    "On a machine without a display, `fba render FILE -o OUT.mp4` makes a film instead; "
+    "with one, check that the variable DISPLAY (or WAYLAND_DISPLAY) is set"
+)
+
+
+def check_display() -> None:
+    """Raises DisplayError, which says what to do, where no window can be opened. Takes no time."""
+    started_glfw([]).terminate()
+
+
+def started_glfw(problems: list[str]) -> Any:
+    """The module glfw, ready for a window. What it reports from now on is added to problems.
+
+    Raises DisplayError where it is not installed or finds no display.
+    """
+    try:
+        import glfw
+    except ImportError as error:
+        raise DisplayError(
+            f"the window needs the Python package glfw, which cannot be used: {error}. "
+            f"{cure(error, 'glfw')}. {HOW_WITHOUT}"
+        ) from error
+    glfw.set_error_callback(lambda code, text: problems.append(_text(text)))
+    if not glfw.init():
+        reason = problems[-1] if problems else "there is no display"
+        raise DisplayError(f"no window can be opened: {reason}. {HOW_WITHOUT}")
+    return glfw
+
+
+def _text(value: bytes | str) -> str:
+    return value.decode(errors="replace") if isinstance(value, bytes) else value

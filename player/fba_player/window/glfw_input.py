@@ -1,0 +1,215 @@
+"""glfw's keyboard and mouse -> the names of the table of keys, and -> imgui."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fba_player.session.controls import Controls
+from fba_player.session.session import Session
+
+SHAPES = {
+    "text_input": "IBEAM_CURSOR",
+    "hand": "HAND_CURSOR",
+    "resize_ew": "HRESIZE_CURSOR",
+    "resize_ns": "VRESIZE_CURSOR",
+}
+"""glfw's name of imgui's cursors; an arrow for all others."""
+BUTTONS = ("left", "right", "middle")
+NAMED = {
+    "SPACE": "space", "LEFT": "left", "RIGHT": "right", "UP": "up", "DOWN": "down", "HOME": "home",
+    "END": "end", "ESCAPE": "esc", "ENTER": "enter", "TAB": "tab", "BACKSPACE": "backspace",
+    "DELETE": "delete", "KP_ADD": "+", "KP_SUBTRACT": "-", "EQUAL": "+", "MINUS": "-",
+    **{f"F{number}": f"f{number}" for number in range(1, 13)},
+    **{f"KP_{number}": str(number) for number in range(10)},
+}  # fmt: skip
+"""Keys that bear no letter, by glfw's name; and those that mean the same on every keyboard."""
+PLACES = {
+    "LEFT_BRACKET": "[", "RIGHT_BRACKET": "]", "BACKSLASH": "\\",
+    **{str(number): str(number) for number in range(10)},
+    **{letter: letter.lower() for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"},
+}  # fmt: skip
+"""What a US keyboard has where the user's own has something that means nothing here."""
+
+
+class GlfwInput:
+    """Hears a glfw window's events and hands them to the panels and the controls.
+
+    gui: a `fba_player.ui.gui.Gui`, or None where there are no panels. heard: called after each event that may
+    change the picture.
+    """
+
+    def __init__(
+        self,
+        glfw: Any,
+        window: Any,
+        session: Session,
+        controls: Controls,
+        gui: Any,
+        heard: Callable[[], None],
+    ) -> None:
+        self._glfw, self._window = glfw, window
+        self._session, self._controls, self._gui = session, controls, gui
+        self._heard = heard
+        self._named = {getattr(glfw, f"KEY_{name}"): word for name, word in NAMED.items()}
+        self._places = {getattr(glfw, f"KEY_{name}"): word for name, word in PLACES.items()}
+        self._shape = "arrow"
+        self._cursors: dict[str, Any] = {}
+        self._imgui_keys: dict[int, Any] = _imgui_keys(glfw) if gui is not None else {}
+        glfw.set_key_callback(window, self.on_key)
+        glfw.set_char_callback(window, self.on_character)
+        glfw.set_mouse_button_callback(window, self.on_button)
+        glfw.set_cursor_pos_callback(window, self.on_move)
+        glfw.set_cursor_enter_callback(window, self.on_enter)
+        glfw.set_scroll_callback(window, self.on_scroll)
+        glfw.set_window_focus_callback(window, self.on_focus)
+        glfw.set_drop_callback(window, self.on_drop)
+        glfw.set_framebuffer_size_callback(window, lambda *_: heard())
+        glfw.set_window_refresh_callback(window, lambda *_: heard())
+
+    def on_key(self, window: Any, key: int, code: int, action: int, modifiers: int) -> None:
+        """A key went down, is held, or went up."""
+        glfw = self._glfw
+        if self._gui is not None:
+            self._tell_imgui(key, action, modifiers)
+            if action != glfw.RELEASE and self._gui.io.want_text_input:
+                return
+        if action == glfw.RELEASE:
+            return
+        name = self.name(key, code, modifiers)
+        if name is not None:
+            self._controls.key(name, held=action == glfw.REPEAT)
+        self._heard()
+
+    def on_drop(self, window: Any, paths: list[str]) -> None:
+        """Files were dropped onto the window: it closes, for them to be opened, if they can be."""
+        self._session.drop(tuple(Path(_text(path)) for path in paths))
+        self._heard()
+
+    def on_character(self, window: Any, character: int) -> None:
+        """A character was typed."""
+        if self._gui is not None:
+            self._gui.io.add_input_character(character)
+            self._heard()
+
+    def on_button(self, window: Any, button: int, action: int, modifiers: int) -> None:
+        """A mouse button went down or up."""
+        down = action == self._glfw.PRESS
+        self._session.touched()
+        if self._gui is not None:
+            if button < 5:
+                self._gui.io.add_mouse_button_event(button, down)
+        elif down and button < len(BUTTONS):
+            self._controls.press(BUTTONS[button], *self.pixels(*self._glfw.get_cursor_pos(window)))
+        else:
+            self._controls.release()
+        self._heard()
+
+    def on_move(self, window: Any, x: float, y: float) -> None:
+        """The mouse moved; x, y in the window's own units."""
+        self._session.touched()
+        right, down = self.pixels(x, y)
+        if self._gui is not None:
+            scale = self._session.scale
+            self._gui.io.add_mouse_pos_event(right / scale, down / scale)
+        else:
+            self._controls.move(right, down)
+        self._heard()
+
+    def on_enter(self, window: Any, entered: int) -> None:
+        """The mouse came into the window or left it."""
+        if self._gui is not None and not entered:
+            self._gui.io.add_mouse_pos_event(-3.4e38, -3.4e38)
+        self._heard()
+
+    def on_scroll(self, window: Any, right: float, up: float) -> None:
+        """The wheel was turned."""
+        self._session.touched()
+        if self._gui is not None:
+            self._gui.io.add_mouse_wheel_event(right, up)
+        else:
+            self._controls.scroll(up)
+        self._heard()
+
+    def on_focus(self, window: Any, focused: int) -> None:
+        """The window got the keyboard or lost it."""
+        if self._gui is not None:
+            self._gui.io.add_focus_event(bool(focused))
+
+    def point(self, *, hidden: bool) -> None:
+        """Give the mouse the shape that fits what is under it, or hide it."""
+        glfw = self._glfw
+        shape = "hidden" if hidden else self._gui.cursor if self._gui is not None else "arrow"
+        if shape == self._shape:
+            return
+        self._shape = shape
+        mode = glfw.CURSOR_HIDDEN if hidden else glfw.CURSOR_NORMAL
+        glfw.set_input_mode(self._window, glfw.CURSOR, mode)
+        if hidden:
+            return
+        kind = SHAPES.get(shape)
+        if kind is not None and shape not in self._cursors:
+            self._cursors[shape] = glfw.create_standard_cursor(getattr(glfw, kind))
+        glfw.set_cursor(self._window, self._cursors.get(shape))
+
+    def name(self, key: int, code: int, modifiers: int) -> str | None:
+        """A key's name in the table of keys: "space", "l", "shift+left", "ctrl+s"; None for none."""
+        glfw = self._glfw
+        word = self._named.get(key)
+        if word is None:
+            text = glfw.get_key_name(key, code)  # what the user's own keyboard layout has there
+            word = _text(text).lower() if text else None
+            if word is None or (key in self._places and not self._known(word)):
+                word = self._places.get(key, word)
+        if word is None:
+            return None
+        control = modifiers & (glfw.MOD_CONTROL | glfw.MOD_SUPER)
+        shift = modifiers & glfw.MOD_SHIFT and (control or len(word) > 1)
+        return ("ctrl+" if control else "") + ("shift+" if shift else "") + word
+
+    def pixels(self, x: float, y: float) -> tuple[float, float]:
+        """The window's units to pixels of the picture."""
+        wide, high = self._glfw.get_window_size(self._window)
+        size = self._glfw.get_framebuffer_size(self._window)
+        return x * size[0] / max(wide, 1), y * size[1] / max(high, 1)
+
+    def _known(self, word: str) -> bool:
+        from fba_player.session.keys import by_name
+
+        return word in by_name() or any(
+            self._session.switch_key(one).lower() == word for one in self._session.switch_table().values()
+        )
+
+    def _tell_imgui(self, key: int, action: int, modifiers: int) -> None:
+        from imgui_bundle import imgui
+
+        glfw, io = self._glfw, self._gui.io
+        if action == glfw.REPEAT:
+            return
+        for mask, word in (
+            (glfw.MOD_CONTROL, imgui.Key.mod_ctrl),
+            (glfw.MOD_SHIFT, imgui.Key.mod_shift),
+            (glfw.MOD_ALT, imgui.Key.mod_alt),
+            (glfw.MOD_SUPER, imgui.Key.mod_super),
+        ):
+            io.add_key_event(word, bool(modifiers & mask))
+        if key in self._imgui_keys:
+            io.add_key_event(self._imgui_keys[key], action == glfw.PRESS)
+
+
+def _imgui_keys(glfw: Any) -> dict[int, Any]:
+    """Keys that edit text in imgui."""
+    from imgui_bundle import imgui
+
+    words = {
+        "LEFT": "left_arrow", "RIGHT": "right_arrow", "UP": "up_arrow", "DOWN": "down_arrow", "HOME": "home",
+        "END": "end", "DELETE": "delete", "BACKSPACE": "backspace", "ENTER": "enter", "ESCAPE": "escape",
+        "TAB": "tab", "KP_ENTER": "keypad_enter", "PAGE_UP": "page_up", "PAGE_DOWN": "page_down",
+        **{letter: letter.lower() for letter in "ACVXYZ"},
+    }  # fmt: skip
+    return {getattr(glfw, f"KEY_{name}"): getattr(imgui.Key, word) for name, word in words.items()}
+
+
+def _text(value: bytes | str) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -1,0 +1,144 @@
+"""The plain timeline and help, where there is no imgui: drawn by Pillow and shown as textures."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fba_player.session.controls import BAR_HEIGHT, Controls
+from fba_player.session.keys import keys
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageFont import FreeTypeFont, ImageFont
+
+TEXT = (236, 239, 243, 255)
+FAINT = (176, 183, 192, 255)
+ACCENT = (94, 176, 229, 255)
+SHADE = (18, 21, 26, 168)
+TRACK = (255, 255, 255, 54)
+
+
+class Overlay:
+    """Draws the timeline, the status text and the help over the bound framebuffer."""
+
+    def __init__(self, context: Any) -> None:
+        self._gl = context
+        folder = files(__package__) / "shaders"
+        self._program = context.program(
+            vertex_shader=(folder / "overlay.vert").read_text(encoding="utf-8"),
+            fragment_shader=(folder / "overlay.frag").read_text(encoding="utf-8"),
+        )
+        self._square = context.buffer(reserve=4 * 4 * 4, dynamic=True)
+        self._array = context.vertex_array(self._program, [(self._square, "2f 2f", "in_place", "in_texture")])
+        self._textures: dict[str, tuple[object, Any]] = {}
+
+    def draw(self, controls: Controls) -> None:
+        """Timeline and status, and the help where it is wanted."""
+        session = controls.session
+        gl, (width, height) = self._gl, session.size
+        gl.enable_only(gl.BLEND)
+        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA
+        bar = bar_picture(controls)
+        self._show("bar", None, bar, 0, height - bar.height, session.size)
+        if "help" in session.open:
+            key = (session.scale,)
+            kept = self._textures.get("help")
+            panel = None if kept is not None and kept[0] == key else help_picture(session.scale)
+            wide, high = panel.size if panel is not None else kept[1].size  # type: ignore[index]
+            self._show(
+                "help", key, panel, max((width - wide) // 2, 0), max((height - high) // 2, 0), session.size
+            )
+
+    def close(self) -> None:
+        """Give everything back."""
+        for _, texture in self._textures.values():
+            texture.release()
+        self._textures.clear()
+        for part in (self._array, self._square, self._program):
+            part.release()
+
+    def _show(
+        self, name: str, key: object, picture: Image | None, x: int, y: int, size: tuple[int, int]
+    ) -> None:
+        texture = self._textures[name][1] if name in self._textures else None
+        if picture is not None:
+            if texture is None or texture.size != picture.size:
+                if texture is not None:
+                    texture.release()
+                texture = self._gl.texture(picture.size, 4)
+                texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
+            texture.write(picture.tobytes())
+            self._textures[name] = (key, texture)
+        assert texture is not None
+        wide, high = texture.size
+        corners = [(x, y, 0, 0), (x + wide, y, 1, 0), (x, y + high, 0, 1), (x + wide, y + high, 1, 1)]
+        self._square.write(np.array(corners, dtype="f4").tobytes())
+        self._program["size"].value = (float(size[0]), float(size[1]))
+        texture.use(0)
+        self._array.render(self._gl.TRIANGLE_STRIP)
+
+
+def bar_picture(controls: Controls) -> Image:
+    """The strip at the bottom: timeline above, status text below."""
+    from PIL import Image, ImageDraw
+
+    session = controls.session
+    scale, transport = session.scale, session.transport
+    width, height = max(session.size[0], 1), max(round(BAR_HEIGHT * scale), 1)
+    picture = Image.new("RGBA", (width, height), SHADE)
+    draw = ImageDraw.Draw(picture)
+    low, high = controls.bar()
+    middle, half = 15 * scale, 3 * scale
+    at = low + (high - low) * transport.share
+    draw.rounded_rectangle((low, middle - half, high, middle + half), radius=half, fill=TRACK)
+    if at > low + 1:
+        draw.rounded_rectangle((low, middle - half, at, middle + half), radius=half, fill=ACCENT)
+    knob = 6.5 * scale
+    draw.ellipse((at - knob, middle - knob, at + knob, middle + knob), fill=TEXT)
+    font = label_font(13 * scale)
+    line = 28 * scale
+    state = "playing" if transport.playing else "paused"
+    draw.text((low, line), f"{state}   {transport.text()}", font=font, fill=TEXT)
+    words = [notice.text for notice in session.notices()[-1:]] or [session.scene.title[:60]]
+    hint = "   ".join([*filter(None, words), "F1 help"])
+    wide = draw.textlength(hint, font=font)
+    if wide < (high - low) * 0.45:
+        draw.text((high - wide, line), hint, font=font, fill=FAINT)
+    return picture
+
+
+def help_picture(scale: float) -> Image:
+    """The help: two columns of keys."""
+    from PIL import Image, ImageDraw
+
+    rows = [row for row in keys() if not row.action.startswith("panel") or row.action == "panel help"]
+    half = (len(rows) + 1) // 2
+    font, line, column = label_font(12 * scale), 19 * scale, 434 * scale
+    width, height = round(2 * column), round((half + 1) * line + 26 * scale)
+    picture = Image.new("RGBA", (width, height), (0, 0, 0, 0))
+    draw = ImageDraw.Draw(picture)
+    draw.rounded_rectangle((0, 0, width - 1, height - 1), radius=10 * scale, fill=(18, 21, 26, 222))
+    top = 16 * scale
+    draw.text((20 * scale, top), "Keys", font=font, fill=ACCENT)
+    for number, row in enumerate(rows):
+        side, down = divmod(number, half)
+        x, y = side * column + 20 * scale, top + (down + 1) * line
+        draw.text((x, y), row.shown, font=font, fill=TEXT)
+        draw.text((x + 136 * scale, y), row.does, font=font, fill=FAINT)
+    return picture
+
+
+_FONTS: dict[int, FreeTypeFont | ImageFont] = {}
+
+
+def label_font(size: float) -> FreeTypeFont | ImageFont:
+    """Pillow's own font: the same on every machine."""
+    from PIL import ImageFont
+
+    pixels = max(round(size), 6)
+    if pixels not in _FONTS:
+        _FONTS[pixels] = ImageFont.load_default(pixels)
+    return _FONTS[pixels]

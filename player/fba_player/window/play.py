@@ -1,0 +1,93 @@
+"""Opening a window that plays something, from a single call."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fba.animation import Animation
+from fba_player.view.camera import Camera
+from fba_player.scene.scene import Scene
+from fba_player.session.session import Session
+from fba_player.session.source import Source
+from fba.atomic_path import PathLike
+from fba_player.window.window import WARNED, Window
+
+if TYPE_CHECKING:
+    from fba_player.sound.player import Audio
+    from fba_player.view.protocols import Showable
+
+
+def play(
+    animation: Animation | Showable,
+    *,
+    title: str | None = None,
+    size: tuple[int, int] = (1280, 720),
+    camera: Camera | str | None = None,
+    loop: bool = True,
+    speed: float = 1.0,
+    start: float | None = None,
+    paused: bool = False,
+    interpolate: bool = True,
+    audio: PathLike | None = None,
+    audio_offset: float = 0.0,
+    file: PathLike | None = None,
+    bap_steps: str = "iso",
+    warnings: tuple[str, ...] = (),
+    panels: tuple[str, ...] = (),
+) -> tuple[Path, ...]:
+    """Open a window, play an animation in it, and return when it is closed.
+
+    Returns the files that were dropped onto it: they can be read, and the user wants to see them next.
+
+    title: of the window; the animation's name by default. size: of the window. camera: a `Camera`, the
+    name of a preset, or None for the one that suits the content. speed: 0.1 to 4. start: seconds.
+    interpolate: whether motion is smooth between frames. audio: a sound file to be heard with it; the
+    sound's clock then leads; it begins audio_offset seconds after the first frame, earlier where negative.
+    file: where the animation was read from (with bap_steps), for what the window
+    tells about it. warnings: what was said while it was read; the window shows it for some seconds, and the
+    file's panel lists it. panels: names of those open at the beginning ("file", "view", "camera", "help").
+    F1 shows the keys. Motion follows the clock: a slow machine shows fewer pictures, not slower ones.
+
+    Raises DisplayError where there is no display or no OpenGL 3.3, or where it stops working, saying what
+    to do; ValueError for a speed, size or preset that does not exist; FormatError for a sound file that
+    cannot be read.
+    """
+    if not math.isfinite(audio_offset):
+        raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
+    scene: Any = animation if hasattr(animation, "timeline") else Scene(animation)
+    source = Source(scene, file, bap_steps=bap_steps, warnings=warnings)
+    with Window(scene, title=title, size=size, camera=camera, loop=loop, source=source) as window:
+        window.transport.set_speed(speed)
+        window.transport.interpolate = interpolate
+        window.session.open |= set(panels)
+        for text in warnings:
+            window.session.say(text, "warning", WARNED)
+        with contextlib.ExitStack() as stack:
+            if audio is not None:
+                sound = _sounded(window.session, audio, audio_offset)
+                if sound is not None:
+                    stack.enter_context(sound)
+            if start is not None:
+                window.transport.seek(start)
+            if not paused:
+                window.transport.play()
+            window.run()
+        return window.session.dropped
+
+
+def _sounded(session: Session, path: PathLike, offset: float) -> Audio | None:
+    """The session has a sound from now on; None where nobody hears it, which the user is told."""
+    from fba_player.sound.player import open_audio
+
+    session.audio = open_audio(path, session.transport, offset=offset)
+    session.sound, session.sound_offset = path, offset
+    if session.audio is None:
+        name = os.path.basename(os.fspath(path))
+        session.say(
+            f"There is no sound device: {name} is not heard, but recorded films have it", "warning", 8.0
+        )
+    return session.audio
