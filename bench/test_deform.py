@@ -37,7 +37,7 @@ def sample(face_alone: bool) -> Animation:
 @pytest.fixture(params=["face", "person"])
 def views(request: Any) -> Iterator[tuple[str, dict[str, Any]]]:
     """One scene, shown in both ways."""
-    from fba_player import Offscreen
+    from fba.player import Offscreen
 
     animation = sample(request.param == "face")
     if request.param == "face":

@@ -43,7 +43,7 @@ def sample() -> Animation:
 
 @pytest.fixture(params=["face", "person"])
 def shown(request: Any, sample: Animation) -> Iterator[tuple[str, Any]]:
-    from fba_player import Offscreen
+    from fba.player import Offscreen
 
     animation = sample
     if request.param == "face":

@@ -16,7 +16,7 @@ import pytest
 
 from fba import Animation, BodyTrack
 from fba.errors import DisplayError
-from fba_player import Offscreen, Recorder
+from fba.player import Offscreen, Recorder
 
 SIZE = (1280, 720)
 FRAMES = 60

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 
 import fba
-from fba_conformance.runner import check, vectors
 from fba import Animation, FaceTrack
 from fba.capture import from_skeleton, retarget_report
 from fba.errors import FbaWarning
 from fba.face import FaceModel, checks
 from fba.face.importers import import_model
 from fba.formats.bvh.reader import read_motion
+from fba_conformance.runner import check, vectors
 
 CAPTURES = (
     "vreng/cmu_walk", "greta/Dance", "greta/Fluid_gesture", "greta/GangnamStyle", "greta/c-Walkaround",
@@ -140,9 +140,9 @@ def test_validation(
 def test_sound_clock(benchmark: Any, tmp_path: Path, report: Callable[[str], None]) -> None:
     """A null device takes samples by the wall clock: the clock of the sound must keep a constant distance."""
     pytest.importorskip("miniaudio")
-    from fba_player.sound.player import Audio
     from fba_player.playback.timeline import Timeline
     from fba_player.playback.transport import Transport
+    from fba_player.sound.player import Audio
 
     rate = 48_000
     path = tmp_path / "tone.wav"

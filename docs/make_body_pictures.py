@@ -12,8 +12,7 @@ import numpy as np
 from PIL import Image
 
 import fba
-import fba_player
-from fba import Animation, BodyTrack
+from fba import Animation, BodyTrack, player
 from fba.parameters import baps
 
 IMAGES = Path(__file__).with_name("images")

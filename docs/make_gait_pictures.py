@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-import fba_player
+from fba import player
 from fba.body import gait
 from fba_player.view.camera import Camera
 

@@ -10,8 +10,7 @@ import numpy.typing as npt
 from PIL import Image
 
 import fba
-import fba_player
-from fba import Animation, FaceTrack
+from fba import Animation, FaceTrack, player
 from fba.face import FaceModel, feature_point_names
 from fba.face.calibration import fit
 from fba.formats import merge

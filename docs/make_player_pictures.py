@@ -10,14 +10,14 @@ from pathlib import Path
 import fba
 from fba.animation import Animation
 from fba.formats import merge
-from fba_player.scene.compare import CompareScene
 from fba_player.export.image_files import write_picture
-from fba_player.session.puppet import Expression
+from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
-from fba_player.ui.window_picture import SETTLES, Studio, picture
-from fba_player.ui.panels.puppet_panel import PuppetPanel
+from fba_player.session.puppet import Expression
 from fba_player.session.session import Session
 from fba_player.session.source import Source
+from fba_player.ui.panels.puppet_panel import PuppetPanel
+from fba_player.ui.window_picture import SETTLES, Studio, picture
 
 IMAGES = Path(__file__).resolve().with_name("images")
 SAMPLES = Path(fba.__file__).resolve().with_name("samples")

@@ -14,7 +14,7 @@ from pathlib import Path
 from PIL import Image
 
 import fba
-import fba_player
+from fba import player
 from fba.formats import merge
 
 SAMPLES = Path(fba.__file__).parent / "samples"

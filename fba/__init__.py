@@ -57,7 +57,7 @@ _PLACES = {
     "read": "fba.formats",
     "write": "fba.formats",
 }
-_MODULES = ("body", "capture", "codec", "face", "formats", "parameters")
+_MODULES = ("body", "capture", "codec", "face", "formats", "parameters", "player")
 
 __all__ = [
     "Animation",

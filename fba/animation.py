@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from importlib import import_module
 from typing import Any, overload
 
 import numpy as np
@@ -187,14 +186,6 @@ class Animation:
         about = f"{len(self)} frames at {float(self.rate):g} frames/s, {float(self.duration):g} s"
         named = f"{self.name}: " if self.name else ""
         return f"<Animation {named}{', '.join([about, *parts])}>"
-
-    def _repr_html_(self) -> str | None:
-        """A small film, for notebooks; None where the player is not installed."""
-        try:
-            notebook = import_module("fba_player.export.notebook")  # by name: the player stands above this module
-        except ImportError:
-            return None
-        return str(notebook.Preview(self)._repr_html_())
 
     @property
     def times(self) -> npt.NDArray[np.float64]:

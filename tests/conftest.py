@@ -6,8 +6,9 @@ import os
 from collections import Counter
 from pathlib import Path
 
-import graphics
 import pytest
+
+import graphics
 
 
 @pytest.fixture(scope="session")

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from fba.atomic import atomic
-from fba.errors import DisplayError, FormatError
 from fba.atomic_path import written
+from fba.errors import DisplayError, FormatError
 
 
 def put(path: Path | str, data: bytes = b"new") -> None:

@@ -27,9 +27,9 @@ from typing import NamedTuple
 from urllib.parse import urlsplit
 
 import click
-import graphics
 import pytest
 
+import graphics
 from fba.cli.main import _COMMANDS, group
 
 ROOT = Path(__file__).parents[1]
@@ -54,7 +54,7 @@ ILLUSTRATIONS = {
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
     ("README.md", "pip install ."): "makes an environment; .ci/run installs the wheel and runs the demo",
     ("docs/develop.md", "./dev test"): CHECKOUT,
-    ("docs/develop.md", "python examples/figure/make_head.py"): "replaces the built-in head",
+    ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",
     ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",
     ("docs/motion-capture.md", MISMATCH): "a warning, with figures of another file",

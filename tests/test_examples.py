@@ -7,8 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import graphics
 import pytest
+
+import graphics
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -21,7 +21,7 @@ from fba.parameters import bap_numbers, baps, fap_numbers, faps
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = Path(fba.__file__).parent / "samples"
-SCRIPT = ROOT / "examples" / "make_samples.py"
+SCRIPT = ROOT / "tools" / "make_samples.py"
 BAP_STEPS = "visage"
 
 

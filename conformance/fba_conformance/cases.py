@@ -12,9 +12,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from fba_conformance import motion
 from fba.animation import Animation, FaceTrack
 from fba.codec import EncoderOptions, encode
+from fba_conformance import motion
 
 
 @dataclass(frozen=True)

@@ -27,12 +27,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fba_conformance import motion
-from fba_conformance.runner import plane_records
-from fba_conformance.trace import planes as independent_planes
 from fba.animation import Animation, FaceTrack
 from fba.codec import Block, Decoder, EncoderOptions, encode, probe_stream
 from fba.errors import FbaError, FbaWarning
+from fba_conformance import motion
+from fba_conformance.runner import plane_records
+from fba_conformance.trace import planes as independent_planes
 
 START_CODES = (
     b"\0\0\1\xba",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from fba.parameters import EXPRESSION_FIELDS, EXPRESSION_SELECT_MAX, VISEME_FIELDS, VISEME_SELECT_MAX
 from fba_conformance.part import INTENSITY_MAX, Slot, read_segment
 from fba_conformance.reader import Reader
-from fba.parameters import EXPRESSION_FIELDS, EXPRESSION_SELECT_MAX, VISEME_FIELDS, VISEME_SELECT_MAX
 
 CODED_FIELDS = {"viseme": 3, "expression": 4}
 """How many of the fields go through the arithmetic coder; the rest are single bits behind it."""

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fba_conformance.reader import Levels, Reader
-from fba_conformance.textbook import FrequencyTable
 from fba.errors import UnsupportedError
 from fba.parameters import bap_groups, baps, fap_groups, faps
+from fba_conformance.reader import Levels, Reader
+from fba_conformance.textbook import FrequencyTable
 
 RANGE_UNIT = 60
 LISTS = ("i_new_max", "i_new_min", "p_new_max", "p_new_min")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from bitstring import ConstBitStream
 
-from fba_conformance.textbook import FrequencyTable, decode_segment
 from fba.errors import BitstreamError
+from fba_conformance.textbook import FrequencyTable, decode_segment
 
 PREFIX_BITS = 24
 START_CODE_BITS = 32

@@ -167,8 +167,8 @@ def _wrong_files(vector: Vector, frames: list[Frame]) -> str:
 
 def _encoded(vector: Vector, frames: list[Frame]) -> bytes:
     from fba.formats import merge
-    from fba.formats.text.bap import read_bap
     from fba.formats.epf.epf import read_epf
+    from fba.formats.text.bap import read_bap
     from fba.formats.text.fap import read_fap
 
     script, fap, bap = vector.path("epf"), vector.path("source_fap"), vector.path("source_bap")

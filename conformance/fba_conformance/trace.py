@@ -12,6 +12,9 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
+from fba.errors import FbaError, FbaWarning
+from fba.parameters import BAP_STEP_TABLES
+from fba.recognition import HEAD_BYTES, but_recognised
 from fba_conformance.high_level import HighLevel
 from fba_conformance.listing import element_dict, format_trace
 from fba_conformance.part import Part
@@ -23,9 +26,6 @@ from fba_conformance.reader import (
     Levels,
     Reader,
 )
-from fba.errors import FbaError, FbaWarning
-from fba.parameters import BAP_STEP_TABLES
-from fba.recognition import HEAD_BYTES, but_recognised
 
 __all__ = ["Element", "Levels", "Walker", "decode_values", "element_dict", "format_trace", "planes", "trace"]
 

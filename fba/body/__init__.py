@@ -6,12 +6,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fba.body.solve.conventions import convention_names
     from fba.body.definition import BodyDefinition
-    from fba.body.solve.limits import Excess, Limit, Limits
     from fba.body.skeleton import Skeleton
-    from fba.body.solve.solver import BapSolver
     from fba.body.solve.angle_wrap import wrapped
+    from fba.body.solve.conventions import convention_names
+    from fba.body.solve.limits import Excess, Limit, Limits
+    from fba.body.solve.solver import BapSolver
 
 _PLACES = {
     "BapSolver": "fba.body.solve.solver",

@@ -15,10 +15,10 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, WHOLE, widest
 from fba.body.solve.pose_loops import MILLIMETRE, UNIT
-from fba.body.skeleton import Skeleton
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
 from fba.tracks import BodyTrack
 

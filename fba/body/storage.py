@@ -17,8 +17,8 @@ from fba.body.model import BODY_PART_KINDS, INFLUENCES, BodyModel, BodyPart, Flo
 from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.errors import ModelError
 from fba.gltf.document import Document
-from fba.gltf.part_materials import Looks, material_of
 from fba.gltf.nodes import rotation_matrix
+from fba.gltf.part_materials import Looks, material_of
 from fba.gltf.scene import Gltf, Primitive
 from fba.gltf.values import Value, located, optional
 from fba.gltf.writer import Builder

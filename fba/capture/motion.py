@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from fba.animation import MAX_FRAMES
 from fba import rotations
+from fba.animation import MAX_FRAMES
 from fba.errors import ModelError
 
 

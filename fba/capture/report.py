@@ -10,10 +10,8 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.body import BapSolver
-from fba.capture import matching
-from fba.capture.limbs import soles
-from fba.capture.limbs import ground
-from fba.capture import rest_alignment
+from fba.capture import matching, rest_alignment
+from fba.capture.limbs import ground, soles
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 

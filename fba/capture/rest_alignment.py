@@ -17,8 +17,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.skeleton import Skeleton
 from fba import rotations
+from fba.body.skeleton import Skeleton
 from fba.capture.motion import SkeletonMotion
 from fba.capture.spine import joints as spine_joints
 from fba.errors import ModelError

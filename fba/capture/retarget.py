@@ -8,13 +8,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from fba import rotations
 from fba.body import BapSolver, wrapped
 from fba.body.solve.solver_loops import joint_angles
-from fba.capture import spine
-from fba.capture.limbs import bone_ik
-from fba.capture.limbs import hinges
-from fba.capture import rest_alignment
-from fba import rotations
+from fba.capture import rest_alignment, spine
+from fba.capture.limbs import bone_ik, hinges
 from fba.capture.limbs.foot_planting import Footing
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning, Remedy

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack
 from fba.body import BapSolver
-from fba.capture import matching
-from fba.capture import standard_skeleton
+from fba.capture import matching, standard_skeleton
 from fba.capture import spine as spines
 from fba.capture.motion import SkeletonMotion
 from fba.capture.retarget import Retarget
@@ -66,8 +65,8 @@ def from_skeleton(
     where the source turns about an axis that a joint lacks, the joint before or after it turns instead.
     BAPs 181..183 are millimetres from the default standing place. Angles are within +-pi; they are not
     clamped to the standard's ranges. A skeleton of the standard's own joints that rests in the default
-    posture (`fba.capture.standard_skeleton`) is taken joint for joint, wherever its feet are: ground has no say, and
-    spine only where it is "simple", "full" or a number.
+    posture (`fba.capture.standard_skeleton`) is taken joint for joint, wherever its feet are: ground has no
+    say, and spine only where it is "simple", "full" or a number.
 
     Raises ModelError where no family of names fits, the skeleton has no size or there are more than 500,000
     frames, ValueError for a bad option or joint name. Warns (FbaWarning) of joints that a limb lacks: they
@@ -102,7 +101,11 @@ def from_skeleton(
             FbaWarning,
             stacklevel=2,
         )
-    if joints is None and spine in ("spread", "joints") and standard_skeleton.is_direct(motion, solver.skeleton):
+    if (
+        joints is None
+        and spine in ("spread", "joints")
+        and standard_skeleton.is_direct(motion, solver.skeleton)
+    ):
         return _track(motion, standard_skeleton.values(motion, solver, scale, origin), set(motion.names))
     retarget = Retarget(motion, mapped, solver, scale, groups, spine in ("spread", "joints"))
     turned = {*retarget.wanted, solver.skeleton.names[0]}

@@ -17,8 +17,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.skeleton import Skeleton
 from fba import rotations
+from fba.body.skeleton import Skeleton
 from fba.parameters import baps
 
 Float = npt.NDArray[np.float64]

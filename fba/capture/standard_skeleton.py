@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from fba import rotations
 from fba.body import BapSolver, Skeleton, wrapped
 from fba.capture import rest_alignment
-from fba import rotations
 from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
 

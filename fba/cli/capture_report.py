@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +41,9 @@ def compared(captures: Sequence[Path], animation: Animation, format: str | None 
 
     reports = []
     for path in captures:
-        motion = import_module(f"fba.formats.{format_of(path, format).name}").read_motion(path)
+        read_motion = format_of(path, format).read_motion
+        assert read_motion is not None  # the caller names captures only
+        motion = read_motion(path)
         report = asdict(retarget_report(motion, animation))
         reports.append({"input": str(path), **report})
     return {"captures": reports}

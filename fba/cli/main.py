@@ -14,10 +14,10 @@ import click
 
 from fba import __version__
 from fba.cli.compile_notice import Notice
-from fba.cli.sigint import Interruptions
 from fba.cli.exit_quietly import INTERRUPTED, TEXT
 from fba.cli.options import Group, described, examples
 from fba.cli.program import NAME, program_words, with_program
+from fba.cli.sigint import Interruptions
 from fba.cli.startup import hasten
 from fba.compilation import heard
 from fba.errors import FbaError, FbaWarning, did_you_mean
@@ -80,7 +80,7 @@ class _Commands(Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        command: click.Command = import_module(f"fba.cli.{cmd_name}").command
+        command: click.Command = import_module(f"fba.cli.commands.{cmd_name}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fba.animation import Animation, Frame
-from fba.codec._plane import loops
-from fba.codec._plane import slots
-from fba.codec._plane import syntax
-from fba.codec.assembly import Assembly
+from fba.codec._plane import loops, slots, syntax
 from fba.codec._plane.bits import OutOfDataError
+from fba.codec._plane.reader import PlaneReader, Planes
+from fba.codec.assembly import Assembly
 from fba.codec.block import Block
 from fba.codec.buffer import Buffer
 from fba.codec.clock import StreamClock
-from fba.codec._plane.reader import PlaneReader, Planes
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, but_recognised

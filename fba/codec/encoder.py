@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack, Frame
 from fba.codec import planner
-from fba.codec._plane import quantiser
-from fba.codec._plane import slots
+from fba.codec._plane import quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec.planner import EncoderOptions, Ranges

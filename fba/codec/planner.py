@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.codec._plane import quantiser
-from fba.codec._plane import slots
-from fba.codec._plane import syntax
+from fba.codec._plane import quantiser, slots, syntax
 from fba.codec._plane.loops import quantise
+from fba.codec._plane.slots import Int64
 from fba.codec.settings import (
     QUANT_MAX,
     RANGE_CODE_MAX,
@@ -25,7 +24,6 @@ from fba.codec.settings import (
     TimeCode,
     UInt8,
 )
-from fba.codec._plane.slots import Int64
 from fba.compiled import compiled
 from fba.errors import FbaWarning, RangeError, Remedy
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, Bap, Fap, baps, faps

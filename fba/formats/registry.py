@@ -21,6 +21,7 @@ from fba.recognition import but_recognised
 from fba.source import Path, read_head
 
 if TYPE_CHECKING:
+    from fba.capture.motion import SkeletonMotion
     from fba.codec import StreamInfo
 
 
@@ -54,8 +55,9 @@ class Format:
     name: as in `format=`. suffixes: lower case, with the dot, the first is the usual one. sniff: whether
     a file with this beginning (up to 64 KiB) and this lower-case suffix is one. read, write: file to
     Animation and back; write is None where there is no writer. carries: the parts that it can hold.
-    captured: motion capture, whose parameters are worked out when it is read. written: what a written file
-    is, where that is less than `description` says.
+    read_motion: the motion of a captured skeleton,
+    for formats of motion capture, whose parameters are worked out when they are read. written: what a written
+    file is, where that is less than `description` says.
     """
 
     name: str
@@ -65,7 +67,7 @@ class Format:
     read: Callable[..., Animation]
     write: Callable[..., None] | None
     carries: tuple[str, ...] = ("face", "body")
-    captured: bool = False
+    read_motion: Callable[..., SkeletonMotion] | None = None
     written: str = ""
 
     @property
@@ -83,37 +85,37 @@ class Format:
 def formats() -> tuple[Format, ...]:
     """The formats, in the order in which they are tried on a content: the quick to import first."""
 
-    def place(name: str, module: str = "") -> Lazy:
-        return Lazy(f"fba.formats.{module or name.partition('_')[2]}:{name}")
+    def at(module: str, name: str) -> Lazy:
+        return Lazy(f"fba.formats.{module}:{name}")
 
     return (
         Format(
             "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
-            place("sniff_fba"), place("read_fba"), place("write_fba"),
+            at("fba", "sniff_fba"), at("fba", "read_fba"), at("fba", "write_fba"),
         ),
         Format(
             "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
-            place("sniff_fap"), place("read_fap"), place("write_fap"), ("face",),
+            at("text.fap", "sniff_fap"), at("text.fap", "read_fap"), at("text.fap", "write_fap"), ("face",),
             written="ASCII face animation parameters, version 2.2",
         ),
         Format(
             "bap", (".bap",), "ASCII body animation parameters, versions 3.1 and 3.2",
-            place("sniff_bap"), place("read_bap"), place("write_bap"), ("body",),
+            at("text.bap", "sniff_bap"), at("text.bap", "read_bap"), at("text.bap", "write_bap"), ("body",),
             written="ASCII body animation parameters, version 3.2",
         ),
         Format(
             "epf", (".epf",), "encoder parameter file: how to code an animation; holds none itself",
-            place("sniff_epf"), place("read_animation", "epf"), None, (),
+            at("epf.epf", "sniff_epf"), at("epf.epf", "read_animation"), None, (),
         ),
         Format(
             "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-            place("sniff", "bvh"), place("read", "bvh"), place("write", "bvh_writing"), ("body",),
-            captured=True,
+            at("bvh.reader", "sniff"), at("bvh.reader", "read"), at("bvh.writer", "write"), ("body",),
+            read_motion=at("bvh.reader", "read_motion"),
         ),
         Format(
             "gltf", (".glb", ".gltf"), "glTF 2.0: read, an animated skeleton; written, a skinned person",
-            place("sniff", "gltf"), place("read", "gltf"), place("write", "gltf_writing"),
-            captured=True, written="glTF 2.0, a skinned person",
+            at("gltf.reader", "sniff"), at("gltf.reader", "read"), at("gltf.writer", "write"),
+            read_motion=at("gltf.reader", "read_motion"), written="glTF 2.0, a skinned person",
         ),
     )  # fmt: skip
 

@@ -6,8 +6,8 @@ import os
 import warnings
 
 from fba.errors import FbaWarning, ModelError
-from fba.mesh.text_files import beside, number, whole, words
 from fba.face.model import Material
+from fba.mesh.text_files import beside, number, whole, words
 
 MAX_PICTURE = 1 << 27
 """Largest picture, in bytes."""

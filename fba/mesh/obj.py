@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
 from fba.mesh.polygons import Polygons
+from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
 
 
 def read_obj(path: str | os.PathLike[str]) -> Polygons:

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, whole, whole_number
 from fba.mesh.polygons import Polygons
+from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, whole, whole_number
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",

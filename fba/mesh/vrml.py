@@ -8,8 +8,8 @@ import re
 import numpy as np
 
 from fba.errors import ModelError
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
 from fba.mesh.polygons import Polygons
+from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
 
 TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]|[^\s,\[\]{}"]+')
 LISTS = ("point", "coordIndex", "texCoordIndex")

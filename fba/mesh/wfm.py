@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fba.errors import ModelError
-from fba.mesh.text_files import MAX_FACES, MAX_VERTICES, number, whole_number, words
 from fba.mesh.polygons import Polygons
+from fba.mesh.text_files import MAX_FACES, MAX_VERTICES, number, whole_number, words
 
 
 def read_wfm(path: str | os.PathLike[str]) -> Polygons:

@@ -15,9 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from json_places import REMOVED, put
 from scipy.spatial import cKDTree
-from small_bodies import random_pose, rod
 
 from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart
@@ -28,6 +26,8 @@ from fba.gltf.glb import join, split
 from fba.gltf.reader import read_document
 from fba.gltf.surfaces import surfaces
 from fba.parameters import joints
+from json_places import REMOVED, put
+from small_bodies import random_pose, rod
 
 
 def assert_same(one: BodyModel, other: BodyModel) -> None:

@@ -9,9 +9,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from small_bodies import rod
 
 from fba.body.model import BodyModel
+from small_bodies import rod
 
 SCRIPT = """
 const validator = require(process.argv[1] + '/gltf-validator');

@@ -160,7 +160,7 @@ def test_the_feet_are_where_the_solver_has_them() -> None:
 
 
 def test_the_projects_own_vectors() -> None:
-    folder = Path(__file__).parents[2] / "conformance" / "vectors"
+    folder = Path(__file__).parents[2] / "conformance" / "fba_conformance" / "vectors"
     for record in json.loads((folder / "index.json").read_text(encoding="utf-8")):
         decoded = fba.decode((folder / record["stream"]).read_bytes(), bap_steps=record["bap_steps"])
         assert decoded.body is None or doubt(decoded, record["bap_steps"]) is None, record["stream"]

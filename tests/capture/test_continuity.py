@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_bodies import bone_errors, limb_bones, motion
 from scipy.spatial.transform import Rotation
 from test_from_skeleton import NAMES, REAL
 
+from capture_bodies import bone_errors, limb_bones, motion
 from fba.body import BapSolver, Skeleton
 from fba.capture import SkeletonMotion, from_skeleton, matching
 from fba.formats.bvh import reader

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_bodies import ARM, bone_errors, limb_bones, motion, source_places
 from scipy.spatial.transform import Rotation
 
+from capture_bodies import ARM, bone_errors, limb_bones, motion, source_places
 from fba.body import BapSolver, Skeleton
 from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
 from fba.errors import FbaWarning, ModelError

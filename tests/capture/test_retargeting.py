@@ -7,9 +7,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from capture_bodies import motion
 from scipy.spatial.transform import Rotation
 
+from capture_bodies import motion
 from fba.animation import Animation, FaceTrack
 from fba.body import BapSolver, Skeleton
 from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report

@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 
 import fba
-import fba_player
-from fba import Animation
-from fba_player.scene.compare import CompareScene
+from fba import Animation, player
 from fba_player.playback.live import LiveAnimation
+from fba_player.scene.compare import CompareScene
 
 Run = Callable[..., Any]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import fba_player
+from fba import player
 from fba.body.model import BodyModel
 from fba.face import FaceModel
 

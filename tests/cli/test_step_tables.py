@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 import fba
-import fba_player
-from fba import Animation
+from fba import Animation, player
 from fba.body import gait
 
 Run = Callable[..., Any]

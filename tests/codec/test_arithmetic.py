@@ -7,7 +7,6 @@ from random import Random
 import numpy as np
 import pytest
 
-from fba_conformance import textbook
 from fba import BitstreamError
 from fba.codec._plane.arithmetic import (
     BAD_FLUSH,
@@ -21,6 +20,7 @@ from fba.codec._plane.arithmetic import (
     encode_segment,
     learn,
 )
+from fba_conformance import textbook
 
 SIZES = (1, 2, 2, 3, 7, 63, 127, 720, 3721, 3721)
 

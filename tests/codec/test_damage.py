@@ -10,9 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from codec_streams import OBJECT, content, decoded
 
-from fba_conformance import motion
+from codec_streams import OBJECT, content, decoded
 from fba import (
     Animation,
     BitstreamError,
@@ -25,6 +24,7 @@ from fba import (
     decode,
     encode,
 )
+from fba_conformance import motion
 
 NAMES = ["face", "body", "high level", "both in sections"]
 

@@ -7,14 +7,14 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 import pytest
-from codec_streams import BAP_GROUPS, FAP_GROUP_SIZES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fba_conformance.trace import trace
+from codec_streams import BAP_GROUPS, FAP_GROUP_SIZES
 from fba import Animation, BodyTrack, Decoder, FaceTrack, FbaWarning
 from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode, encode_planes
 from fba.parameters import bap_groups, baps, fap_groups, faps
+from fba_conformance.trace import trace
 
 LISTS = ("i_new_max", "i_new_min", "p_new_max", "p_new_min")
 FLUSH = 2

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+
 from codec_streams import (
     BAP_GROUPS,
     END,
@@ -22,11 +23,10 @@ from codec_streams import (
     packed,
     segment,
 )
-
-from fba_conformance.textbook import FrequencyTable, encode_segment
 from fba import BitstreamError, Decoder, FbaError, FbaWarning, UnsupportedError, decode
 from fba.codec import probe_stream
 from fba.parameters import bap_groups
+from fba_conformance.textbook import FrequencyTable, encode_segment
 
 JAW = packed(jaw_intra(5))
 NO_BAPS = "100" * BAP_GROUPS

@@ -7,11 +7,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from codec_streams import END, OBJECT, content, decoded, jaw_intra, jaw_predicted, packed, steps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fba_conformance import motion
+from codec_streams import END, OBJECT, content, decoded, jaw_intra, jaw_predicted, packed, steps
 from fba import (
     Animation,
     BitstreamError,
@@ -24,6 +23,7 @@ from fba import (
     decode,
     encode,
 )
+from fba_conformance import motion
 
 EVERY = ["talking", "walking", "both", "part comes and goes"]
 

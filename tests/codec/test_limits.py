@@ -7,10 +7,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from codec_streams import WIDEST, largest_level, steps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from codec_streams import WIDEST, largest_level, steps
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack, RangeError, decode, encode
 from fba.codec import encode_with_statistics
 from fba.parameters import baps, faps

@@ -9,13 +9,13 @@ from math import floor
 
 import numpy as np
 import pytest
-from codec_streams import OBJECT, RATES, decoded, jaw_intra, packed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fba_conformance import motion
+from codec_streams import OBJECT, RATES, decoded, jaw_intra, packed
 from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, decode, encode
 from fba.codec import FrameRate, PlaneSettings, TimeCode, encode_planes
+from fba_conformance import motion
 
 SKIP_MAX = 15 << 20
 NTSC = Fraction(1000, 1001)

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from fba_conformance import fuzz
 from fba import compiled
+from fba_conformance import fuzz
 
 SCRIPT = """
 import sys

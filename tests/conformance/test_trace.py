@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fba import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba_conformance.textbook import FrequencyTable, encode_segment
 from fba_conformance.trace import Element, Levels, decode_values, element_dict, format_trace, trace
-from fba import BitstreamError, FbaError, FbaWarning, UnsupportedError
 
 OBJECT, PLANE, END = (f"{code:032b}" for code in (0x1BA, 0x1BB, 0x1B1))
 OLD_OBJECT, OLD_PLANE = (f"{code:032b}" for code in (0x101, 0x103))

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from fba_conformance.trace import decode_values
 from fba import FbaWarning
+from fba_conformance.trace import decode_values
 
 FAMILIES = (
     "real/",

@@ -17,7 +17,7 @@ from fba.face.feature_points import row_of
 from fba.parameters import faps
 
 HERE = Path(__file__).parent
-FIGURE = HERE.parents[1] / "examples" / "figure"
+FIGURE = HERE.parents[1] / "tools" / "figure"
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from stored_models import face
 
 from fba.face.compact import compact
 from fba.face.deform.deformer import Deformer
 from fba.face.storage import load, save
 from fba.face.tables import FaceDefMesh, FaceDefTables
+from stored_models import face
 
 
 def test_a_compact_face_moves_as_before_and_takes_less(tmp_path: Path) -> None:

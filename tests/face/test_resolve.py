@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_tracks import track
 
 from fba.animation import FaceTrack
 from fba.face import Definitions, Resolver, resolve
 from fba.parameters import faps
+from hand_tracks import track
 
 JOY, ANGER = 1, 3
 OPEN_JAW, MIDLIP, MIDLIP_O = 3, 4, 51

@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from format_files import mask
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from fba.errors import FbaError, FbaWarning
 from fba.formats import read
-from fba.formats.text.bap import read_bap
 from fba.formats.epf.epf import read_epf, write_epf
+from fba.formats.text.bap import read_bap
 from fba.formats.text.fap import read_fap, write_fap
+from format_files import mask
 
 WORDS = (
     b"", b" ", b"\n", b"\r", b"#", b"0", b"1", b"-1", b"2", b"1e308", b"-1e999", b"inf", b"nan", b".5",

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_edits import edited
 
 import fba
 from fba.animation import Animation, BodyTrack
 from fba.errors import FbaWarning, FormatError
 from fba.formats.bvh import reader
 from fba.parameters import BAP_COUNT, bap_numbers
+from gltf_edits import edited
 
 FRAMES = 5
 BVH = """HIERARCHY

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_files import file, mask
 
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.errors import BitstreamError, FbaWarning, FormatError, UnsupportedError
 from fba.formats import OptionError, format_of, formats, merge
 from fba.source import read_head
+from format_files import file, mask
 
 FAP = ("2.1 a 25 1", mask(3), "0 5")
 BAP = ("3.1 a 25 1", mask(3, width=186), "0 5")

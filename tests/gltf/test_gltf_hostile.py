@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_documents import Sheet, container
-from json_places import REMOVED, put
 
 from fba.errors import FbaError, FbaWarning, FormatError, ModelError
 from fba.gltf import read_gltf
 from fba.gltf.document import parse_document
 from fba.gltf.reader import read_document
+from gltf_documents import Sheet, container
+from json_places import REMOVED, put
 
 
 def good() -> Sheet:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_documents import Sheet
 
 from fba.errors import FbaWarning, ModelError
 from fba.gltf import Primitive, read_gltf
+from gltf_documents import Sheet
 
 CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 

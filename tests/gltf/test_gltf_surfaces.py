@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gltf_documents import Sheet
 
 from fba.errors import ModelError
 from fba.gltf import read_gltf, surfaces
+from gltf_documents import Sheet
 
 
 def test_transforms_move_positions_normals_and_morph_targets(tmp_path: Path) -> None:

@@ -7,12 +7,12 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 
-import graphics
 import numpy as np
 import pytest
-from player_tracks import body_track, face_track
 
+import graphics
 from fba.animation import Animation
+from player_tracks import body_track, face_track
 
 
 @pytest.fixture(scope="session")

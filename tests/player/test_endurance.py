@@ -9,17 +9,17 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-import graphics
 import numpy as np
 import pytest
-from player_tracks import body_track, face_track
-from small_face import small_face
 
-import fba_player.gl.context
+import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
-from fba_player import Offscreen, Scene
+from fba.player import Offscreen, Scene
+from fba_player.gl import context
 from fba_player.scene.scene import SWITCHES
+from player_tracks import body_track, face_track
+from small_face import small_face
 
 TINY = (16, 12)
 MOST_GROWTH = 1_000_000
@@ -258,7 +258,7 @@ def test_without_opengl_it_says_what_to_do(
         raise RuntimeError(failure)
 
     monkeypatch.setattr(moderngl, "create_context", refuse)
-    monkeypatch.setattr(player.context, "missing_libraries", list)  # whatever this machine has
+    monkeypatch.setattr(context, "missing_libraries", list)  # whatever this machine has
     with pytest.raises(DisplayError) as told:
         Offscreen(small_scene(), TINY)
     for word in words:

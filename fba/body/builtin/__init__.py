@@ -1,4 +1,4 @@
-"""The built-in person: `body.glb`, made by `examples/figure/make_body.py`; see NOTICE.txt for its origin."""
+"""The built-in person: `body.glb`, made by `tools/figure/make_body.py`; see NOTICE.txt for its origin."""
 
 from __future__ import annotations
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.body.solve.conventions import convention
 from fba.body.gait.limb import ELBOW, KNEE, Limb
 from fba.body.gait.rotations import Float
 from fba.body.skeleton import ROOT, Skeleton
+from fba.body.solve.conventions import convention
 from fba.errors import ModelError
 
 HEEL_BEHIND, TOES_AHEAD = 0.054, 0.062

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.body.solve.conventions import convention
 from fba.body.gait.anatomy import Anatomy
 from fba.body.gait.rotations import Float
 from fba.body.skeleton import Skeleton
+from fba.body.solve.conventions import convention
 from fba.body.solve.solver import BapSolver
 
 ON_GROUND = 0.002

@@ -14,8 +14,8 @@ from fba.animation import Animation, BodyTrack
 from fba.body.gait.curves import Interpolation
 from fba.body.gait.detection import Gait, detect
 from fba.body.skeleton import Skeleton
-from fba.body.solve.solver import BapSolver
 from fba.body.solve.angle_wrap import wrapped
+from fba.body.solve.solver import BapSolver
 from fba.parameters import baps
 
 _STILL = 1e-6

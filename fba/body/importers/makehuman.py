@@ -19,10 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body.importers.obj_mesh import ObjMesh, read_obj_mesh, read_text
-from fba.body.skin.skin_weights import strongest
 from fba.body.model import BodyModel, BodyPart, Material
-from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
 from fba.body.skeleton import Skeleton
+from fba.body.skin.skin_weights import strongest
+from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
 from fba.errors import ModelError
 from fba.gltf.document import MAX_ITEMS, parse_json
 from fba.gltf.values import Value

@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.skin.girdle_loops import Girdle
 from fba.body.skeleton import Skeleton
+from fba.body.skin.girdle_loops import Girdle
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from fba.body.skeleton import Skeleton
 from fba.body.skin.girdle import chosen_girdle, girdle
 from fba.body.skin.moving_normals import rings
-from fba.body.skeleton import Skeleton
 from fba.body.skin.twisting import chosen_twists, twists
 from fba.mesh.meshes import result_array
 

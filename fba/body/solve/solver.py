@@ -7,11 +7,10 @@ from collections.abc import Collection
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.solve import pose_loops
-from fba.body.solve import solver_loops
+from fba.body.skeleton import Skeleton
+from fba.body.solve import pose_loops, solver_loops
 from fba.body.solve.conventions import NO_BAP, Convention, convention
 from fba.body.solve.limits import widest
-from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT
 

@@ -7,11 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fba.capture.limbs import bone_ik
-from fba.capture.limbs import soles
-from fba.capture.limbs import ground
-from fba.capture.limbs import leg_ik
 from fba import rotations
+from fba.capture.limbs import bone_ik, ground, leg_ik, soles
 
 if TYPE_CHECKING:
     from fba.capture.retarget import Retarget
@@ -75,8 +72,8 @@ class Footing:
         source = soles.source_soles(
             body.motion, body.mapped, body.upright, body.turned, body.places, body.scale
         )
-        soles = soles.body_soles(body.skeleton, body.wanted, root, toes)
-        if source is None or soles is None:
+        standing = soles.body_soles(body.skeleton, body.wanted, root, toes)
+        if source is None or standing is None:
             return
         middles = source.points.mean(axis=1)
         level = ground.found(source.lowest, middles).under(middles)
@@ -86,21 +83,21 @@ class Footing:
         if plant and all(self.body.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):
             pliant = np.array([leg_ik.pliancy(self._leg(side, root)) for side in "lr"])
             stiff = STIFFEST - pliant
-            raised = soles.lift(above, soles.lowest - under, stiff, rate)
-            whole, along = soles.slips(source.points, soles.points, level, rate)
+            raised = soles.lift(above, standing.lowest - under, stiff, rate)
+            whole, along = soles.slips(source.points, standing.points, level, rate)
             root[:, [0, 2]] += whole
-            ups = soles.heights(above, soles.lowest - under + raised, rate)
-            for side, pitch in zip("lr", soles.pitches(soles.points, ups), strict=True):
+            ups = soles.heights(above, standing.lowest - under + raised, rate)
+            for side, pitch in zip("lr", soles.pitches(standing.points, ups), strict=True):
                 self.rotations[side] = pitch @ self.rotations[side]
                 self.turn(side)
             for _ in range(ROUNDS):
-                soles = soles.body_soles(body.skeleton, body.wanted, root, toes) or soles
-                ups = soles.heights(above, soles.lowest - under + raised, rate)
+                standing = soles.body_soles(body.skeleton, body.wanted, root, toes) or standing
+                ups = soles.heights(above, standing.lowest - under + raised, rate)
                 for side, up, course in zip("lr", ups, along, strict=True):
                     self._move(side, root, np.stack([course[:, 0], up, course[:, 1]], axis=1))
                 along = np.zeros_like(along)
-            soles = soles.body_soles(body.skeleton, body.wanted, root, toes) or soles
-        root[:, 1] += soles.lift(above, soles.lowest - under, stiff, rate)
+            standing = soles.body_soles(body.skeleton, body.wanted, root, toes) or standing
+        root[:, 1] += soles.lift(above, standing.lowest - under, stiff, rate)
 
     def _move(self, side: str, root: Float, move: Float) -> None:
         """A leg takes its foot elsewhere, by move (T, 3), metres."""

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.skeleton import Skeleton
 from fba import rotations
-from fba.capture.motion import SkeletonMotion
+from fba.body.skeleton import Skeleton
 from fba.capture.limbs.coupled_paths import chain
+from fba.capture.motion import SkeletonMotion
 
 Float = npt.NDArray[np.float64]
 

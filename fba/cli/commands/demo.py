@@ -1,6 +1,6 @@
 """`fba demo`: the main job, from BVH and FAP files to a picture, on the samples that come with fba.
 
-A script made the samples (examples/make_samples.py); nobody was captured for them.
+A script made the samples (tools/make_samples.py); nobody was captured for them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     A script made the sample; it is not motion capture. Without a display, make a video and a picture of it
     instead. The folder gets the sample files as well, hello.bvh and hello.fap.
     """
-    import fba_player
+    from fba import player
     from fba.codec import EncoderOptions, encode, probe_stream
     from fba.formats import merge, read
 

@@ -237,7 +237,7 @@ def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
 def _captured(path: Path, format: str | None) -> bool:
     from fba.formats import format_of
 
-    return str(path) != "-" and format_of(path, format).captured
+    return str(path) != "-" and format_of(path, format).read_motion is not None
 
 
 def _joined(

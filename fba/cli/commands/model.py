@@ -222,9 +222,9 @@ def fit(
 def _points(path: Path, model: FaceModel) -> npt.NDArray[np.float64]:
     """Feature points of a file; of an Xface file without its mesh those that its distances tell."""
     from fba.face.importers.points.fdp import load_fdp
-    from fba.mesh.text_files import beside
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
+    from fba.mesh.text_files import beside
 
     if path.suffix.lower() in (".json", ".csv"):
         return read_points(path).points

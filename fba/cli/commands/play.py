@@ -81,7 +81,7 @@ def command(
         raise click.UsageError("--audio goes with a file to play")
     if not files and how.model is None and how.body is None:
         raise click.UsageError("give a file to play, or a --model or --body to move by hand")
-    import fba_player
+    from fba import player
 
     player.check_display()  # before anything that takes long
     if not files:
@@ -109,7 +109,7 @@ def _play(
     **window: Any,
 ) -> tuple[Path, ...]:
     """Play files in a window; those that were dropped onto it."""
-    import fba_player
+    from fba import player
     from fba.cli import scene_loading
 
     voice = scene_loading.voice(files, sound, "played without sound")
@@ -126,7 +126,9 @@ def _play(
         ]
         scene = scene_loading.scene(opened, names, how, over=compare)
         _check_start(scene, start, growing=bool(streams))
-        single = len(files) == 1 and not streams and str(files[0]) != "-" and not scene_loading.is_pipe(files[0])
+        single = (
+            len(files) == 1 and not streams and str(files[0]) != "-" and not scene_loading.is_pipe(files[0])
+        )
         return player.play(
             scene,
             title=" | ".join(names),
@@ -149,7 +151,7 @@ def _play(
 
 def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
     """A window with a neutral figure and the sliders that move it."""
-    import fba_player
+    from fba import player
     from fba.cli import scene_loading
     from fba_player.session.performer import neutral
 

@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from fba.codec._plane import quantiser
-from fba.codec._plane import slots
+from fba.codec._plane import quantiser, slots
 from fba.codec._plane.arithmetic import STRIDE, Counts
 from fba.codec._plane.loops import Coding
 from fba.codec.settings import RANGE_UNIT, PartSettings

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fba.codec._plane import arithmetic
-from fba.codec._plane import slots
+from fba.codec._plane import arithmetic, slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA, Counts, decode_segment, encode_segment, learn
 from fba.compiled import compiled
 

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.codec._plane import loops
-from fba.codec._plane import slots
-from fba.codec._plane import syntax
+from fba.codec._plane import loops, slots, syntax
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, OutOfDataError
 from fba.codec._plane.coder_state import Models

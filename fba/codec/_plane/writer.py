@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba.codec._plane import loops
-from fba.codec._plane import quantiser
-from fba.codec._plane import slots
-from fba.codec._plane import syntax
+from fba.codec._plane import loops, quantiser, slots, syntax
 from fba.codec._plane.arithmetic import OUT_OF_DATA
 from fba.codec._plane.bits import BitWriter
 from fba.codec._plane.coder_state import Models

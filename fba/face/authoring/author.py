@@ -9,23 +9,23 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.face.authoring.surface.binding import Binding, bind_points, face_size, part_lips
-from fba.face.authoring.surface.attached_parts import LARGEST, NEAR, Anchors
+from fba.face.authoring.regions.brows_cheeks_nose import spot_motions
 from fba.face.authoring.regions.ears import ear_motions
-from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.regions.eyes import Eye, eye_transforms, eyes, pupil_motions
 from fba.face.authoring.regions.jaw import CHIN, Jaw, jaw, opening, share_of_part, turned
-from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
 from fba.face.authoring.regions.lashes import lash_motion
 from fba.face.authoring.regions.lids import lid_motion
 from fba.face.authoring.regions.lips import HANDLES, lip_motions
-from fba.face.authoring.surface.motion import Motion, by_part, tables
 from fba.face.authoring.regions.mouth_opening import LIDS
-from fba.face.authoring.surface.unfold import relaxed
-from fba.face.authoring.surface.motion_limits import guarded, linear
-from fba.face.authoring.regions.brows_cheeks_nose import spot_motions
 from fba.face.authoring.regions.tongue import FAPS as TONGUE_FAPS
 from fba.face.authoring.regions.tongue import tongue_motion
+from fba.face.authoring.surface.attached_parts import LARGEST, NEAR, Anchors
+from fba.face.authoring.surface.binding import Binding, bind_points, face_size, part_lips
+from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
+from fba.face.authoring.surface.motion import Motion, by_part, tables
+from fba.face.authoring.surface.motion_limits import guarded, linear
+from fba.face.authoring.surface.unfold import relaxed
 from fba.face.expressions import Definitions
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part

@@ -1,4 +1,4 @@
-"""The built-in head: `head.glb`, made by `examples/figure/make_head.py`; see NOTICE.txt for its origin."""
+"""The built-in head: `head.glb`, made by `tools/figure/make_head.py`; see NOTICE.txt for its origin."""
 
 from __future__ import annotations
 

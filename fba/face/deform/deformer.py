@@ -12,8 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import RangeError
-from fba.face.deform.subset import ChosenVertices
-from fba.face.deform.normals import Surface, surface
 from fba.face.deform.flat_tables import (
     VALUE_MAX,
     Shifts,
@@ -22,6 +20,8 @@ from fba.face.deform.flat_tables import (
     flat_shifts,
     flat_transforms,
 )
+from fba.face.deform.normals import Surface, surface
+from fba.face.deform.subset import ChosenVertices
 from fba.face.feature_points import names
 from fba.face.model import FaceModel
 from fba.mesh.meshes import result_array

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.compiled import compiled
-from fba.face.deform.normals import Surface
 from fba.face.deform.flat_tables import Shifts, Transforms
+from fba.face.deform.normals import Surface
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.compiled import compiled
-from fba.face.deform.loops import Scratch, add_shifts, cofactors, compose, copy, place
 from fba.face.deform.flat_tables import Shifts, Transforms
+from fba.face.deform.loops import Scratch, add_shifts, cofactors, compose, copy, place
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

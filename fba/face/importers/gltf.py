@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names
-from fba.mesh.text_files import MAX_VERTICES
 from fba.face.importers.assembly.model import finished, turned
 from fba.face.importers.assembly.pieces import Piece, assembled
 from fba.face.importers.points.points_file import GivenPoints, given_points
 from fba.face.model import FaceModel, Material, Part
+from fba.mesh.text_files import MAX_VERTICES
 
 Float64 = npt.NDArray[np.float64]
 

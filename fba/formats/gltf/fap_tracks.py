@@ -18,8 +18,8 @@ from fba.errors import FbaWarning
 from fba.face.model import FaceModel
 from fba.face.resolve import resolve
 from fba.formats.gltf.fap_joints import FapJoint
-from fba.formats.gltf.pose import Sampler, nearest_rotation, sample
 from fba.formats.gltf.morph_targets import Targets
+from fba.formats.gltf.pose import Sampler, nearest_rotation, sample
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf
 from fba.gltf.values import Value

@@ -15,8 +15,8 @@ from fba.face.model import FaceModel, Part, point_row
 from fba.face.tables import HEAD
 from fba.formats.gltf.fap_joints import FapJoint
 from fba.formats.gltf.joints import Clip, adopt, move
-from fba.formats.gltf.pose import nearest_rotation
 from fba.formats.gltf.morph_targets import Targets, targets
+from fba.formats.gltf.pose import nearest_rotation
 from fba.gltf.part_materials import Looks
 from fba.gltf.writer import Builder
 

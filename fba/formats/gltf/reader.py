@@ -13,9 +13,9 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from fba import rotations
 from fba.animation import Animation
 from fba.capture import SkeletonMotion, from_skeleton, matching
-from fba import rotations
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
 from fba.formats.gltf.own_files import note_of, read_note

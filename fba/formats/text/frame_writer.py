@@ -10,8 +10,8 @@ import numpy as np
 from fba.animation import Animation
 from fba.atomic import atomic
 from fba.errors import FormatError
-from fba.formats.text.layout import Layout
 from fba.formats.text.frame_rates import format_rate, parse_rate
+from fba.formats.text.layout import Layout
 from fba.formats.text.values import FRAME_NUMBER_MAX, Bool, Int32
 from fba.source import Path
 

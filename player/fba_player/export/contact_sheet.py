@@ -15,10 +15,10 @@ from fba.animation import Animation
 from fba.face.model import FaceModel, point_row
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
 from fba.tracks import FaceTrack
-from fba_player.view.camera import Camera, Subject
-from fba_player.view.font import label_font, shortened
 from fba_player.export.offscreen import Offscreen
 from fba_player.scene.scene import Scene
+from fba_player.view.camera import Camera, Subject
+from fba_player.view.font import label_font, shortened
 
 UInt8 = npt.NDArray[np.uint8]
 Float32 = npt.NDArray[np.float32]

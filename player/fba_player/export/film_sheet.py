@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.errors import RangeError
-from fba_player.view.camera import Camera
-from fba_player.view.font import label_font, shortened
 from fba_player.export.offscreen import Offscreen
 from fba_player.export.render import as_scene, check_inside
-from fba_player.view.protocols import Showable
 from fba_player.playback.timecode import timecode
+from fba_player.view.camera import Camera
+from fba_player.view.font import label_font, shortened
+from fba_player.view.protocols import Showable
 
 Progress = Callable[[int, int], None]
 UInt8 = npt.NDArray[np.uint8]

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.export.mp4 import import_av
 from fba.atomic_path import PathLike, cannot, written
+from fba_player.export.mp4 import import_av
 
 UInt8 = npt.NDArray[np.uint8]
 

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.atomic import atomic
-from fba.errors import UnsupportedError
 from fba.atomic_path import PathLike
+from fba.errors import UnsupportedError
 
 UInt8 = npt.NDArray[np.uint8]
 

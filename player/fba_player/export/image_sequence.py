@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from fba.atomic_path import PathLike, cannot
 from fba.errors import FormatError, Remedy, UnsupportedError
 from fba_player.export.image_files import check_picture, write_picture
 from fba_player.export.recorder import FILMS
-from fba.atomic_path import PathLike, cannot
 
 UInt8 = npt.NDArray[np.uint8]
 

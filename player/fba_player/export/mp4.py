@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import DisplayError
-from fba_player.sound.soundtrack import FilmedSound, Soundtrack
-from fba_player.sound.audio_file import av_version
 from fba.atomic_path import PathLike, cannot, written
+from fba.errors import DisplayError
+from fba_player.sound.audio_file import av_version
+from fba_player.sound.soundtrack import FilmedSound, Soundtrack
 
 UInt8 = npt.NDArray[np.uint8]
 

@@ -1,7 +1,7 @@
 """Animations in notebooks: a small film in the page.
 
-`Animation._repr_html_`, which notebooks call and terminals do not, looks this module up by name when it is
-called: nobody has to import the player first, and the library below it does not depend on it.
+`fba.player` calls `show_animations` where it is imported in a notebook; the library below the player knows
+nothing of it.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from fba.animation import Animation
+from fba.atomic_path import PathLike
 from fba.errors import DisplayError, FbaError
+from fba_player.playback.timecode import clock_text
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
-from fba_player.playback.timecode import clock_text
-from fba.atomic_path import PathLike
 
 WIDTH, SHAPE = 480, 4 / 3
 """Of the film: pixels, and width by height."""
@@ -128,8 +128,8 @@ class Preview:
         ), note
 
     def _still(self, scene: Showable) -> str:
-        from fba_player.export.offscreen import Offscreen
         from fba_player.export.image_files import put_picture
+        from fba_player.export.offscreen import Offscreen
 
         width, height = self._size
         with Offscreen(scene, self._size, self._camera) as view:
@@ -138,6 +138,12 @@ class Preview:
         put_picture(file, pixels, ".png")
         data = base64.b64encode(file.getvalue()).decode()
         return f'<img width="{width}" height="{height}" src="data:image/png;base64,{data}">'
+
+
+def show_animations(shell: Any) -> None:
+    """Make cells that end in an `Animation` show a film. shell: IPython's InteractiveShell."""
+    formatter = shell.display_formatter.formatters["text/html"]
+    formatter.for_type_by_name("fba.animation", "Animation", lambda one: Preview(one)._repr_html_())
 
 
 def described(animation: Animation) -> str:

@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.parameters import FAP_COUNT
-from fba_player.view.camera import Camera
 from fba_player.gl.context import offscreen_context
+from fba_player.gl.framebuffer import Target
 from fba_player.gl.gpu.choice import checked
 from fba_player.gl.renderer import Renderer
 from fba_player.scene.scene import Scene
-from fba_player.view.view import View
+from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
-from fba_player.gl.framebuffer import Target
+from fba_player.view.view import View
 
 UInt8 = npt.NDArray[np.uint8]
 

@@ -19,12 +19,12 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.errors import DisplayError
-from fba_player.view.camera import Camera
 from fba_player.export.offscreen import following
+from fba_player.gl.system_libraries import missing_libraries, missing_text
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.scene.scene import Scene
+from fba_player.view.camera import Camera
 from fba_player.view.view import Eye, FaceMesh, Mesh
-from fba_player.gl.system_libraries import missing_libraries, missing_text
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel

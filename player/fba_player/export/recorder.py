@@ -15,10 +15,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import UnsupportedError
-from fba_player.sound.switch_interval import PROMPT_THREADS
-from fba_player.sound.soundtrack import FilmedSound
 from fba.atomic_path import PathLike
+from fba.errors import UnsupportedError
+from fba_player.sound.soundtrack import FilmedSound
+from fba_player.sound.switch_interval import PROMPT_THREADS
 
 UInt8 = npt.NDArray[np.uint8]
 

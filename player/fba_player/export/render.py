@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from fba.animation import Animation
+from fba.atomic_path import PathLike
 from fba.errors import FbaError, RangeError, UnsupportedError
-from fba_player.view.camera import Camera
-from fba_player.export.offscreen import Offscreen
 from fba_player.export.image_files import PICTURES, check_picture, write_picture
+from fba_player.export.image_sequence import Numbered, Sequence, is_film, is_sequence
+from fba_player.export.offscreen import Offscreen
 from fba_player.export.recorder import FILMS, Recorder, exact_rate
 from fba_player.scene.scene import Scene
-from fba_player.export.image_sequence import Numbered, Sequence, is_film, is_sequence
+from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
-from fba.atomic_path import PathLike
 
 Progress = Callable[[int, int], None]
 

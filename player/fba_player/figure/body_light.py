@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body.model import BodyModel
-from fba.compiled import compiled, is_compiled
 from fba.cache import kept, key_of
-from fba_player.mesh.simplify import Coarser
+from fba.compiled import compiled, is_compiled
 from fba_player.figure.face_light import KEY_DIRECTION, kept_visibility
+from fba_player.mesh.simplify import Coarser
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -103,8 +103,8 @@ class BodyLight:
         self._kept: dict[tuple[int, int, int], tuple[Rows | None, Prepared]] = {}
 
     def reaching(self, places: Float32, normals: Float32, joints: Float64) -> Float32:
-        """float32 (V, 4), see `fba_player.view.view.FaceMesh.light`, for the body's vertices and normals (V, 3) in
-        the world and its joint matrices (J, 4, 4)."""
+        """float32 (V, 4), see `fba_player.view.view.FaceMesh.light`, for the body's vertices and normals (V,
+        3) in the world and its joint matrices (J, 4, 4)."""
         return self.lit(places, normals, joints)(slice(0, len(places)), None)
 
     def lit(self, places: Float32, normals: Float32, joints: Float64) -> LitBody:

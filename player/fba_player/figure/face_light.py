@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from fba.cache import kept
 from fba.compiled import is_compiled
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
-from fba.cache import kept
 from fba_player.figure.face_light_loops import Table, lit, sway
 from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
 

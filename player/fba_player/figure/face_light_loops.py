@@ -1,4 +1,5 @@
-"""The loops of `fba_player.figure.face_light`: how much light reaches vertices, from what was worked out once."""
+"""The loops of `fba_player.figure.face_light`: how much light reaches vertices, from what was worked out
+once."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ Rows = npt.NDArray[np.intp]
 
 
 class Table(NamedTuple):
-    """Visibility of N vertices, see `fba_player.figure.occlusion`: with the mouth shut, and of some of them, near
+    """Visibility of N vertices, see `fba_player.figure.occlusion`: with the mouth shut, and of some of them,
+    near
     (M,), wide open. Harmonics stand side by side: their columns are what goes through the processor fastest.
     """
 

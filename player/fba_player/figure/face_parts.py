@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
-from fba_player.mesh.simplify import Coarser
-from fba_player.mesh.texture_image import FacePicture
-from fba_player.mesh.skin_relief import RELIEF
-from fba_player.view.view import FaceShape
 from fba_player.figure.texture_images import breadth
+from fba_player.mesh.simplify import Coarser
+from fba_player.mesh.skin_relief import RELIEF
+from fba_player.mesh.texture_image import FacePicture
+from fba_player.view.view import FaceShape
 
 if TYPE_CHECKING:
     from fba.body.model import BodyPart

@@ -9,11 +9,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.view.camera import Camera
-from fba_player.view.annotations import Dots, Extras, Grid, Legend, Lines
-from fba_player.view.world_positions import directions, places
-from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
-from fba_player.view.view import FaceMesh, FaceShape
 from fba_player.gl.labels import (
     MOST_NAMES,
     SMALLEST,
@@ -22,6 +17,11 @@ from fba_player.gl.labels import (
     names_picture,
     placed_names,
 )
+from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
+from fba_player.view.annotations import Dots, Extras, Grid, Legend, Lines
+from fba_player.view.camera import Camera
+from fba_player.view.view import FaceMesh, FaceShape
+from fba_player.view.world_positions import directions, places
 
 Float64 = npt.NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from fba.errors import DisplayError
-from fba_player.gl.context import import_moderngl
 from fba_player.gl.antialias_region import Steps
+from fba_player.gl.context import import_moderngl
 
 
 class Target:

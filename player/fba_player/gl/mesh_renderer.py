@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.gl.lod import distance
+from fba_player.figure.texture_images import Pictures, halved
 from fba_player.gl.gpu.way import Way, release
+from fba_player.gl.lod import distance
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
 from fba_player.mesh.skin_relief import RELIEF, relief
 from fba_player.view.view import FaceMesh, FaceShape
-from fba_player.figure.texture_images import Pictures, halved
 
 Float64 = npt.NDArray[np.float64]
 

@@ -38,8 +38,8 @@ class Timeline:
     animation: may grow where `growing` says so. model: gives the definitions of visemes and expressions, and
     the interpolation table; by default the built-in ones. A time before or after shows the first or last
     frame; between two frames, values are interpolated, over skipped frames too, unless `interpolate` is
-    False: then the frame last passed is shown. growing: whether frames still arrive (`fba_player.playback.live`);
-    arrived: changes whenever some did.
+    False: then the frame last passed is shown. growing: whether frames still arrive
+    (`fba_player.playback.live`); arrived: changes whenever some did.
     """
 
     growing = False

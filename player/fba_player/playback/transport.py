@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from fba_player.playback.playhead import Motion
-from fba_player.view.protocols import Times
 from fba_player.playback.timecode import clock_text, timecode
+from fba_player.view.protocols import Times
 
 SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 """The steps of `faster` and `slower`."""
@@ -41,7 +41,8 @@ class Played(Times, Protocol):
 class Transport:
     """The position in a performance.
 
-    timeline: gives the start, the end and the frames' own times; it may grow (`fba_player.playback.live`). clock: seconds
+    timeline: gives the start, the end and the frames' own times; it may grow (`fba_player.playback.live`).
+    clock: seconds
     from any origin, never going back; the process's monotonic clock by default, see `use_clock`. Times are
     seconds of the animation.
 

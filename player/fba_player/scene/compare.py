@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.scene.layout import Drawing, caption, joined, moved
-from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.scene.compare_timeline import CompareTimeline
 from fba_player.scene.differences import Differences, differences
+from fba_player.scene.layout import Drawing, caption, joined, moved
 from fba_player.scene.scene import Scene
-from fba_player.view.view import View, srgb
+from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.view.protocols import InTime
 from fba_player.view.switches import Switches
+from fba_player.view.view import View, srgb
 
 if TYPE_CHECKING:
     from fba.animation import Animation

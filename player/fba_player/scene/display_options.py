@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.face.feature_points import names
-from fba_player.scene.bones import Bones, face_pivots
-from fba_player.view.annotations import Colour, Dots, Extras, Grid
 from fba_player.figure.face import FaceFigure
-from fba_player.scene.ground import body_grid, face_grid, no_shadows
+from fba_player.scene.bones import Bones, face_pivots
 from fba_player.scene.fap_heatmap import Influence
-from fba_player.view.view import FaceMesh, FaceShape, View
-from fba_player.view.switches import Switches
+from fba_player.scene.ground import body_grid, face_grid, no_shadows
 from fba_player.scene.wireframe import Wireframe
+from fba_player.view.annotations import Colour, Dots, Extras, Grid
+from fba_player.view.switches import Switches
+from fba_player.view.view import FaceMesh, FaceShape, View
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

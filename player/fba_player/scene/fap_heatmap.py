@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.parameters import FAP_COUNT, faps
-from fba_player.view.annotations import Legend
 from fba_player.figure.face import FaceFigure
-from fba_player.view.world_positions import swayed
 from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.annotations import Legend
 from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape, rotation_vector
+from fba_player.view.world_positions import swayed
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from fba.face.feature_points import row_of
 from fba_player.figure.face import FaceFigure
 from fba_player.mesh.primitives import tube_mesh
-from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
 from fba_player.scene.skin_lines import skin_lines
+from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.view.camera import Subject
 from fba_player.view.annotations import Grid
+from fba_player.view.camera import Subject
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -8,20 +8,20 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba_player.view.camera import Camera, Subject
+from fba_player.playback.timeline import Timeline
 from fba_player.scene.framing import Extent, body_extent
 from fba_player.scene.ground import no_shadows, shadows
-from fba_player.view.view import View
+from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import InTime
 from fba_player.view.switches import SWITCHES, Switches
-from fba_player.playback.timeline import Timeline
+from fba_player.view.view import View
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
     from fba.face.model import FaceModel
-    from fba_player.scene.display_options import Dressing
     from fba_player.figure.face import FaceFigure
     from fba_player.figure.person import Person
+    from fba_player.scene.display_options import Dressing
     from fba_player.scene.feature_points_view import PointView
 
 __all__ = ["LOOKS", "SWITCHES", "Scene", "default_camera"]

@@ -7,10 +7,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.view.annotations import Colour, Lines
-from fba_player.view.world_positions import directions, places
 from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.annotations import Colour, Lines
 from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape
+from fba_player.view.world_positions import directions, places
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]

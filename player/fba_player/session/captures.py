@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import FbaError
-from fba_player.sound.recorded_sound import FilmSound
 from fba_player.export.image_files import write_picture
 from fba_player.export.recorder import Recorder
 from fba_player.session.session import Session
+from fba_player.sound.recorded_sound import FilmSound
 
 UInt8 = npt.NDArray[np.uint8]
 

@@ -12,7 +12,8 @@ from importlib.resources import files
 class Key:
     """A row of the table.
 
-    keys: as shown to people ("F12", "Ctrl+S"); any of them does. action: see `fba_player.session.actions`. held:
+    keys: as shown to people ("F12", "Ctrl+S"); any of them does. action: see `fba_player.session.actions`.
+    held:
     whether it goes on while the key is held. group, does: for the help. shown: the keys for people, "Esc, Q".
     """
 

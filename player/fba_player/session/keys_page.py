@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import sys
 
-from fba_player.view.switches import SWITCHES
 from fba_player.session.keys import keys, mouse
+from fba_player.view.switches import SWITCHES
 
 
 def tables() -> str:

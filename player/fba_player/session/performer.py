@@ -10,9 +10,9 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.tracks import BodyTrack, FaceTrack
+from fba_player.playback.timeline import Timeline
 from fba_player.session.puppet import Baps, Faps, Puppet
 from fba_player.session.takes import TakeRecorder, Takes, take_rate
-from fba_player.playback.timeline import Timeline
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.view.camera import Camera
-from fba_player.view.view import View
-from fba_player.view.protocols import Showable
-from fba_player.view.switches import SWITCHES, Switch
 from fba_player.playback.transport import Transport
+from fba_player.session.camera_controller import Viewpoint
 from fba_player.session.keys import by_name
 from fba_player.session.source import Source
-from fba_player.session.camera_controller import Viewpoint
+from fba_player.view.camera import Camera
+from fba_player.view.protocols import Showable
+from fba_player.view.switches import SWITCHES, Switch
+from fba_player.view.view import View
 
 if TYPE_CHECKING:
     from fba_player.sound.player import Audio

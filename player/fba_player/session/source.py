@@ -14,8 +14,8 @@ from fba_player.session.timeline_trace import trace_of_motion, trace_of_planes
 
 if TYPE_CHECKING:
     from fba.codec import StreamInfo
-    from fba_player.view.protocols import Showable
     from fba_player.session.timeline_trace import Trace
+    from fba_player.view.protocols import Showable
 
 REFRESH = 0.2
 """Seconds between looks at what has arrived of a stream."""

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba.errors import DisplayError, FbaWarning, FormatError
 from fba.atomic_path import PathLike
+from fba.errors import DisplayError, FbaWarning, FormatError
 
 Int16 = npt.NDArray[np.int16]
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.sound.soundtrack import AAC_RATES, BLOCK
+from fba.atomic_path import PathLike
+from fba_player.playback.transport import Transport
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.mixer import SoundMixer
-from fba_player.playback.transport import Transport
-from fba.atomic_path import PathLike
+from fba_player.sound.soundtrack import AAC_RATES, BLOCK
 
 Int16 = npt.NDArray[np.int16]
 
@@ -24,7 +24,8 @@ PIECE = 1.0
 
 
 class FilmSound:
-    """Samples for a film, from where a transport is at each of its moments; a `fba_player.sound.soundtrack.FilmedSound`.
+    """Samples for a film, from where a transport is at each of its moments; a
+    `fba_player.sound.soundtrack.FilmedSound`.
 
     path: an audio file. transport: what is played; `offset` gives the seconds by which the sound begins after
     the first frame. muted: whether nothing is to be heard now.

@@ -10,9 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from fba.atomic_path import PathLike
 from fba.errors import FormatError
 from fba_player.sound.audio_file import open_sound
-from fba.atomic_path import PathLike
 
 Float32 = npt.NDArray[np.float32]
 

@@ -8,12 +8,12 @@ from typing import Any
 from imgui_bundle import imgui
 
 from fba_player.playback.timecode import clock_text
+from fba_player.session.session import Session
+from fba_player.session.timeline_trace import trace_picture
 from fba_player.ui import theme
 from fba_player.ui.imgui_renderer import ImguiRenderer
 from fba_player.ui.panels.panel import EITHER_BUTTON, STANDING
 from fba_player.ui.ruler import Ruler, label
-from fba_player.session.session import Session
-from fba_player.session.timeline_trace import trace_picture
 from fba_player.ui.transport_buttons import Buttons
 
 HEIGHT = 124.0

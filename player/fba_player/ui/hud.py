@@ -5,10 +5,10 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from fba_player.playback.timecode import clock_text
+from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.docks import EDGE
 from fba_player.ui.panels.panel import STANDING, Panel, tooltip
-from fba_player.session.session import Session
 
 ABOVE = 40.0
 """Points from the bar to words: what the timeline tells under the mouse stands between."""

@@ -34,7 +34,7 @@ class ImguiRenderer:
                 "version of imgui-bundle"
             )
         self._gl = context
-        folder = files("player") / "shaders"
+        folder = files("fba_player.gl") / "shaders"
         self._program = context.program(
             vertex_shader=(folder / "panels.vert").read_text(encoding="utf-8"),
             fragment_shader=(folder / "panels.frag").read_text(encoding="utf-8"),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from fba_player.session.session import Session
 from fba_player.ui.docks import EDGE, GAP, Dock, Docks, Wish, free_middle
 from fba_player.ui.panels.panel import Panel
-from fba_player.session.session import Session
 
 TOP = 56.0
 """Where panels begin below the buttons."""

@@ -7,12 +7,11 @@ import math
 from imgui_bundle import imgui
 
 from fba_player.playback.transport import SPEEDS
-from fba_player.ui import icons
-from fba_player.ui import theme
 from fba_player.session.actions import act
 from fba_player.session.keys import key_of
-from fba_player.ui.panels.panel import icon_button, tooltip
 from fba_player.session.session import Session
+from fba_player.ui import icons, theme
+from fba_player.ui.panels.panel import icon_button, tooltip
 
 MARGIN = 18.0
 

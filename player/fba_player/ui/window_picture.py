@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba_player.gl.context import offscreen_context
-from fba_player.gl.renderer import Renderer
 from fba_player.gl.framebuffer import Target
+from fba_player.gl.renderer import Renderer
 from fba_player.session.session import Session
 
 UInt8 = npt.NDArray[np.uint8]

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba_player.view.camera import Camera
-from fba_player.view.view import View
 from fba_player.view.switches import Switches
+from fba_player.view.view import View
 
 
 class Times(Protocol):

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from fba_player.mesh.simplify import Coarser
-    from fba_player.view.annotations import Extras
-    from fba_player.mesh.texture_image import FacePicture
     from fba_player.mesh.lazy_vertices import Places, Whole
+    from fba_player.mesh.simplify import Coarser
+    from fba_player.mesh.texture_image import FacePicture
+    from fba_player.view.annotations import Extras
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -176,7 +176,8 @@ class View:
     capsules: float32 (N, 16), see `CAPSULE_FLOATS`. marks: the same, but what hides them lets them shine
     through a little. blobs: float32 (K, 4), soft shadows on the ground:
     x, z, radius, darkness. ground: whether there is a ground. background: colour behind everything (sRGB,
-    0..1, as shown) instead of the studio. extras: what is drawn over the figure, see `fba_player.view.annotations`.
+    0..1, as shown) instead of the studio. extras: what is drawn over the figure, see
+    `fba_player.view.annotations`.
     """
 
     meshes: list[Mesh] = field(default_factory=list)

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
-from fba_player.view.camera import Camera
+from fba.atomic_path import PathLike
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.session.source import Source
-from fba.atomic_path import PathLike
+from fba_player.view.camera import Camera
 from fba_player.window.window import WARNED, Window
 
 if TYPE_CHECKING:

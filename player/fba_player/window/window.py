@@ -9,21 +9,21 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from fba.errors import DisplayError, FbaWarning
-from fba_player.view.camera import Camera
 from fba_player.gl.context import import_moderngl
-from fba_player.session.controls import Controls
-from fba_player.window.display import HOW_WITHOUT, started_glfw
-from fba_player.window.plain_overlay import Overlay
-from fba_player.gl.renderer import Renderer
-from fba_player.window.fullscreen import FullScreen
-from fba_player.gl.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
 from fba_player.gl.framebuffer import Target
+from fba_player.gl.renderer import Renderer
+from fba_player.gl.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
 from fba_player.playback.transport import Transport
-from fba_player.window.glfw_input import GlfwInput
 from fba_player.session.captures import Keeper
+from fba_player.session.controls import Controls
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.session.stills import pixels_of, still
+from fba_player.view.camera import Camera
+from fba_player.window.display import HOW_WITHOUT, started_glfw
+from fba_player.window.fullscreen import FullScreen
+from fba_player.window.glfw_input import GlfwInput
+from fba_player.window.plain_overlay import Overlay
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable

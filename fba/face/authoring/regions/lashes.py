@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.authoring.surface.attached_parts import roots
 from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, measure, slid
+from fba.face.authoring.surface.attached_parts import roots
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
-from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, measure, slid
 from fba.face.authoring.surface.surface import Surface
 from fba.face.model import Part
 

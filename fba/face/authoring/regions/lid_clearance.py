@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.face.authoring.regions.eyes import Eye
-from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.regions.mouth_opening import CLOSED
+from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.weights import smooth_step
 from fba.face.model import Part

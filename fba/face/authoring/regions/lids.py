@@ -11,14 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.authoring.regions.lid_clearance import Profile, bridged, edge_length, freed
-from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.regions.lid_clearance import Profile, bridged, edge_length, freed
+from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, Opening, measure, slid
+from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
-from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, Opening, measure, slid
-from fba.face.authoring.surface.unfold import relaxed
 from fba.face.authoring.surface.motion_limits import guarded
+from fba.face.authoring.surface.unfold import relaxed
 from fba.face.authoring.surface.weights import smooth_step, smoothed, without_hem
 from fba.face.model import Part
 

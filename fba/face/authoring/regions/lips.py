@@ -16,7 +16,6 @@ from fba.face.authoring.surface.contours import shares
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
-from fba.face.authoring.surface.unfold import eased_field
 from fba.face.authoring.surface.motion_limits import (
     caps,
     goals,
@@ -26,6 +25,7 @@ from fba.face.authoring.surface.motion_limits import (
     linear,
     values_between,
 )
+from fba.face.authoring.surface.unfold import eased_field
 from fba.face.authoring.surface.weights import region, smooth_step, spread, without_hem
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps

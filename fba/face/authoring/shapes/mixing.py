@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from fba.face.authoring.shapes.shapes import Shapes
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, by_part, limits, tables
-from fba.face.authoring.surface.unfold import eased_field
 from fba.face.authoring.surface.motion_limits import EASE, MODERATE, straight
-from fba.face.authoring.shapes.shapes import Shapes
 from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.unfold import eased_field
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.points import DIRECTIONS

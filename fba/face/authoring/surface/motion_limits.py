@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, limits
-from fba.face.authoring.surface.unfold import eased_field
 from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.unfold import eased_field
 
 Float64 = npt.NDArray[np.float64]
 Int = npt.NDArray[np.intp]

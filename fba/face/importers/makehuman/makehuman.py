@@ -20,12 +20,12 @@ import numpy.typing as npt
 
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
-from fba.mesh.text_files import beside, whole
 from fba.face.importers.assembly.default_materials import LOOKS
 from fba.face.importers.makehuman.mhclo import fitted
+from fba.face.model import FaceModel, Material, Part
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons, Source, make_part
-from fba.face.model import FaceModel, Material, Part
+from fba.mesh.text_files import beside, whole
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.mesh.text_files import beside, number, whole_number, words
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons
+from fba.mesh.text_files import beside, number, whole_number, words
 
 Float64 = npt.NDArray[np.float64]
 

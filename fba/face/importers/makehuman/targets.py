@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.mesh.text_files import number, whole_number, words
 from fba.face.importers.makehuman.makehuman import EYES, METRES, MakeHumanHead, eye_pieces
+from fba.mesh.text_files import number, whole_number, words
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

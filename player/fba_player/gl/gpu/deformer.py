@@ -13,8 +13,8 @@ from fba_player.figure.face_light import LitFacePart
 from fba_player.gl.gpu.programs import deforming_program, use
 from fba_player.gl.gpu.tables import CarriedBody, CarriedFace, MovedFace, Tables
 from fba_player.gl.gpu.textures import Table, grid
-from fba_player.mesh.lazy_vertices import Places, Whole
 from fba_player.gl.programs import set_uniform
+from fba_player.mesh.lazy_vertices import Places, Whole
 
 Float32 = npt.NDArray[np.float32]
 

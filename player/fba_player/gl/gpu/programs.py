@@ -51,7 +51,7 @@ def use(**textures: Any) -> None:
 
 
 def _source(name: str, *words: str) -> str:
-    folder = files("player") / "shaders"
+    folder = files("fba_player.gl") / "shaders"
     lines = []
     for line in (folder / name).read_text(encoding="utf-8").splitlines():
         included = line.startswith("//include ")

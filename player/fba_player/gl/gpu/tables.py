@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from fba.body.skin.skinning import JointMotion, Skinner, SkinTables
 from fba.face.deform.deformer import Deformer, FaceMotion
-from fba.face.deform.normals import Surface
 from fba.face.deform.flat_tables import Shifts
+from fba.face.deform.normals import Surface
 from fba_player.figure.face_light import FaceLight
-from fba_player.mesh.lazy_vertices import Whole
 from fba_player.figure.occlusion import Visibility
+from fba_player.mesh.lazy_vertices import Whole
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
@@ -68,7 +68,8 @@ class MovedFace:
 
 
 class LightTables:
-    """Where the light on a body is worked out, and who takes it from there: see `fba_player.figure.body_light`.
+    """Where the light on a body is worked out, and who takes it from there: see
+    `fba_player.figure.body_light`.
 
     at (A, 1): vertices; around, numbers, upright, joints, weights: theirs, as in `SkinTables`. near, shares
     (V, 3), folds (V, 1): of each vertex.

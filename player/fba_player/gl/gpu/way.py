@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fba_player.figure.body_light import LitPart
-from fba_player.gl.lod import same
 from fba_player.figure.face_light import LitFacePart
 from fba_player.gl.gpu.choice import FAILED, Choice
 from fba_player.gl.gpu.deformer import GpuDeformer
+from fba_player.gl.lod import same
 from fba_player.mesh.lazy_vertices import Places, Whole, spare
 from fba_player.view.view import ChosenLight, FaceMesh
 
@@ -168,7 +168,8 @@ def release(parts: Parts) -> None:
 
 
 def _limbs(mesh: FaceMesh) -> npt.NDArray[np.float32] | None:
-    """What may be in the light's way to the body that a mesh is a part of: see `fba_player.figure.body_light`."""
+    """What may be in the light's way to the body that a mesh is a part of: see
+    `fba_player.figure.body_light`."""
     reaching = _reaching(mesh)
     return reaching.body.capsules if isinstance(reaching, LitPart) else None
 

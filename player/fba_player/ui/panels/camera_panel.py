@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from fba_player.view.camera import DISTANCES, PITCH_LIMIT, PRESETS
-from fba_player.ui import theme
 from fba_player.session.actions import act
 from fba_player.session.keys import key_of
-from fba_player.ui.panels.panel import Panel, heading, tooltip
 from fba_player.session.session import Session
+from fba_player.ui import theme
+from fba_player.ui.panels.panel import Panel, heading, tooltip
+from fba_player.view.camera import DISTANCES, PITCH_LIMIT, PRESETS
 
 
 class CameraPanel(Panel):

@@ -40,8 +40,8 @@ class Course:
 class Columns:
     """Courses of a timeline's parameters; what is looked at is worked out when it is needed.
 
-    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds by which it is shown
-    later than its own times say.
+    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds by which
+    it is shown later than its own times say.
     """
 
     def __init__(self, timeline: Any, model: Any = None, later: float = 0.0) -> None:

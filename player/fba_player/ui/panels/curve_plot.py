@@ -10,13 +10,13 @@ import numpy as np
 from imgui_bundle import imgui
 
 from fba_player.playback.timecode import clock_text
+from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels.curve_data import Course
 from fba_player.ui.panels.envelope import Envelope, envelope
 from fba_player.ui.panels.panel import EITHER_BUTTON, shortened
-from fba_player.ui.ruler import Ruler, label
-from fba_player.session.session import Session
 from fba_player.ui.panels.time_zoom import Stretch
+from fba_player.ui.ruler import Ruler, label
 
 COLOURS: tuple[theme.Colour, ...] = (
     (0.36, 0.68, 0.90, 1.0), (0.96, 0.72, 0.33, 1.0), (0.45, 0.80, 0.52, 1.0), (0.90, 0.50, 0.62, 1.0),

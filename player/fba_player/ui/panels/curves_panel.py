@@ -7,12 +7,12 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels.parameter_chooser import Chooser
 from fba_player.ui.panels.curve_data import Columns, amount, parameter
 from fba_player.ui.panels.curve_plot import COLOURS, Lane, Lanes
 from fba_player.ui.panels.panel import Panel, chosen_name, tooltip
-from fba_player.session.session import Session
+from fba_player.ui.panels.parameter_chooser import Chooser
 from fba_player.ui.panels.time_zoom import Stretch
 
 BEGINS_WITH = 3

@@ -11,9 +11,9 @@ from imgui_bundle import imgui, implot
 
 from fba_player.scene.compare import ARRANGEMENTS
 from fba_player.scene.differences import Differences, Largest
+from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels.panel import Panel, chosen_name, heading, tooltip
-from fba_player.session.session import Session
 
 ROWS = 9
 """Parameters listed, those that differ most."""

@@ -10,9 +10,9 @@ from imgui_bundle import imgui
 
 from fba.codec import PartInfo, StreamInfo
 from fba_player.playback.timecode import clock_text
+from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels.panel import Panel, facts, heading
-from fba_player.session.session import Session
 
 
 class FilePanel(Panel):

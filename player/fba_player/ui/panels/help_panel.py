@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from fba_player.ui import theme
 from fba_player.session.keys import keys, mouse
-from fba_player.ui.panels.panel import Panel, heading
 from fba_player.session.session import Session
+from fba_player.ui import theme
+from fba_player.ui.panels.panel import Panel, heading
 
 WIDE = 296.0
 """Points that a column needs."""

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from imgui_bundle import imgui
 
-from fba_player.ui import theme
 from fba_player.session.keys import key_of
 from fba_player.session.session import Session
+from fba_player.ui import theme
 
 _FLAGS = imgui.WindowFlags_
 STANDING = int(

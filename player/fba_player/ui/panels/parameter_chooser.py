@@ -7,8 +7,8 @@ from functools import cache
 from imgui_bundle import imgui
 
 from fba.parameters import BAP_STANDARD_COUNT, FIRST_LOW_LEVEL_FAP, baps, faps
-from fba_player.ui import theme
 from fba_player.session.session import Session
+from fba_player.ui import theme
 
 MOST = 24
 """Curves at once."""

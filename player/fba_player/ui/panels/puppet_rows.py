@@ -73,7 +73,7 @@ def groups() -> tuple[Group, ...]:
 @cache
 def reach(number: int) -> float:
     """What the gallery shows of a FAP, as an amount in its unit: a strong, plausible motion."""
-    text = (files("player") / "contact_sheet.csv").read_text(encoding="utf-8")
+    text = (files("fba_player.export") / "contact_sheet.csv").read_text(encoding="utf-8")
     return next(
         abs(float(row["value"])) for row in csv.DictReader(text.splitlines()) if int(row["fap"]) == number
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
-from fba_player.view.switches import Switch, Switches
-from fba_player.ui.panels.panel import Panel, heading, tooltip
 from fba_player.session.session import Session
+from fba_player.ui.panels.panel import Panel, heading, tooltip
+from fba_player.view.switches import Switch, Switches
 
 
 class ViewPanel(Panel):

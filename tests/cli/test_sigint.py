@@ -1,0 +1,122 @@
+"""Ctrl-C at the worst moments."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+IN_A_CALLBACK = """
+import ctypes, signal, sys, time
+import fba.cli.commands.info
+from fba.cli.main import group, main
+callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+@group.command("long")
+def long():
+    callback()
+    {afterwards}
+    print("done")
+
+group.get_command = lambda context, name: long
+main(["long"])
+"""
+
+
+IMPORTING = """
+import signal, sys
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == "{module}":
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+signal.signal(signal.SIGINT, signal.{handler})
+sys.argv = ["fba", "info", "--help"]
+from fba.__main__ import main
+main()
+"""
+
+ENDING = """
+import atexit, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["fba", "--version"]
+from fba.__main__ import main
+atexit.register(signal.raise_signal, signal.SIGINT)
+main()
+"""
+
+
+LOADING = """
+import signal, sys, time
+from fba.cli.main import group, main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+steps = []
+names = {"signal": signal, "steps": steps, "__name__": "llvmlite.binding.executionengine"}
+exec("def load():\\n signal.raise_signal(signal.SIGINT)\\n steps.append('loaded')", names)
+
+@group.command("long")
+def long():
+    names["load"]()
+    while True:
+        time.sleep(0.01)
+
+group.get_command = lambda context, name: long
+try:
+    main(["long"])
+finally:
+    print(*steps)
+"""
+
+
+def ran(code: str) -> tuple[int, str, str]:
+    command = [sys.executable, "-c", code]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return result.returncode, result.stdout, result.stderr
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["fba.cli.main", "click", "inspect", "fba.cli.startup", "fba.cli.options", "fba.cli.commands.info"],
+)
+def test_ctrl_c_while_the_program_is_imported_leaves_no_traceback(module: str) -> None:
+    code, out, err = ran(IMPORTING.format(module=module, handler="default_int_handler"))
+    assert (code, out, err.strip()) == (130, "", "fba: interrupted")
+
+
+def test_a_program_that_shall_ignore_ctrl_c_ignores_it() -> None:
+    code, out, err = ran(IMPORTING.format(module="click", handler="SIG_IGN"))
+    assert (code, err) == (0, "")
+    assert out.startswith("Usage: ")
+
+
+def test_ctrl_c_while_the_program_ends_leaves_no_traceback() -> None:
+    code, _, err = ran(ENDING)
+    assert (code, err) == (130, "fba: interrupted\n")
+
+
+def test_what_must_not_be_left_halfway_is_finished_first() -> None:
+    command = [sys.executable, "-c", LOADING]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (result.returncode, result.stdout.strip(), result.stderr.strip()) == (
+        130, "loaded", "fba: interrupted",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "afterwards",
+    [
+        pytest.param("[time.sleep(0.01) for _ in range(1000)]", id="work goes on"),
+        pytest.param("raise RuntimeError('the callback did not do its work')", id="what needed it fails"),
+        pytest.param(
+            "raise SystemError('a result with an exception set') from KeyboardInterrupt()", id="cause"
+        ),
+    ],
+)
+def test_ctrl_c_inside_a_callback_of_c_code_is_not_lost(afterwards: str) -> None:
+    code = IN_A_CALLBACK.format(afterwards=afterwards)
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (result.returncode, result.stdout, result.stderr.strip()) == (130, "", "fba: interrupted")

@@ -1,0 +1,201 @@
+"""What a face with an interpolation table shows: the table first, then mates; in one piece or in many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hand_tracks
+from fba.animation import FaceTrack
+from fba.face import Definitions, Resolver, resolve
+from fba.face.interpolation.table import Function, InterpolationTable, Link, Term
+from fba.parameters import fap_numbers
+
+JOY = 1
+
+
+def scaled(name: str, factor: float) -> Function:
+    return Function([Term(factor, {name: 1})])
+
+
+class Face:
+    """A face as `resolve` sees it."""
+
+    def __init__(self, *links: Link, definitions: Definitions | None = None) -> None:
+        self.fit = InterpolationTable(links)
+        self.definitions = definitions
+
+
+def track(
+    *frames: dict[str, int],
+    viseme: list[tuple[int, ...] | None] | None = None,
+    expression: list[tuple[int, ...] | None] | None = None,
+) -> FaceTrack:
+    """Frames as {name: value}; None where no viseme or expression is sent."""
+    numbered = [{fap_numbers()[name]: value for name, value in frame.items()} for frame in frames]
+    return hand_tracks.track(numbered, viseme, expression)
+
+
+def shown(name: str, faps: np.ndarray) -> list[float]:
+    """What one FAP shows over time."""
+    column: list[float] = faps[:, fap_numbers()[name] - 1].tolist()
+    return column
+
+
+CORNERS = Link(("open_jaw",), {"stretch_l_cornerlip": scaled("open_jaw", -0.25)})
+
+
+def test_the_table_comes_before_mates_and_mates_follow_it() -> None:
+    # the right corner alone would be the left one's mate; the table gives the left one -0.25 x 400
+    faps = resolve(track({"open_jaw": 400}), Face(CORNERS))
+    assert shown("stretch_l_cornerlip", faps) == [-100]
+    assert shown("stretch_r_cornerlip", faps) == [-100]  # copied from what the table gave
+    assert shown("stretch_l_cornerlip_o", faps) == [-100]
+    both = resolve(track({"open_jaw": 400, "stretch_r_cornerlip": 60}), Face(CORNERS))
+    assert (shown("stretch_l_cornerlip", both), shown("stretch_r_cornerlip", both)) == ([-100], [60])
+
+
+def test_a_fap_that_is_sent_is_interpolated_no_more() -> None:
+    faps = resolve(
+        track({"open_jaw": 400}, {"open_jaw": 200}, {"stretch_l_cornerlip": 7}, {"open_jaw": 80}),
+        Face(CORNERS),
+    )
+    assert shown("stretch_l_cornerlip", faps) == [-100, -50, 7, 7]
+
+
+def test_kept_values_feed_the_table() -> None:
+    both = Link(
+        ("lower_t_midlip", "raise_b_midlip"),
+        {"depress_chin": Function([Term(1, {"lower_t_midlip": 1, "raise_b_midlip": 1})])},
+    )
+    faps = resolve(
+        track({"lower_t_midlip": 3}, {"raise_b_midlip": 5}, {}, {"lower_t_midlip": -2}), Face(both)
+    )
+    assert shown("depress_chin", faps) == [0, 15, 15, -10]
+
+
+def test_a_vanishing_denominator_leaves_the_mate() -> None:
+    inverse = Link(
+        ("open_jaw",), {"raise_l_cornerlip": Function([Term(100)], [Term(1, {"open_jaw": 1}), Term(-1)])}
+    )
+    faps = resolve(
+        track({"open_jaw": 11, "raise_r_cornerlip": 33}, {"open_jaw": 1}, {"open_jaw": -9}), Face(inverse)
+    )
+    assert shown("raise_l_cornerlip", faps) == [10, 33, -10]
+
+
+def test_what_the_table_gives_stands_over_visemes_and_expressions() -> None:
+    expressions = np.zeros((7, 68))
+    expressions[JOY, [5, 17]] = 500, 70  # the left corner and the chin
+    face = Face(CORNERS, definitions=Definitions(np.zeros((15, 68)), expressions))
+    faps = resolve(track({"open_jaw": 400}, expression=[(JOY, 63, 0, 0, 0, 0)]), face)
+    assert (shown("stretch_l_cornerlip", faps), shown("depress_chin", faps)) == ([-100], [70])
+    # init_face: the expression is the new neutral face, and FAPs come on top
+    faps = resolve(track({"open_jaw": 400}, expression=[(JOY, 63, 0, 0, 1, 0)]), face)
+    assert (shown("stretch_l_cornerlip", faps), shown("depress_chin", faps)) == ([400], [70])
+
+
+def test_what_the_table_makes_of_an_expression_is_not_added_to_it_again() -> None:
+    smile = Link(
+        ("expression",),
+        {
+            "stretch_l_cornerlip": Function(
+                [Term(2, {"expression_intensity1": 1}, ("expression_select1", JOY))]
+            )
+        },
+    )
+    further = Link(("stretch_l_cornerlip",), {"lift_l_cheek": scaled("stretch_l_cornerlip", 3)})
+    expressions = np.full((7, 68), 1000.0)
+    face = Face(smile, further, definitions=Definitions(np.zeros((15, 68)), expressions))
+    faps = resolve(track({"open_jaw": 5}, expression=[(JOY, 63, 0, 0, 1, 0)]), face)
+    assert shown("stretch_l_cornerlip", faps) == [126]
+    assert shown("stretch_r_cornerlip", faps) == [126]
+    assert shown("lift_r_cheek", faps) == [378]
+    assert shown("open_jaw", faps) == [1005]
+    # before any expression was sent, the link has no source
+    faps = resolve(track({}, {}, expression=[None, (JOY, 10, 0, 0, 0, 0)]), face)
+    assert shown("stretch_l_cornerlip", faps) == [0, 20]
+
+
+def test_a_table_survives_copying_the_resolver() -> None:
+    resolver = Resolver(Face(CORNERS))
+    resolver.push(track({"open_jaw": 400}))
+    twin = resolver.copy()
+    resolver.push(track({"stretch_l_cornerlip": 1}))
+    assert shown("stretch_l_cornerlip", twin.push(track({}))) == [-100]
+    assert shown("stretch_l_cornerlip", resolver.push(track({}))) == [1]
+
+
+def everything() -> Face:
+    """Links of all kinds: chains, alternatives, functions without value, high-level sources."""
+    return Face(
+        Link(
+            ("raise_l_i_eyebrow", "raise_l_o_eyebrow"),
+            {"raise_l_m_eyebrow": scaled("raise_l_i_eyebrow", 0.5)},
+        ),
+        Link(("raise_l_i_eyebrow",), {"raise_l_m_eyebrow": scaled("raise_l_i_eyebrow", 0.25)}),
+        Link(("raise_l_m_eyebrow",), {"squeeze_l_eyebrow": scaled("raise_l_m_eyebrow", -1)}),
+        Link(
+            ("open_jaw",),
+            {
+                "depress_chin": Function([Term(9, {"open_jaw": 2})], [Term(1, {"open_jaw": 1}), Term(-3)]),
+                "push_b_lip": scaled("open_jaw", 0.5),
+            },
+        ),
+        Link(
+            ("viseme", "push_b_lip"),
+            {"push_t_lip": Function([Term(1, {"push_b_lip": 1, "viseme_blend": 1}, ("viseme_select1", 2))])},
+        ),
+        Link(("expression",), {"lift_l_cheek": scaled("expression_intensity1", 2)}),
+    )
+
+
+@st.composite
+def tracks(draw: st.DrawFn) -> FaceTrack:
+    count = draw(st.integers(1, 60))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    mask = rng.random((count, 68)) < draw(st.sampled_from([0.0, 0.02, 0.3, 1.0]))
+    values = np.where(mask, rng.integers(-6, 6, (count, 68)), 0)
+    values[:, :2] = 0
+    viseme = np.stack([rng.integers(0, high, count) for high in (4, 4, 64, 2)], axis=1)
+    expression = np.stack([rng.integers(0, high, count) for high in (3, 64, 3, 64, 2, 2)], axis=1)
+    interpolated = rng.random((count, 68)) < draw(st.sampled_from([0.0, 0.0, 0.05, 0.5]))
+    return FaceTrack(values, mask, viseme, expression, interpolated)
+
+
+@given(tracks(), st.data())
+@settings(max_examples=80, deadline=None)
+def test_pieces_give_what_the_whole_gives(whole: FaceTrack, data: st.DataObject) -> None:
+    face = everything()
+    borders = sorted(data.draw(st.lists(st.integers(0, len(whole)), max_size=6)))
+    resolver = Resolver(face)
+    pieces = [
+        resolver.push(whole[a:b])
+        for a, b in zip([0, *borders], [*borders, len(whole)], strict=True)
+        if data.draw(st.booleans()) or b > a
+    ]
+    expected = resolve(whole, face)
+    np.testing.assert_array_equal(np.concatenate(pieces), expected)
+    assert np.isfinite(expected).all()
+
+
+@given(tracks())
+@settings(max_examples=40, deadline=None)
+def test_sent_values_show_as_they_are(whole: FaceTrack) -> None:
+    faps = resolve(whole, everything())
+    plain = (whole.mask[:, 2:]) & ~(np.maximum.accumulate(whole.expression[:, 4:5], axis=0) == 1)
+    assert (faps[:, 2:] == whole.values[:, 2:])[plain].all()
+
+
+def test_an_hour_is_resolved_in_bounded_steps() -> None:
+    """Blocks of any length: the border of the internal blocks shows nowhere."""
+    from fba.face.resolve import BLOCK
+
+    count = BLOCK + 3
+    values, mask = np.zeros((count, 68), dtype=int), np.zeros((count, 68), dtype=bool)
+    values[:, 2], mask[0, 2], mask[BLOCK + 1, 2] = 0, True, True
+    values[0, 2], values[BLOCK + 1, 2] = 40, 80
+    faps = resolve(FaceTrack(values, mask), Face(CORNERS))
+    assert shown("stretch_l_cornerlip", faps) == pytest.approx([-10] * (BLOCK + 1) + [-20] * 2)

@@ -1,0 +1,74 @@
+"""PLY files: ASCII and both byte orders, and damage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fba.errors import ModelError
+from fba.mesh.ply import read_ply
+from mesh_files import ply
+
+VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 2, 0.25]])
+MIXED = [[0, 1, 2], [0, 2, 3], [3, 2, 4, 0]]
+
+
+@pytest.mark.parametrize("order", ["ascii", "<", ">"])
+@pytest.mark.parametrize("extra", [False, True])
+@pytest.mark.parametrize("faces", [MIXED, MIXED[:2]])
+def test_all_formats_agree(tmp_path: Path, order: str, extra: bool, faces: list[list[int]]) -> None:
+    file = tmp_path / "mesh.ply"
+    file.write_bytes(ply(VERTICES, faces, order, extra))
+    mesh = read_ply(file)
+    np.testing.assert_array_equal(mesh.vertices, VERTICES)
+    found = [mesh.corners[a:b].tolist() for a, b in zip(mesh.starts[:-1], mesh.starts[1:], strict=True)]
+    assert found == faces
+    if extra:
+        assert mesh.colours is not None
+        # 127 of 255 is about 0.21 in linear light
+        np.testing.assert_allclose(mesh.colours[0, :3], [1, 0, 0.2158], atol=0.01)
+    else:
+        assert mesh.colours is None
+
+
+def damaged(old: bytes, new: bytes, order: str = "ascii") -> bytes:
+    whole = ply(VERTICES, MIXED, order)
+    assert old in whole
+    return whole.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"ply\n", "end_header"),
+        (b"ply\nformat ascii 1.0\nend_header\n", "x, y and z"),
+        (damaged(b"format ascii 1.0", b"format morse 1.0"), ":2"),
+        (damaged(b"format ascii 1.0", b"comment"), "no line 'format'"),
+        (damaged(b"element vertex 5", b"element vertex 99999999"), ":4: 99999999 of element vertex"),
+        (damaged(b"element vertex 5", b"element vertex -5"), ":4"),
+        (damaged(b"element vertex 5", b"element vertex 500"), "is it whole?"),
+        (damaged(b"property float x", b"property quaternion x"), ":5"),
+        (damaged(b"property float x", b"property float w"), "x, y and z"),
+        (damaged(b"list uchar int vertex_indices", b"list float int vertex_indices"), "fraction"),
+        (damaged(b"vertex_indices", b"something_else"), "no list vertex_indices"),
+        (damaged(b"element face 3", b"element face 0"), "0 faces"),
+        (damaged(b"3 0 1 2\n", b"3 0 1 7\n"), "face 0 names vertex 7, but there are 5"),
+        (damaged(b"3 0 1 2\n", b"3 0 1 -2\n"), "names vertex -2"),
+        (damaged(b"3 0 1 2\n", b"200 0 1 2\n"), "is it whole?"),
+        (damaged(b"3 0 1 2\n", b"-3 0 1 2\n"), "a list of -3"),
+        (damaged(b"3 0 1 2\n", b"3 0 1 x\n"), "could not convert"),
+        (damaged(b"1.0 1.0 0.0\n", b"1.0 nan 0.0\n"), "not finite"),
+        (ply(VERTICES, MIXED, "<")[:-3], "is it whole?"),
+        (ply(VERTICES, MIXED[:2], ">")[:-3], "is it whole?"),
+        (b"", "empty"),
+    ],
+)
+def test_damage_is_named(tmp_path: Path, data: bytes, words: str) -> None:
+    file = tmp_path / "mesh.ply"
+    file.write_bytes(data)
+    with pytest.raises(ModelError) as caught:
+        read_ply(file)
+    assert "mesh.ply" in str(caught.value)
+    assert words in str(caught.value)

@@ -1,0 +1,119 @@
+"""The same pose drawn by pyrender and by us: the silhouettes agree."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fba.animation import Animation
+from fba.errors import DisplayError
+from fba.player import to_pyrender
+from fba_player.export import pyrender_bridge
+from fba_player.export.pyrender_bridge import _numpy_1, swayed
+
+BOTH = """
+import json, sys
+import numpy as np
+import player
+from player_tracks import body_track, face_track
+from fba.animation import Animation
+
+HEAD = {3: 700, 48: 20000, 49: -40000, 31: 80}  # the jaw opens, head and eyes turn
+ARM = {32: 90000, 8: 50000, 11: -80000}
+cases = {
+    "head": (Animation(25, np.arange(1), face_track([HEAD])), "three-quarter", (320, 240)),
+    "body": (Animation(25, np.arange(1), face_track([{}]), body_track([ARM])), "body", (960, 720)),
+}
+found = {}
+for name, (animation, camera, size) in cases.items():
+    scene = player.to_pyrender(None, animation, 0.0, camera=camera, aspect=4 / 3)
+    import pyrender
+    drawing = pyrender.OffscreenRenderer(*size)
+    colour, depth = drawing.render(scene)
+    drawing.delete()
+    ours = player.Scene(animation)
+    ours.show("background", "transparent")
+    ours.show("shadows", False)
+    with player.Offscreen(ours, size, camera, samples=4) as view:
+        picture = view.frame(0.0)
+    one, other = depth > 0, picture[..., 3] > 127
+    inside = one & other
+    found[name] = {
+        "iou": float(inside.sum() / (one | other).sum()),
+        "share": float(other.mean()),
+        "brightness": [float(pixels[inside][:, :3].mean()) for pixels in (colour, picture)],
+        "meshes": len(scene.meshes),
+        "lights": len(scene.directional_lights),
+        "scale": float(scene.scale),
+    }
+found["numpy"] = [name for name in ("infty", "Inf", "NaN", "float_") if hasattr(np, name)]
+print(json.dumps(found))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("opengl")
+def test_silhouettes_agree() -> None:
+    if find_spec("pyrender") is None:
+        pytest.skip('pyrender is not installed: pip install ".[pyrender]"')
+    root = Path(__file__).parents[3]
+    folders = [str(root / folder) for folder in ("tests/helpers", "", "player")]
+    folders.append(os.environ.get("PYTHONPATH", ""))
+    environment = {**os.environ, "PYOPENGL_PLATFORM": "egl", "PYTHONPATH": os.pathsep.join(folders)}
+    done = subprocess.run(
+        [sys.executable, "-c", BOTH],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found.pop("numpy") == []
+    for name, one in found.items():
+        assert one["iou"] > 0.99, name
+        assert one["share"] > 0.05, name
+        assert one["lights"] == 3
+        assert one["meshes"] >= 4
+        assert 0.5 < one["brightness"][0] / one["brightness"][1] < 2
+    assert 0.3 < found["head"]["scale"] < 1.2  # metres, corner to corner
+    assert 1.7 < found["body"]["scale"] < 2.6
+
+
+def test_pyrender_missing_is_named(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyrender", None)
+    monkeypatch.setattr(pyrender_bridge, "missing_libraries", list)  # whatever this machine has
+    before = set(vars(np))
+    with pytest.raises(DisplayError, match=r"pip install pyrender;.*PYOPENGL_PLATFORM=egl"):
+        to_pyrender(None, talking, 0.0)
+    assert set(vars(np)) == before
+
+
+def test_what_numpy_has_dropped_is_lent_and_taken_back() -> None:
+    with _numpy_1():
+        assert np.infty == np.inf  # type: ignore[attr-defined]  # noqa: NPY201
+    assert not hasattr(np, "infty")
+    with pytest.raises(KeyError), _numpy_1():
+        raise KeyError
+    assert not hasattr(np, "infty")
+
+
+def test_the_neck_bends_between_shoulders_and_head() -> None:
+    random = np.random.default_rng(3)
+    places, centre = random.normal(size=(20, 3)), np.array([0.1, -0.4, 0.2])
+    turn, sway = np.array([0.5, -0.8, 0.3]), np.linspace(0, 1, 20)
+    wanted = [
+        centre + Rotation.from_rotvec(turn * share).apply(place - centre)
+        for place, share in zip(places, sway, strict=True)
+    ]
+    np.testing.assert_allclose(swayed(places, sway.astype(np.float32), turn, centre), wanted, atol=1e-6)
+    np.testing.assert_array_equal(swayed(places, sway.astype(np.float32), np.zeros(3), centre), places)

@@ -1,0 +1,111 @@
+"""The person that BAPs move in the player: body and face in one place, dressed once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import Animation
+from fba.body import BapSolver
+from fba.body.model import BodyModel
+from fba.face.model import FaceModel
+from fba.player import Scene
+from fba_player.figure.face import FaceFigure
+from fba_player.figure.person import Person
+from player_tracks import body_track, face_track
+
+STILL = np.zeros(68, dtype=np.float32)
+
+
+@pytest.fixture(scope="module")
+def person() -> Person:
+    return Person(BodyModel.default(), FaceFigure(FaceModel.default()))
+
+
+@pytest.fixture(scope="module")
+def standing() -> np.ndarray:
+    return BapSolver(BodyModel.default().skeleton).pose(np.zeros(296))
+
+
+def test_everything_of_a_person_is_there_once(person: Person, standing: np.ndarray) -> None:
+    body, model = BodyModel.default(), FaceModel.default()
+    meshes = person.meshes(STILL, person.joints(STILL, standing))
+    worn = [part for part in body.parts if part.kind != "neck"]  # the built-in head brings its neck
+    faces = [part for part in model.parts if part.kind not in ("eye", "other")]  # and leaves its shirt
+    assert [len(mesh.positions) for mesh in meshes] == [len(part.vertices) for part in (*worn, *faces)]
+    for mesh in meshes:
+        assert mesh.light.shape == (len(mesh.positions), 4)
+        assert np.isfinite(mesh.positions).all()
+        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-3)
+    assert len(person.eyes(STILL, standing)) == 2
+
+
+def test_a_person_stands_on_the_ground_and_has_its_eyes_in_its_head(
+    person: Person, standing: np.ndarray
+) -> None:
+    places = np.concatenate([mesh.positions for mesh in person.meshes(STILL, standing)])
+    assert places[:, 1].min() == pytest.approx(0, abs=0.02)
+    assert 1.70 < places[:, 1].max() < 1.80
+    eyes = np.array([eye.matrix[:3, 3] for eye in person.eyes(STILL, standing)])
+    assert eyes[:, 1] == pytest.approx(1.648, abs=0.02)
+    assert np.ptp(eyes[:, 0]) == pytest.approx(0.062, abs=0.003)
+
+
+def test_faps_and_baps_turn_the_head_alike(person: Person, standing: np.ndarray) -> None:
+    """30 degrees of yaw by FAP 49 turn the eyes by 30 degrees about the skull base."""
+    faps = STILL.copy()
+    faps[48] = np.radians(30) * 1e5
+    turned = person.joints(faps, standing)
+    poses = ((STILL, standing), (faps, turned))
+    before, after = (np.mean([eye.matrix[:3, 3] for eye in person.eyes(*p)], axis=0) for p in poses)
+    skull = standing[BodyModel.default().skeleton.number("skullbase"), :3, 3]
+    arms = (before - skull)[[0, 2]], (after - skull)[[0, 2]]
+    assert np.linalg.norm(arms[0]) == pytest.approx(np.linalg.norm(arms[1]), rel=0.02)
+    cosine = arms[0] @ arms[1] / np.linalg.norm(arms[0]) / np.linalg.norm(arms[1])
+    assert np.degrees(np.arccos(cosine)) == pytest.approx(30, abs=0.5)
+
+
+def test_another_face_gets_the_neck_of_the_body(standing: np.ndarray) -> None:
+    """A face that ends at the jaw: the body's own neck is shown."""
+    model = FaceModel.default()
+    skin = model.part("skin")
+    kept = (skin.vertices[skin.triangles][:, :, 1] > -0.06).all(axis=1)
+    used, corners = np.unique(skin.triangles[kept], return_inverse=True)
+    arrays = {key: getattr(skin, key)[used] for key in ("vertices", "normals", "texcoords", "colours")}
+    mask = replace(skin, triangles=corners.reshape(-1, 3).astype(np.int32), **arrays)
+    points, bound = model.points.copy(), np.full(84, -1, dtype=np.int32)
+    small = replace(model, parts=(mask, *model.parts[1:]), points=points, bound=bound, tables=())
+    person = Person(BodyModel.default(), FaceFigure(small))
+    assert not person.head.brings_neck
+    neck = len(BodyModel.default().part("neck").vertices)
+    assert neck in [len(mesh.positions) for mesh in person.meshes(STILL, standing)]
+
+
+def test_a_scene_shows_the_person_or_its_bones(person: Person) -> None:
+    animation = Animation(25, np.arange(2), face_track([{3: 1}, {3: 200}]), body_track([{32: 5}, {32: 9000}]))  # type: ignore[arg-type]
+    scene = Scene(animation)
+    shown = scene.at(0.04)
+    assert (len(shown.capsules), len(shown.meshes)) == (0, 0)
+    assert len(shown.faces) > 5
+    scene.view = "points"
+    bones = scene.at(0.04)
+    assert len(bones.capsules) > 100
+
+
+def test_a_body_of_ones_own() -> None:
+    body = BodyModel.default()
+    scene = Scene(Animation(25, np.arange(1), body=body_track([{}])), body=body)  # type: ignore[arg-type]
+    assert scene.person.body is body
+
+
+def test_real_clips_stand_on_the_ground(shared: Path) -> None:
+    """Somebody who dances: the lowest of the person is always within 6 cm of the ground."""
+    scene = Scene(fba.read(shared / "data" / "greta" / "Dance.bvh"))
+    for share in np.linspace(0.05, 0.95, 7):
+        view = scene.at(float(scene.start) + share * float(scene.duration))
+        lowest = min(float(mesh.positions[:, 1].min()) for mesh in view.faces)
+        assert -0.06 < lowest < 0.06

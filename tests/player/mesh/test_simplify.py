@@ -1,0 +1,160 @@
+"""Coarser meshes: fewer triangles of the same vertices, on the same surface; chosen by size on the screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from fba.cache import kept
+from fba.compiled import is_compiled
+from fba_player.gl.lod import Details, distance, same
+from fba_player.mesh.lazy_vertices import Places
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.mesh.simplify import TOLERANCES, Coarser, coarser
+from fba_player.view.view import FaceMesh, FaceShape
+
+pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba meshes are drawn as they are")
+Int32 = npt.NDArray[np.int32]
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FBA_CACHE", str(tmp_path))
+
+
+def grid(count: int, size: float) -> tuple[npt.NDArray[np.float64], Int32]:
+    """A flat square of count x count vertices."""
+    x, y = np.meshgrid(np.linspace(0, size, count), np.linspace(0, size, count))
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    one = np.stack([corner, corner + 1, corner + count], axis=1)
+    other = np.stack([corner + 1, corner + count + 1, corner + count], axis=1)
+    vertices = np.stack([x.ravel(), y.ravel(), np.zeros(count * count)], axis=1)
+    return vertices, np.concatenate([one, other]).astype(np.int32)
+
+
+def area(vertices: npt.NDArray[np.float64], triangles: Int32) -> float:
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+
+
+def mesh_of(vertices: npt.NDArray[np.float32], triangles: Int32) -> FaceMesh:
+    count = len(vertices)
+    shape = FaceShape(
+        triangles,
+        np.zeros((count, 4), np.float32),
+        np.ones(count, np.float32),
+        coarser=Coarser(vertices, 1, triangles),
+    )
+    return FaceMesh(
+        shape,
+        Places.of(vertices, vertices),
+        np.ones((count, 4), np.float32),
+        np.eye(4),
+        np.zeros(3),
+        np.zeros(3),
+    )
+
+
+def test_a_flat_square_needs_few_triangles_and_keeps_its_border() -> None:
+    vertices, triangles = grid(21, 0.1)
+    found = Coarser(vertices.astype(np.float32), 1, triangles).within(0.0004)
+    assert found is not None
+    assert len(found) < len(triangles) / 4
+    assert area(vertices, found) == pytest.approx(0.01, rel=1e-6)
+    normal = np.cross(
+        vertices[found[:, 1]] - vertices[found[:, 0]], vertices[found[:, 2]] - vertices[found[:, 0]]
+    )
+    assert (normal[:, 2] > 0).all()  # none turned over
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES[2:])
+def test_a_ball_stays_a_ball_of_that_size(tolerance: float) -> None:
+    """Vertices stay on the sphere; what lies between is off by no more than a few times the mean error."""
+    unit, triangles = sphere_mesh(48, 64)
+    vertices = (unit * 0.1).astype(np.float32)
+    found = Coarser(vertices, 1, triangles.astype(np.int32)).within(tolerance)
+    assert found is not None
+    assert len(found) < len(triangles)
+    middles = vertices[found].mean(axis=1)
+    assert (0.1 - np.linalg.norm(middles, axis=1)).max() < 6 * tolerance + 0.0005
+
+
+def test_levels_only_leave_out() -> None:
+    unit, triangles = sphere_mesh(32, 48)
+    coarse = Coarser((unit * 0.1).astype(np.float32), 1, triangles.astype(np.int32))
+    before = set(range(len(unit)))
+    counts = []
+    for tolerance in TOLERANCES:
+        found = coarse.within(tolerance)
+        assert found is not None
+        assert set(found.ravel().tolist()) <= before
+        before = set(found.ravel().tolist())
+        counts.append(len(found))
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] < len(triangles) / 5
+    assert coarse.within(TOLERANCES[0] / 2) is None
+
+
+def test_what_moves_in_a_pose_keeps_its_vertices() -> None:
+    """A flat square that bulges in its second pose keeps more than one that does not."""
+    vertices, triangles = grid(25, 0.1)
+    bulged = vertices.copy()
+    bulged[:, 2] = 0.01 * np.sin(vertices[:, 0] * 60) * np.sin(vertices[:, 1] * 60)
+    flat = coarser(np.concatenate([vertices, vertices], axis=1), 2, triangles, (0.0004,))[1]
+    moving = coarser(np.concatenate([vertices, bulged], axis=1), 2, triangles, (0.0004,))[1]
+    assert (moving == 1).sum() > 2 * (flat == 1).sum()
+
+
+def test_a_seam_does_not_gape() -> None:
+    """Two squares side by side whose vertices along the seam are there twice."""
+    left, triangles = grid(11, 0.05)
+    right = left + np.array([0.05, 0.0, 0.0])
+    vertices = np.concatenate([left, right])
+    both = np.concatenate([triangles, triangles + len(left)]).astype(np.int32)
+    onto, _ = coarser(vertices, 1, both, (0.001,))
+    seam = np.flatnonzero(np.abs(vertices[:, 0] - 0.05) < 1e-9)
+    assert (onto[seam] == seam).all()
+
+
+def test_a_file_that_was_tampered_with_is_made_anew(tmp_path: Path) -> None:
+    unit, triangles = sphere_mesh(24, 32)
+    points = (unit * 0.1).astype(np.float32)
+    good = Coarser(points, 1, triangles.astype(np.int32)).within(0.0016)
+    (path,) = (tmp_path / "fba").glob("coarse-*.fbk")
+    count = len(points)
+    zeros = np.zeros(count, dtype=np.int32)
+    path.unlink()
+    kept(path.stem, ((count,),) * 2, lambda: [np.full(count, 10**6, dtype=np.int32), zeros], np.int32)
+    again = Coarser(points, 1, triangles.astype(np.int32)).within(0.0016)
+    assert good is not None
+    assert again is not None
+    np.testing.assert_array_equal(good, again)
+    circle = np.roll(np.arange(count), 1).astype(np.int32)
+    path.unlink()
+    kept(path.stem, ((count,),) * 2, lambda: [circle, zeros], np.int32)
+    assert Coarser(points, 1, triangles.astype(np.int32)).within(0.0016) is not None  # and no endless walk
+
+
+def test_the_farther_the_coarser() -> None:
+    unit, triangles = sphere_mesh(48, 64)
+    mesh = mesh_of((unit * 0.1).astype(np.float32), triangles.astype(np.int32))
+    details, pixel = Details(), 0.0006
+    near, far = (details.suited([mesh], (0.0, 0.0, away), pixel)[0] for away in (0.15, 6.0))
+    assert near is mesh
+    assert len(far.shape.triangles) < len(triangles) / 3
+    assert len(far.positions) == len(far.normals) == len(far.light) == int(far.shape.triangles.max()) + 1
+    np.testing.assert_allclose(np.linalg.norm(far.positions, axis=1), 0.1, rtol=1e-5)
+    again = details.suited([mesh], (0.0, 0.0, 6.0), pixel)[0]
+    assert again.shape is far.shape
+    assert again.light is far.light
+    assert distance(mesh, np.array([0.0, 0.0, 6.0])) == pytest.approx(5.9, abs=0.02)
+
+
+def test_views_of_one_array_are_known_as_the_same() -> None:
+    light = np.ones((8, 4), dtype=np.float32)
+    assert same(light[2:5], light[2:5])
+    assert not same(light[2:5], light[3:6])
+    assert not same(light[2:5], light.copy()[2:5])

@@ -1,0 +1,324 @@
+"""A stream shown while it arrives: frames as soon as they are there, the last one held, damage told."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import fba
+from fba.animation import Animation
+from fba.codec import Decoder, EncoderOptions
+from fba.errors import FbaError
+from fba_player.playback.frame_buffer import GrowingFrames
+from fba_player.playback.live import LiveAnimation, LiveTimeline
+from fba_player.playback.timeline import Timeline
+from fba_player.playback.transport import BUFFER, Transport
+from fba_player.scene.scene import Scene
+from player_tracks import body_track, face_track
+
+
+class Wire:
+    """A pipe: what is sent is read at the other end, bit by bit."""
+
+    def __init__(self) -> None:
+        read, write = os.pipe()
+        self.out = os.fdopen(read, "rb")
+        self.into = os.fdopen(write, "wb", buffering=0)
+
+    def send(self, data: bytes) -> None:
+        self.into.write(data)
+
+    def end(self) -> None:
+        self.into.close()
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    pipe = Wire()
+    yield pipe
+    pipe.into.close()
+    until(lambda: not any(t.name == "fba live" and t.is_alive() for t in threading.enumerate()))
+    pipe.out.close()
+
+
+def until(condition: Callable[[], object]) -> None:
+    """Wait for another thread; not for long."""
+    begun = time.monotonic()
+    while not condition():
+        assert time.monotonic() - begun < 20, "nothing came"
+        time.sleep(0.002)
+
+
+def performance(count: int = 600, both: bool = False) -> Animation:
+    faces = [{3: 4 * (t % 200), 5: -t % 90} for t in range(count)]
+    bodies = [{32: 3000 * (t % 20)} for t in range(count)] if both else None
+    body = body_track(bodies) if bodies is not None else None
+    return Animation(Fraction(25), np.arange(count), face_track(faces), body, "live")
+
+
+def stream(animation: Animation, **options: object) -> tuple[bytes, list[int]]:
+    """Its bytes, and the byte at which each plane ends."""
+    data = fba.encode(animation, EncoderOptions(**options))  # type: ignore[arg-type]
+    decoder = Decoder()
+    frames = [*decoder.push(data), *decoder.finish()]
+    return data, [(frame.plane.bit + frame.plane.bits + 7) // 8 for frame in frames]
+
+
+def test_frames_can_be_seen_as_soon_as_they_are_there(wire: Wire) -> None:
+    animation = performance(both=True)
+    data, ends = stream(animation)
+    live = LiveAnimation(wire.out, name="wire")
+    timeline = LiveTimeline(live)
+    whole = Timeline(fba.decode(data))
+    sent = 0
+    for frames in (1, 2, 100, 255, 256, 257, 600):
+        wire.send(data[sent : ends[frames - 1]])
+        sent = ends[frames - 1]
+        until(lambda least=frames - 1: len(live) >= least)  # what follows a plane tells that it is complete
+        assert live.growing
+        last = float(whole.time_of(frames - 2 if frames > 1 else 0))
+        for at in (last, last / 2) if len(live) else ():
+            np.testing.assert_array_equal(timeline.faps(at), whole.faps(at))
+            np.testing.assert_array_equal(timeline.baps(at), whole.baps(at))
+    wire.send(data[sent:])
+    wire.end()
+    until(lambda: not live.growing)
+    assert live.snapshot() == fba.decode(data)
+    assert live.message == ""
+    assert (timeline.frames, timeline.duration) == (600, 24)
+
+
+def test_playing_begins_with_the_first_i_plane_and_waits_for_what_is_late(wire: Wire) -> None:
+    animation = performance(100)
+    data, ends = stream(animation)
+    live = LiveAnimation(wire.out)
+    assert not live.wait(0.0)
+    wire.send(data[: ends[9]])  # frames 0 to 8 or 9: more than is needed
+    assert live.wait(20)
+    shown = len(Decoder().push(data[: ends[9]]))
+    until(lambda: len(live) == shown)
+    now = [100.0]
+    player = Transport(LiveTimeline(live), loop=True, clock=lambda: now[0])
+    player.play()
+    now[0] += 0.2
+    assert player.time == pytest.approx(0.2)
+    now[0] += 5.0
+    edge = (shown - 1) / 25
+    assert (player.time, player.waiting, player.playing) == (pytest.approx(edge), True, True)
+    wire.send(data[ends[9] : ends[12]])  # a little more: not enough to go on
+    until(lambda: len(live) > shown)
+    now[0] += 1.0
+    assert (player.time, player.waiting) == (pytest.approx(edge), True)
+    wire.send(data[ends[12] : ends[30]])
+    until(lambda: len(live) > 25)
+    assert player.time == pytest.approx(edge)
+    now[0] += 0.1
+    assert (player.time, player.waiting) == (pytest.approx(edge + 0.1), False)
+    player.last()  # near the newest
+    assert player.behind == pytest.approx(BUFFER)
+    player.seek(0.1)  # and back, in what has arrived
+    now[0] += 0.05
+    assert player.time == pytest.approx(0.15)
+    wire.send(data[ends[30] :])
+    wire.end()
+    until(lambda: not live.growing)
+    now[0] += 4.0
+    assert player.time == pytest.approx(0.15)  # four seconds long, and now it loops
+    assert not player.waiting
+
+
+def test_the_planes_are_counted_as_they_arrive(wire: Wire) -> None:
+    data, ends = stream(performance(), intra_period=2)
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[99]])
+    until(lambda: len(live) == 100)
+    half = live.info()
+    wire.send(data[ends[99] :])
+    wire.end()
+    assert live.wait_end(20)
+    whole, file = live.info(), fba.codec.probe_stream(data)
+    assert (half.frames, half.size) == (100, ends[99])
+    assert file.plane_bits is not None
+    assert half.plane_bits is not None
+    assert half.plane_bits.tolist() == file.plane_bits.tolist()[:100]
+    for name in ("format", "size", "rate", "frames", "duration", "start", "skipped", "intra_planes"):
+        assert getattr(whole, name) == getattr(file, name), name
+    np.testing.assert_array_equal(whole.plane_bits, file.plane_bits)
+    np.testing.assert_array_equal(whole.plane_intra, file.plane_intra)
+    np.testing.assert_array_equal(whole.frame_index, file.frame_index)
+
+
+def test_paused_it_stays_where_it_is_while_more_arrives(wire: Wire) -> None:
+    data, ends = stream(performance(100))
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[20]])
+    assert live.wait(20)
+    now = [0.0]
+    player = Transport(LiveTimeline(live), clock=lambda: now[0])
+    player.seek(0.4)
+    length = player.duration
+    wire.send(data[ends[20] :])
+    wire.end()
+    until(lambda: not live.growing)
+    now[0] += 3.0
+    assert (player.time, player.playing) == (pytest.approx(0.4), False)
+    assert player.duration > length
+
+
+def test_a_mark_in_what_has_arrived_loops_at_once(wire: Wire) -> None:
+    data, ends = stream(performance(100))
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[40]])
+    assert live.wait(20)
+    now = [0.0]
+    player = Transport(LiveTimeline(live), clock=lambda: now[0])
+    player.mark_in, player.mark_out = 0.2, 0.6
+    player.play()
+    now[0] += 0.7
+    assert player.time == pytest.approx(0.3)
+    player.clear_marks()
+    now[0] += 0.5
+    assert player.time == pytest.approx(0.8)
+
+
+def test_a_stream_that_is_cut_off_shows_what_is_there(wire: Wire) -> None:
+    data, ends = stream(performance(100))
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[70] - 2])
+    wire.end()
+    assert live.wait(20)
+    until(lambda: not live.growing)
+    assert 68 <= len(live) <= 71
+    assert "bytes lost at byte" in live.message
+    assert "ends inside" in live.details
+
+
+def test_damage_is_stepped_over_and_told(wire: Wire) -> None:
+    data, ends = stream(performance(200), intra_period=1, start_codes=True)
+    broken = bytearray(data)
+    broken[ends[60] + 1 : ends[60] + 12] = b"\xff" * 11
+    live = LiveAnimation(wire.out)
+    wire.send(bytes(broken))
+    wire.end()
+    assert live.wait(20)
+    until(lambda: not live.growing)
+    assert "lost" in live.message
+    assert 100 < len(live) < 200
+    assert int(live.index[-1]) > 150
+
+
+def test_nothing_at_all_is_an_error(wire: Wire) -> None:
+    live = LiveAnimation(wire.out)
+    wire.send(b"nothing of the sort")
+    wire.end()
+    with pytest.raises(FbaError, match="00 00 01 ba"):
+        live.wait(20)
+
+
+def test_an_empty_stream_is_an_error(wire: Wire) -> None:
+    live = LiveAnimation(wire.out)
+    wire.end()
+    with pytest.raises(FbaError):
+        live.wait(20)
+
+
+def test_bytes_that_were_looked_at_before_count(wire: Wire) -> None:
+    animation = performance(30)
+    data, _ = stream(animation)
+    live = LiveAnimation(wire.out, head=data[:7])
+    wire.send(data[7:])
+    assert not live.wait_end(0.0)
+    wire.end()
+    assert live.wait_end(20)
+    assert live.wait()
+    assert len(live) == 30
+
+
+def test_a_scene_of_a_stream_is_the_scene_of_its_file(wire: Wire) -> None:
+    animation = performance(30)
+    data, ends = stream(animation)
+    live = LiveAnimation(wire.out, name="wire")
+    wire.send(data[: ends[15]])
+    assert live.wait(20)
+    scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
+    assert (scene.title, scene.has_body) == ("wire", False)
+    ours, theirs = scene.at(0.4).faces, Scene(fba.decode(data)).at(0.4).faces
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(one.positions, other.positions, atol=1e-6)
+
+
+def test_the_camera_follows_who_walks_away_later(wire: Wire) -> None:
+    steps = [{183: 0 if t < 20 else 100 * (t - 20)} for t in range(100)]  # BAP 183: forwards, mm
+    data, ends = stream(Animation(Fraction(25), np.arange(100), body=body_track(steps)))
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[19]])
+    assert live.wait(20)
+    scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
+    assert scene.travel(0.5) == (0.0, 0.0, 0.0)
+    wire.send(data[ends[19] :])
+    wire.end()
+    until(lambda: not live.growing)
+    assert scene.travel(3.96)[2] == pytest.approx(7.9, abs=0.3)
+
+
+def test_closing_ends_it_though_the_sender_goes_on(wire: Wire) -> None:
+    data, ends = stream(performance(100))
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[20]])
+    assert live.wait(20)
+    live.close()
+    assert not live.growing
+    before = len(live)
+    wire.send(data[ends[20] :])
+    wire.end()
+    until(lambda: not any(t.name == "fba live" and t.is_alive() for t in threading.enumerate()))
+    assert len(live) - before < 100
+
+
+def test_a_body_that_comes_late_is_told_but_not_shown() -> None:
+    frames = GrowingFrames()
+    alone, both = performance(10), performance(10, both=True)
+    for animation in (alone, both):
+        data = fba.encode(animation)
+        decoder = Decoder()
+        for block in [*decoder.push_blocks(data), *decoder.finish_blocks()]:
+            frames.append(block)
+        frames.settle()
+    assert (frames.now.body, frames.left_out) == (None, "a body")
+    assert len(frames.now.index) == 20
+
+
+def test_a_rate_that_changes_keeps_the_times() -> None:
+    frames = GrowingFrames()
+    for rate, first in ((25, 0), (10, 4)):
+        animation = Animation(Fraction(rate), np.arange(10), face=face_track([{3: 9}] * 10))
+        decoder = Decoder()
+        data = fba.encode(animation)
+        for block in [*decoder.push_blocks(data), *decoder.finish_blocks()]:
+            frames.append(replace(block, start=block.start + Fraction(first, rate)))
+    times = frames.now.index / float(frames.now.rate)
+    np.testing.assert_allclose(times[:10], np.arange(10) / 25)
+    assert (np.diff(times) > 0).all()
+    np.testing.assert_allclose(np.diff(times[10:]), 0.1)
+
+
+def test_arrays_that_somebody_looks_at_do_not_change(wire: Wire) -> None:
+    animation = performance(3000)
+    data, ends = stream(animation)
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[50]])
+    assert live.wait(20)
+    early = live.snapshot()
+    wire.send(data[ends[50] :])
+    wire.end()
+    until(lambda: not live.growing)
+    assert early == fba.decode(data)[: len(early)]
+    assert not early.index.flags.writeable
+    assert live.snapshot() == fba.decode(data)

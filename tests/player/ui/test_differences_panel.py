@@ -1,0 +1,112 @@
+"""The panel of differences, drawn into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import graphics
+from fba.animation import Animation
+from fba_player.playback.transport import Transport
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
+from fba_player.session.session import Session
+from player_tracks import body_track, face_track
+from studio_hand import panel_of
+
+graphics.imported("imgui_bundle")
+
+from fba_player.ui.panels.differences_panel import DifferencesPanel, thinned  # noqa: E402 - needs imgui
+from fba_player.ui.window_picture import Studio  # noqa: E402
+
+SIZE = (900, 640)
+
+
+def talk(values: list[int]) -> Animation:
+    return Animation(Fraction(10), np.arange(len(values)), face=face_track([{3: v, 18: 5} for v in values]))
+
+
+@pytest.fixture
+def studio(opengl: None) -> Iterator[Studio]:
+    scene = CompareScene(
+        [Scene(talk([0, 10, 20, 30])), Scene(talk([0, 10, 90, 30]))], names=["a.fba", "b.fba"]
+    )
+    session = Session(scene, Transport(scene.timeline, clock=lambda: 0.0), size=SIZE)  # type: ignore[arg-type]
+    with Studio(session) as made:
+        yield made
+
+
+def click(studio: Studio, place: tuple[float, float]) -> None:
+    io = studio.gui.io
+    io.add_mouse_pos_event(*place)
+    studio.draw(2)
+    for down in (True, False):
+        studio.gui.io.add_mouse_button_event(0, down)
+        studio.draw(2)
+
+
+def test_a_row_takes_to_where_the_difference_is_largest(studio: Studio) -> None:
+    studio.session.open.add("differences")
+    picture = studio.draw(6)
+    panel = picture[60:600, 520:886, :3].astype(int)
+    accent = (abs(panel - (92, 173, 230)).sum(axis=2) < 60).sum()
+    assert accent > 100  # the curve and the heading
+    click(studio, (600.0, 186.0))
+    assert studio.session.transport.time == pytest.approx(0.2)
+
+
+def test_it_is_there_only_where_something_is_compared(opengl: None) -> None:
+    panel, alone = DifferencesPanel(), Scene(talk([0, 1]))
+    assert not panel.available(Session(alone, Transport(alone.timeline)))
+    pair = CompareScene([alone, alone])
+    assert panel.available(Session(pair, Transport(pair.timeline)))  # type: ignore[arg-type]
+
+
+def test_a_long_curve_keeps_its_peaks() -> None:
+    values = np.zeros(100_000)
+    values[[7, 50_123, 99_999]] = (5.0, -8.0, 3.0)
+    times, shown = thinned(np.arange(100_000) / 25, values, 500)
+    assert (len(times), shown.max(), shown.min()) == (500, 5.0, -8.0)
+    assert times[int(shown.argmin())] == 50_123 / 25
+    assert (np.diff(times) > 0).all()
+    short = np.arange(3.0)
+    assert thinned(short, short, 3)[0] is short
+
+
+def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
+    session = studio.session
+    session.selection.faps = [3]
+    session.open.add("curves")
+    studio.draw(4)
+    panel = panel_of(studio, "curves")
+    assert panel._lanes[0].course.values.tolist() == [0, 10, 20, 30]
+    panel.which = 1
+    studio.draw(4)
+    assert panel._lanes[0].course.values.tolist() == [0, 10, 90, 30]
+
+
+def test_each_file_is_told_of(studio: Studio) -> None:
+    from fba_player.ui.panels.file_panel import _all
+
+    told = _all(studio.session, studio.session.source.info)
+    assert [title for title, _ in told] == ["1  a.fba", "2  b.fba"]
+    assert [row for row in told[0][1] if row[0] != "duration"] == [
+        ("frames", "4"),
+        ("rate", "10 frames/s"),
+        ("FAPs", "2: 3, 18"),
+    ]
+
+
+def test_why_nothing_differs() -> None:
+    from fba_player.ui.panels.differences_panel import _nothing
+
+    rest = body_track([{32: 0}] * 4)
+    face, body = Scene(talk([0] * 4)), Scene(Animation(Fraction(10), np.arange(4), body=rest))
+    for scene, said in (
+        (CompareScene([face, face]), "nothing differs"),
+        (CompareScene([face, body]), "one is a face, the other a body"),
+    ):
+        assert _nothing(scene, 1, scene.differences()).startswith(said)

@@ -1,0 +1,308 @@
+"""The panels over the picture, drawn into memory; the mouse is imgui's own queue of events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+import graphics
+from fba.animation import Animation
+from fba_player.playback.transport import Transport
+from fba_player.scene.scene import Scene
+from fba_player.session.session import Session
+from fba_player.session.source import Source
+from set_clock import Clock
+
+imgui = graphics.imported("imgui_bundle").imgui
+
+from fba_player.ui.window_picture import Studio  # noqa: E402 - needs imgui
+
+SIZE = (900, 600)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def studio(opengl: None, talking: Animation, tmp_path: Path, clock: Clock) -> Iterator[Studio]:
+    """A window's inside that shows a stream from a file, ten frames at 25 a second."""
+    path = tmp_path / "talk.fba"
+    fba.write(path, talking)
+    scene = Scene(talking)
+    session = Session(
+        scene, Transport(scene.timeline, clock=clock), source=Source(scene, path), size=SIZE, clock=clock
+    )
+    session.source.look(wait=True)
+    with Studio(session) as made:
+        made.gui.hides = True
+        made.draw(4)
+        yield made
+
+
+def place(studio: Studio, share: float) -> tuple[float, float]:
+    """A point of the timeline: 0 the first frame, 1 the last."""
+    left, top, right, bottom = studio.gui.bar.place
+    return left + share * (right - left), (top + bottom) / 2
+
+
+def move(studio: Studio, x: float, y: float) -> None:
+    studio.gui.io.add_mouse_pos_event(x, y)
+    studio.session.touched()
+    studio.draw(2)
+
+
+def button(studio: Studio, down: bool, number: int = 0) -> None:
+    studio.gui.io.add_mouse_button_event(number, down)
+    studio.draw(2)
+
+
+def click(studio: Studio, x: float, y: float) -> None:
+    move(studio, x, y)
+    button(studio, True)
+    button(studio, False)
+
+
+def drag(studio: Studio, start: tuple[float, float], end: tuple[float, float], number: int = 0) -> None:
+    move(studio, *start)
+    button(studio, True, number)
+    move(studio, *end)
+    button(studio, False, number)
+
+
+def test_scrubbing_follows_the_mouse_and_goes_on_playing(studio: Studio, clock: Clock) -> None:
+    transport = studio.session.transport
+    camera = studio.session.viewpoint.camera
+    transport.play()
+    move(studio, *place(studio, 0.25))
+    button(studio, True)
+    assert transport.time == pytest.approx(0.09, abs=0.002)
+    move(studio, *place(studio, 0.75))
+    assert transport.time == pytest.approx(0.27, abs=0.002)
+    clock.now += 0.05  # the mouse holds it where it is
+    studio.draw(1)
+    assert transport.time == pytest.approx(0.27, abs=0.002)
+    button(studio, False)
+    clock.now += 0.05
+    assert transport.playing
+    assert transport.time == pytest.approx(0.32, abs=0.002)
+    assert studio.session.viewpoint.camera == camera  # nothing of it turned the view
+
+
+def test_dragged_beyond_its_ends_it_stays_within(studio: Studio) -> None:
+    drag(studio, place(studio, 0.5), (SIZE[0] + 50, 20))
+    assert studio.session.transport.frame == 9
+    drag(studio, place(studio, 0.5), (-40, 20))
+    assert studio.session.transport.frame == 0
+
+
+def test_marks_are_drawn_and_dragged(studio: Studio) -> None:
+    transport = studio.session.transport
+    before = studio.draw(2).astype(int)
+    transport.mark_in, transport.mark_out = 0.08, 0.28
+    after = studio.draw(2).astype(int)
+    left, top, right, bottom = (round(v) for v in studio.gui.bar.place)
+    changed = np.abs(after - before)[top:bottom, left:right, :3].sum(axis=2) > 20
+    outside = np.r_[0 : round(0.2 * (right - left)), round(0.8 * (right - left)) : right - left]
+    assert changed[:, outside].mean() > 0.5  # darker outside the loop
+    transport.seek(0.2)
+    drag(studio, place(studio, 0.08 / 0.36), place(studio, 0.5))
+    assert transport.mark_in == pytest.approx(0.18, abs=0.002)
+    drag(studio, place(studio, 0.28 / 0.36), place(studio, 0.1))  # not before the other one
+    assert transport.mark_out is not None
+    assert transport.mark_in == pytest.approx(0.18, abs=0.002)
+    assert transport.mark_in < transport.mark_out < 0.2
+    assert transport.time == pytest.approx(0.2)
+
+
+def test_a_right_drag_sets_both_marks(studio: Studio) -> None:
+    transport = studio.session.transport
+    drag(studio, place(studio, 0.75), place(studio, 0.25), 1)
+    assert transport.mark_in == pytest.approx(0.09, abs=0.002)
+    assert transport.mark_out == pytest.approx(0.27, abs=0.002)
+
+
+def test_the_picture_turns_only_where_no_panel_is(studio: Studio) -> None:
+    session = studio.session
+    session.open.add("file")
+    studio.draw(4)
+    before = session.viewpoint.camera
+    drag(studio, (60, 200), (160, 200))  # on the panel
+    assert session.viewpoint.camera == before
+    drag(studio, (600, 300), (700, 300))
+    assert session.viewpoint.camera.yaw == pytest.approx(before.yaw - 35)
+    studio.gui.io.add_mouse_wheel_event(0, 1)
+    studio.draw(2)
+    assert session.viewpoint.camera.distance == pytest.approx(before.distance * 0.9)
+
+
+def test_buttons_open_and_close_panels(studio: Studio) -> None:
+    session = studio.session
+    plain = studio.draw(2).astype(int)
+    click(studio, 855, 31)  # the last of the buttons above
+    opened = session.open.copy()
+    assert len(opened) == 1
+    assert (np.abs(studio.draw(3).astype(int) - plain).sum(axis=2) > 30).mean() > 0.05
+    click(studio, 855, 31)
+    assert session.open == set()
+
+
+def test_play_button(studio: Studio) -> None:
+    _, _, _, bottom = studio.gui.bar.place
+    click(studio, SIZE[0] / 2, bottom + 28)
+    assert studio.session.transport.playing
+    click(studio, SIZE[0] / 2, bottom + 28)
+    assert not studio.session.transport.playing
+
+
+def test_the_bar_hides_itself_while_playing_and_comes_back(studio: Studio, clock: Clock) -> None:
+    session = studio.session
+    move(studio, 450, 200)
+    shown = studio.draw(1).astype(int)
+    clock.now += 60
+    paused = studio.draw(30).astype(int)
+    np.testing.assert_array_equal(paused[-90:], shown[-90:])  # paused it stays
+    session.transport.loop = True
+    session.transport.play()
+    clock.now += 60
+    studio.draw(30)
+    assert studio.gui.shown == 0.0
+    session.transport.pause()
+    session.transport.seek(0.0)
+    session.transport.play()
+    hidden = studio.draw(1).astype(int)
+    assert hidden[-100:].mean() > shown[-100:].mean() + 20  # the studio floor is lighter than the bar
+    session.touched()
+    studio.draw(30)
+    assert studio.gui.shown == 1.0
+
+
+def test_that_it_records_is_seen_when_the_bar_is_hidden(studio: Studio, clock: Clock) -> None:
+    session = studio.session
+    session.transport.loop = True
+    session.transport.play()
+    session.recording = 1.0
+    clock.now += 60
+    picture = studio.draw(30).astype(int)
+    assert studio.gui.shown == 0.0
+    corner = picture[20:42, 14:34]
+    assert (corner[..., 0] - corner[..., 2] > 80).sum() > 60  # the red dot
+
+
+def test_bare_shows_the_picture_alone(studio: Studio) -> None:
+    session = studio.session
+    session.open |= {"file", "view"}
+    session.bare = True
+    from fba_player.export.offscreen import Offscreen
+
+    with Offscreen(session.scene, SIZE, session.viewpoint.camera) as plain:
+        wanted = plain.frame(0.0)
+    np.testing.assert_array_equal(studio.draw(3)[..., :3], wanted[..., :3])
+
+
+def test_a_word_comes_and_goes(studio: Studio, clock: Clock) -> None:
+    before = studio.draw(1).astype(int)
+    studio.session.say("Kept as talk-0001.png")
+    during = studio.draw(1).astype(int)
+    assert (np.abs(during - before).sum(axis=2) > 30).sum() > 2000
+    clock.now += 10
+    np.testing.assert_array_equal(studio.draw(2), before)
+
+
+def test_the_trace_marks_the_intra_planes(studio: Studio) -> None:
+    info = studio.session.source.info
+    assert info.plane_intra is not None
+    assert info.plane_intra.tolist() == [True] + [False] * 9
+    picture = studio.draw(1).astype(int)
+    left, top, right, bottom = (round(v) for v in studio.gui.bar.place)
+    wide = right - left
+    warm = picture[top:bottom, left:right, 0] - picture[top:bottom, left:right, 2]
+    assert (warm[:, 5 : wide // 12] > 60).mean() > 0.5  # the only I plane, the first
+    assert not (warm[:, wide // 8 :] > 60).any()
+
+
+def test_hooks_change_what_is_shown(studio: Studio) -> None:
+    before = studio.draw(1).astype(int)
+
+    def hook(faps: np.ndarray, baps: np.ndarray) -> None:
+        faps[2] = 1000  # open_jaw
+
+    studio.session.before_frame.append(hook)
+    open_mouth = studio.draw(1).astype(int)
+    assert (np.abs(open_mouth - before).sum(axis=2) > 60).sum() > 300
+    assert studio.session.values[0][2] == 1000
+    studio.session.before_frame.remove(hook)
+    np.testing.assert_array_equal(studio.draw(1), before)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_on_dense_displays_all_is_larger(opengl: None, talking: Animation, scale: float) -> None:
+    size = (round(450 * scale), round(300 * scale))
+    with Studio(Session(Scene(talking), size=size, scale=scale)) as studio:
+        picture = studio.draw(4)
+        left, top, right, bottom = studio.gui.bar.place
+        assert (bottom - top, right) == (40, 450 - 18)  # points
+        row = picture[round((top + bottom) / 2 * scale), :, :3].astype(int).sum(axis=1)
+        edge = round(left * scale)
+        assert abs(row[edge + 3] - row[edge - 3]) > 8  # the track begins where it says, in pixels
+        assert studio._gl.error == "GL_NO_ERROR"
+
+
+def test_windows_share_nothing(opengl: None, talking: Animation) -> None:
+    first, second = Session(Scene(talking), size=(400, 300)), Session(Scene(talking), size=(500, 300))
+    with Studio(first) as one, Studio(second) as other:
+        alone = one.draw(3).copy()
+        second.open.add("help")
+        other.draw(3)
+        np.testing.assert_array_equal(one.draw(1), alone)
+
+
+def test_no_texture_stays_behind_when_it_is_resized(studio: Studio) -> None:
+    studio.draw(1)
+    before = len(studio.gui._renderer._textures)
+    for wide in range(700, 900, 40):
+        studio.session.size = (wide, 500)
+        studio.draw(2)
+    assert len(studio.gui._renderer._textures) == before
+
+
+def test_a_panel_that_has_nothing_to_show_says_so(studio: Studio) -> None:
+    session = studio.session
+    session.toggle_panel("differences")  # of a single file
+    studio.draw(2)
+    assert session.open == set()
+    assert [notice.kind for notice in session.notices()] == ["warning"]
+
+
+def test_panels_open_where_there_is_room(studio: Studio) -> None:
+    session = studio.session
+    session.open |= {"camera", "curves"}
+    studio.draw(6)
+    places = [
+        (*imgui.internal.find_window_by_name(name).pos, *imgui.internal.find_window_by_name(name).size)
+        for name in ("###camera", "###curves")
+    ]
+    (x0, y0, w0, h0), (x1, y1, w1, h1) = places
+    assert x0 + w0 <= x1 or x1 + w1 <= x0 or y0 + h0 <= y1 or y1 + h1 <= y0
+    for x, y, wide, high in places:
+        assert 0 <= x <= x + wide <= SIZE[0]
+        assert 0 <= y <= y + high <= SIZE[1] - 124
+
+
+def test_it_rests_while_nothing_changes(studio: Studio, clock: Clock) -> None:
+    session = studio.session
+    assert not session.restless
+    session.say("a word", seconds=4.0)
+    assert not session.restless  # it stands still until it fades
+    clock.now += 3.8
+    assert session.restless
+    clock.now += 1.0
+    studio.draw(1)
+    assert not session.restless
+    session.viewpoint.preset("profile")
+    assert session.restless

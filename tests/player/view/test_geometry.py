@@ -1,0 +1,143 @@
+"""Small geometry of the player: rotations, rectangles that are filled, eyeballs, hairs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fba.compiled import is_compiled
+from fba.face.model import FaceModel, Part
+from fba_player.figure.eyeball import find_eyeball
+from fba_player.figure.face_parts import hairs
+from fba_player.gl.antialias_region import filled
+from fba_player.gl.silhouette import TILE, Outliner
+from fba_player.mesh.lazy_vertices import Places
+from fba_player.mesh.primitives import sphere_mesh
+from fba_player.view.camera import Camera
+from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 2.0, 3.1, np.pi])
+def test_a_rotation_as_axis_and_angle(angle: float) -> None:
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        axis = random.standard_normal(3)
+        axis /= np.linalg.norm(axis)
+        matrix = Rotation.from_rotvec(axis * angle).as_matrix()
+        vector = rotation_vector(matrix)
+        assert np.linalg.norm(vector) == pytest.approx(angle, abs=1e-7)
+        np.testing.assert_allclose(Rotation.from_rotvec(vector).as_matrix(), matrix, atol=1e-7)
+
+
+def square(x: float, half: float) -> Mesh:
+    corners = np.array([[x - half, -half, 0], [x + half, -half, 0], [x + half, half, 0], [x - half, half, 0]])
+    shape = MeshShape(np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), np.zeros((4, 4), dtype=np.float32))
+    return Mesh(shape, corners.astype(np.float32), np.zeros((4, 3), dtype=np.float32), np.eye(4))
+
+
+def test_rectangles_hold_what_is_drawn() -> None:
+    camera, size = Camera(distance=1 / np.tan(np.radians(12))), (200, 100)
+    matrix = camera.projection_matrix(2.0) @ camera.view_matrix()  # 1 m is half the height
+    left, right = square(-1.0, 0.2), square(0.8, 0.4)
+    found = sorted(filled(View([left, right]), matrix, size))
+    assert len(found) == 2
+    for (x, y, wide, high), middle, half in zip(found, (50, 140), (10, 20), strict=True):
+        assert x <= middle - half
+        assert x + wide >= middle + half
+        assert y <= 50 - half
+        assert y + high >= 50 + half
+        assert wide < 2.5 * half + 12
+    assert filled(View([square(0, 0.1), square(0, 0.4)]), matrix, size) == filled(
+        View([square(0, 0.4)]), matrix, size
+    )
+    assert filled(View(), matrix, size) == []
+    assert filled(View([square(50, 0.1)]), matrix, size) == []
+
+
+def test_what_reaches_behind_the_camera_may_fill_everything() -> None:
+    camera = Camera(distance=1.0)
+    matrix = camera.projection_matrix(1.0) @ camera.view_matrix()
+    around = square(0, 5.0)
+    deep = replace(
+        around, positions=around.positions + np.array([[0, 0, 9], [0, 0, 0]] * 2, dtype=np.float32)
+    )
+    assert filled(View([deep]), matrix, (64, 64)) == [(0, 0, 64, 64)]
+
+
+def eye_part(vertices: np.ndarray) -> Part:
+    return Part("ball", "eye", vertices, sphere_mesh(20, 32)[1])
+
+
+def test_an_eyeball_is_found_under_its_cornea() -> None:
+    model = FaceModel.default()
+    vertices = sphere_mesh(20, 32)[0].astype(float)
+    front = vertices[:, 2] > 0.87
+    vertices[front] *= (1 + 0.08 * (vertices[front, 2:] - 0.87) / 0.13) ** 1
+    ball = find_eyeball(eye_part(vertices * 0.012 + (0.03, 0.01, -0.012)), model)
+    assert ball is not None
+    np.testing.assert_allclose(ball.centre, (0.03, 0.01, -0.012), atol=1e-4)
+    assert ball.radius == pytest.approx(0.012, rel=0.01)
+    assert ball.side == 0
+
+
+def test_what_is_no_ball_is_drawn_as_it_is() -> None:
+    model = FaceModel.default()
+    vertices = sphere_mesh(20, 32)[0].astype(float)
+    assert find_eyeball(eye_part(vertices * (0.012, 0.012, 0.004)), model) is None
+    pair = np.concatenate([vertices * 0.012 + (0.03, 0, 0), vertices * 0.012 - (0.03, 0, 0)])
+    both = Part("eyes", "eye", pair, np.zeros((0, 3), dtype=int))
+    assert find_eyeball(both, model) is None
+    assert find_eyeball(Part("few", "eye", vertices[:5] * 0.012, np.zeros((0, 3), dtype=int)), model) is None
+
+
+def test_hairs_know_their_sides_and_their_tip() -> None:
+    root = np.array([[-1, 0, 0], [1, 0, 0], [-0.5, 5, 0], [0.5, 5, 0], [0, 9, 0]]) * 2e-4
+    triangles = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4]])
+    two = np.concatenate([root, root + np.array([0.01, 0, 0])])
+    found = hairs(Part("lash", "lash", two, np.concatenate([triangles, triangles + 5])))
+    assert found is not None
+    for start in (0, 5):
+        rows = found[start : start + 5]
+        np.testing.assert_allclose(rows[0, :3], (-1, 0, 0), atol=1e-6)
+        np.testing.assert_allclose(rows[1, :3], (1, 0, 0), atol=1e-6)
+        np.testing.assert_allclose(rows[:4, 3], (2e-4, 2e-4, 1e-4, 1e-4), rtol=1e-5)
+        assert (rows[:4, 5] > 0.97).all()  # towards the tip
+        assert rows[0, 7] == -rows[1, 7]
+        np.testing.assert_array_equal(rows[4, :7], 0)
+
+
+def test_broad_strips_are_no_hairs() -> None:
+    vertices = np.array([[0, 0, 0], [0.02, 0, 0], [0, 0.01, 0], [0.02, 0.01, 0]])
+    assert hairs(Part("strip", "lash", vertices, np.array([[0, 1, 2], [1, 3, 2]]))) is None
+    assert hairs(Part("nothing", "lash", vertices, np.zeros((0, 3), dtype=int))) is None
+
+
+@pytest.mark.skipif(not is_compiled(), reason="without numba, rectangles are smoothed instead")
+def test_the_outline_of_a_ball_is_a_circle() -> None:
+    vertices, triangles = sphere_mesh(24, 48)
+    shape = FaceShape(triangles, np.zeros((len(vertices), 4), np.float32), np.ones(len(vertices), np.float32))
+    light = np.ones((len(vertices), 4), dtype=np.float32)
+    mesh = FaceMesh(shape, Places.of(vertices * 0.1, vertices), light, np.eye(4), np.zeros(3), np.zeros(3))
+    camera, size = Camera(distance=2.0), (200, 200)
+    matrix = camera.projection_matrix(1.0) @ camera.view_matrix()
+    outliner = Outliner()
+    outliner.begin(size)
+    outliner.add(mesh, matrix)
+    corners = (outliner.tiles().reshape(-1, 6, 2) + 1) * 100
+    # A sphere of radius r at a distance d is seen under the angle asin(r / d).
+    radius = 100 * np.tan(np.arcsin(0.1 / 2.0)) / np.tan(np.radians(12))
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    np.testing.assert_allclose(high[:, 1] - low[:, 1], TILE, atol=1e-3)
+    for angle in np.linspace(0, 2 * np.pi, 60):  # all of the circle lies in tiles
+        x, y = 100 + radius * np.cos(angle), 100 + radius * np.sin(angle)
+        assert ((low <= (x, y)) & ((x, y) <= high)).all(axis=1).any()
+    away = np.linalg.norm(corners - 100, axis=2)  # and no tile lies aside from it
+    assert (away.max(axis=1) > radius - 3).all()
+    nearest = np.linalg.norm(np.clip(100, low, high) - 100, axis=1)
+    assert (nearest < radius + 3).all()
+    assert ((high - low).prod(axis=1)).sum() < 2 * np.pi * radius * TILE * 2
+    outliner.begin(size)
+    assert len(outliner.tiles()) == 0

