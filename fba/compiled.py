@@ -36,7 +36,7 @@ def _compiled(function: Function, **options: bool) -> Function:
     # Nobody calls these through C: numba's wrapper for that took a quarter of the time to compile.
     dispatcher: Any = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
     if not config.DISABLE_JIT:
-        from fba.numba_cache import MachineCode
+        from fba._numba_cache import MachineCode
 
         dispatcher._cache = MachineCode(cast(FunctionType, function))
         dispatcher.get_call_template = partial(_call_by_type, dispatcher)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 
 from fba.body.model import BodyModel
-from fba.body.skin.moving_normals import rings
+from fba.body.skin._moving_normals import rings
 from fba.cache import MOST_FILES, kept, key_of
 
 

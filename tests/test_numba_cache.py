@@ -69,7 +69,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Mo
                 compile((tmp_path / f"{one}.py").read_text(), str(tmp_path / f"{one}.py"), "exec"),
                 modules[-1].__dict__,
             )  # no stale .pyc
-        from fba.numba_cache import _source
+        from fba._numba_cache import _source
 
         _source.cache_clear()
         return modules[-1]
@@ -128,7 +128,7 @@ def test_a_faulty_file_is_made_anew(program: Callable[..., ModuleType], tmp_path
 
 
 def test_no_flipped_bit_is_loaded(program: Callable[..., ModuleType], tmp_path: Path) -> None:
-    from fba.numba_cache import CodeFiles
+    from fba._numba_cache import CodeFiles
 
     module = program()
     told(module)

@@ -30,7 +30,7 @@ import numpy as np
 from fba.animation import Animation, FaceTrack
 from fba.codec import Block, Decoder, EncoderOptions, encode, probe_stream
 from fba.errors import FbaError, FbaWarning
-from fba_conformance import motion
+from fba_conformance import _motion as motion
 from fba_conformance.runner import plane_records
 from fba_conformance.trace import planes as independent_planes
 

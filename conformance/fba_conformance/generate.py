@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from fba_conformance.cases import Case, cases
+from fba_conformance._cases import Case, cases
 from fba_conformance.runner import OWN, Vector, check, digest
 from fba_conformance.trace import decode_values
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from fba_conformance.reader import START_CODE_BITS, TRAILING_BYTES_SHOWN, Element, Levels
+from fba_conformance._reader import START_CODE_BITS, TRAILING_BYTES_SHOWN, Element, Levels
 
 HEADER = f"{'bit':>9} {'bits':>6} {'plane':>6}  element"
 NAMES_SHOWN = 8

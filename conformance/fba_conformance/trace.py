@@ -15,10 +15,9 @@ from typing import Any
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, but_recognised
-from fba_conformance.high_level import HighLevel
-from fba_conformance.listing import element_dict, format_trace
-from fba_conformance.part import Part
-from fba_conformance.reader import (
+from fba_conformance._high_level import HighLevel
+from fba_conformance._part import Part
+from fba_conformance._reader import (
     OBJECT_START_CODES,
     PLANE_START_CODES,
     TRAILING_BYTES_SHOWN,
@@ -26,6 +25,7 @@ from fba_conformance.reader import (
     Levels,
     Reader,
 )
+from fba_conformance.listing import element_dict, format_trace
 
 __all__ = ["Element", "Levels", "Walker", "decode_values", "element_dict", "format_trace", "planes", "trace"]
 

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fba.body.definition import BodyDefinition
+    from fba.body._definition import BodyDefinition
     from fba.body.skeleton import Skeleton
     from fba.body.solve.angle_wrap import wrapped
     from fba.body.solve.conventions import convention_names
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "BapSolver": "fba.body.solve.solver",
-    "BodyDefinition": "fba.body.definition",
+    "BodyDefinition": "fba.body._definition",
     "Excess": "fba.body.solve.limits",
     "Limit": "fba.body.solve.limits",
     "Limits": "fba.body.solve.limits",

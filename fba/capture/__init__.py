@@ -6,17 +6,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fba.capture._report import BoneError, FeetError, RetargetReport, retarget_report
     from fba.capture.motion import SkeletonMotion
-    from fba.capture.report import BoneError, FeetError, RetargetReport, retarget_report
     from fba.capture.skeleton import from_skeleton
 
 _PLACES = {
-    "BoneError": "fba.capture.report",
-    "FeetError": "fba.capture.report",
-    "RetargetReport": "fba.capture.report",
+    "BoneError": "fba.capture._report",
+    "FeetError": "fba.capture._report",
+    "RetargetReport": "fba.capture._report",
     "SkeletonMotion": "fba.capture.motion",
     "from_skeleton": "fba.capture.skeleton",
-    "retarget_report": "fba.capture.report",
+    "retarget_report": "fba.capture._report",
 }
 
 __all__ = [

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from fba import rotations
 from fba.body import BapSolver, wrapped
 from fba.body.solve.solver_loops import joint_angles
-from fba.capture import rest_alignment, spine
+from fba.capture import _rest_alignment as rest_alignment
+from fba.capture import _spine as spine
 from fba.capture.limbs import bone_ik, hinges
 from fba.capture.limbs.foot_planting import Footing
 from fba.capture.motion import SkeletonMotion

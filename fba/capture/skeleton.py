@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack
 from fba.body import BapSolver
-from fba.capture import matching, standard_skeleton
-from fba.capture import spine as spines
+from fba.capture import _spine as spines
+from fba.capture import _standard_skeleton as standard_skeleton
+from fba.capture import matching
 from fba.capture.motion import SkeletonMotion
 from fba.capture.retarget import Retarget
 from fba.errors import FbaWarning, ModelError
@@ -65,7 +66,7 @@ def from_skeleton(
     where the source turns about an axis that a joint lacks, the joint before or after it turns instead.
     BAPs 181..183 are millimetres from the default standing place. Angles are within +-pi; they are not
     clamped to the standard's ranges. A skeleton of the standard's own joints that rests in the default
-    posture (`fba.capture.standard_skeleton`) is taken joint for joint, wherever its feet are: ground has no
+    posture (`fba.capture._standard_skeleton`) is taken joint for joint, wherever its feet are: ground has no
     say, and spine only where it is "simple", "full" or a number.
 
     Raises ModelError where no family of names fits, the skeleton has no size or there are more than 500,000

@@ -13,12 +13,12 @@ from typing import Any, NoReturn
 import click
 
 from fba import __version__
-from fba.cli.compile_notice import Notice
+from fba.cli._compile_notice import Notice
+from fba.cli._program import NAME, program_words, with_program
+from fba.cli._sigint import Interruptions
+from fba.cli._startup import hasten
 from fba.cli.exit_quietly import INTERRUPTED, TEXT
 from fba.cli.options import Group, described, examples
-from fba.cli.program import NAME, program_words, with_program
-from fba.cli.sigint import Interruptions
-from fba.cli.startup import hasten
 from fba.compilation import heard
 from fba.errors import FbaError, FbaWarning, did_you_mean
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from fba.animation import Animation
-from fba.cli.program import NAME, with_program
+from fba.cli._program import NAME, with_program
 from fba.errors import FbaError, FbaWarning, FormatError, OptionError, Remedy
 
 if TYPE_CHECKING:

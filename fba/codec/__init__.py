@@ -1,11 +1,11 @@
 """The FBA codec: numbers to bits and back (ISO/IEC 14496-2, FBA object; predictive mode)."""
 
-from fba.codec.assembly import Assembly
+from fba.codec._assembly import Assembly
+from fba.codec._decoder import Damage, Decoder, decode
+from fba.codec._encoder import Encoder, EncoderStatistics, encode, encode_with_statistics
+from fba.codec._planner import EncoderOptions
+from fba.codec._script import encode_planes
 from fba.codec.block import Block
-from fba.codec.decoder import Damage, Decoder, decode
-from fba.codec.encoder import Encoder, EncoderStatistics, encode, encode_with_statistics
-from fba.codec.planner import EncoderOptions
-from fba.codec.script import encode_planes
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
 from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
 

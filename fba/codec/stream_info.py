@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.codec._decoder import Damage, Decoder
 from fba.codec._plane import syntax
 from fba.codec.block import Block
-from fba.codec.decoder import Damage, Decoder
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError
 

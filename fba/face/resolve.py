@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import FaceTrack
+from fba.face._mates import fill
 from fba.face.expressions import Definitions
 from fba.face.interpolation.evaluate import evaluate
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.mates import fill
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
 
 Float32 = npt.NDArray[np.float32]

@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from fba.errors import FbaError, ModelError
-from fba.gltf import glb
+from fba.gltf import _glb as glb
 from fba.gltf.values import Budget, Value
 from fba.recognition import HEAD_BYTES, but_recognised
 from fba.source import Path, open_source

@@ -9,14 +9,14 @@ from __future__ import annotations
 import warnings
 
 from fba.errors import FbaWarning
-from fba.gltf.accessors import Accessors
-from fba.gltf.animations import read_animations
+from fba.gltf._accessors import Accessors
+from fba.gltf._animations import read_animations
+from fba.gltf._materials import read_materials
+from fba.gltf._meshes import read_meshes
+from fba.gltf._skins import read_skins
 from fba.gltf.document import Document, open_document
-from fba.gltf.materials import read_materials
-from fba.gltf.meshes import read_meshes
 from fba.gltf.nodes import read_nodes, read_roots
 from fba.gltf.scene import Gltf
-from fba.gltf.skins import read_skins
 from fba.source import Path
 
 PACKED = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.gltf.accessors import Accessors
+from fba.gltf._accessors import Accessors
 from fba.gltf.values import Value
 
 Float32 = npt.NDArray[np.float32]

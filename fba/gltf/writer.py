@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from fba.atomic import atomic
 from fba.errors import ModelError
-from fba.gltf.accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
+from fba.gltf._accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
+from fba.gltf._glb import MAX_BYTES, join
+from fba.gltf._materials import media_type
 from fba.gltf.document import MAX_JSON
-from fba.gltf.glb import MAX_BYTES, join
-from fba.gltf.materials import media_type
 from fba.gltf.packed import pack
 from fba.source import Path
 

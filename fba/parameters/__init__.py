@@ -1,6 +1,6 @@
 """What the standard tabulates: FAPs, BAPs, groups, feature points and joints."""
 
-from fba.parameters.tables import (
+from fba.parameters._tables import (
     BAP_COUNT,
     BAP_GROUP_COUNT,
     BAP_STANDARD_COUNT,

@@ -21,8 +21,8 @@ from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart
 from fba.body.storage import build, read_body
 from fba.errors import FormatError, ModelError
+from fba.gltf._glb import join, split
 from fba.gltf.document import parse_document
-from fba.gltf.glb import join, split
 from fba.gltf.reader import read_document
 from fba.gltf.surfaces import surfaces
 from fba.parameters import joints

@@ -12,7 +12,8 @@ from test_from_skeleton import NAMES
 from capture_bodies import bone_errors, limb_bones, motion
 from fba.body import BapSolver, Skeleton
 from fba.capture import SkeletonMotion, from_skeleton, retarget_report
-from fba.capture.limbs import ground, leg_ik
+from fba.capture.limbs import _leg_ik as leg_ik
+from fba.capture.limbs import ground
 
 THIGH, SHANK = 0.36, 0.54
 """Metres: a body of quite other proportions than the default's, whose thigh and shank are of one length."""

@@ -10,7 +10,7 @@ import pytest
 
 COMPILED = """
 import sys
-from fba.cli.startup import hasten
+from fba.cli._startup import hasten
 hasten()
 import numba
 assert numba.njit(lambda array: array.sum())(__import__("numpy").arange(4.0)) == 6

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from fba.cli import options
-from fba.cli.compile_notice import MANY, Notice
+from fba.cli._compile_notice import MANY, Notice
 from fba.compiled import is_compiled
 
 Run = Callable[..., Any]

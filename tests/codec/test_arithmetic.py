@@ -20,7 +20,7 @@ from fba.codec._plane.arithmetic import (
     encode_segment,
     learn,
 )
-from fba_conformance import textbook
+from fba_conformance import _textbook as textbook
 
 SIZES = (1, 2, 2, 3, 7, 63, 127, 720, 3721, 3721)
 

@@ -26,7 +26,7 @@ from codec_streams import (
 from fba import BitstreamError, Decoder, FbaError, FbaWarning, UnsupportedError, decode
 from fba.codec import probe_stream
 from fba.parameters import bap_groups
-from fba_conformance.textbook import FrequencyTable, encode_segment
+from fba_conformance._textbook import FrequencyTable, encode_segment
 
 JAW = packed(jaw_intra(5))
 NO_BAPS = "100" * BAP_GROUPS

@@ -23,7 +23,7 @@ from fba import (
     decode,
     encode,
 )
-from fba_conformance import motion
+from fba_conformance import _motion as motion
 
 EVERY = ["talking", "walking", "both", "part comes and goes"]
 

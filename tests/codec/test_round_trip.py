@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from codec_streams import animations, steps
 from fba import Animation, BodyTrack, Decoder, EncoderOptions, FaceTrack, decode, encode
-from fba_conformance import motion
+from fba_conformance import _motion as motion
 from fba_conformance.runner import plane_records
 from fba_conformance.trace import decode_values
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from codec_streams import OBJECT, RATES, decoded, jaw_intra, packed
 from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, decode, encode
 from fba.codec import FrameRate, PlaneSettings, TimeCode, encode_planes
-from fba_conformance import motion
+from fba_conformance import _motion as motion
 
 SKIP_MAX = 15 << 20
 NTSC = Fraction(1000, 1001)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fba_conformance.cases import cases
+from fba_conformance._cases import cases
 from fba_conformance.generate import generate
 from fba_conformance.runner import OWN, check, vectors
 

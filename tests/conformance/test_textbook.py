@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fba import BitstreamError
-from fba_conformance.textbook import FrequencyTable, decode_segment, encode_segment
+from fba_conformance._textbook import FrequencyTable, decode_segment, encode_segment
 
 
 def as_bytes(bits: str) -> bytes:

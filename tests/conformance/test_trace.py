@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fba import BitstreamError, FbaError, FbaWarning, UnsupportedError
-from fba_conformance.textbook import FrequencyTable, encode_segment
+from fba_conformance._textbook import FrequencyTable, encode_segment
 from fba_conformance.trace import Element, Levels, decode_values, element_dict, format_trace, trace
 
 OBJECT, PLANE, END = (f"{code:032b}" for code in (0x1BA, 0x1BB, 0x1B1))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from fba import Animation, BodyTrack, Decoder, FaceTrack, FbaError, FbaWarning, Frame
 from fba.parameters import bap_steps, fap_steps
-from fba_conformance.textbook import FrequencyTable, encode_segment
+from fba_conformance._textbook import FrequencyTable, encode_segment
 
 OBJECT, PLANE, END = b"\0\0\1\xba", b"\0\0\1\xbb", b"\0\0\1\xb1"
 FAP_GROUP_SIZES = (2, 16, 12, 8, 4, 5, 3, 10, 4, 4)

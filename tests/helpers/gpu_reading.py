@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fba_player.figure.body_light import LitPart
 from fba_player.figure.face_light import LitFacePart
 from fba_player.gl.context import offscreen_context
-from fba_player.gl.gpu.deformer import GpuDeformer
+from fba_player.gl.gpu._deformer import GpuDeformer
 from fba_player.mesh.lazy_vertices import Places, Whole
 from fba_player.view.view import FaceMesh
 

@@ -12,7 +12,7 @@ import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba_player.scene.scene import Scene
-from fba_player.window.window import Window
+from fba_player.window._window import Window
 
 
 def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int, int] = (640, 480)) -> Window:

@@ -4,11 +4,11 @@ Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `character
 `detect` finds cycles and poses in any body animation, `reduce` keeps only these poses.
 """
 
-from fba.body.gait.characters import POSES, Character, Pose, characters
-from fba.body.gait.detection import Cycle, Gait, Step, detect
-from fba.body.gait.measure import Soles, advance, soles
-from fba.body.gait.reduction import Errors, Reduced, compare, reduce
-from fba.body.gait.synthesis import walk
+from fba.body.gait._characters import POSES, Character, Pose, characters
+from fba.body.gait._detection import Cycle, Gait, Step, detect
+from fba.body.gait._measure import Soles, advance, soles
+from fba.body.gait._reduction import Errors, Reduced, compare, reduce
+from fba.body.gait._synthesis import walk
 
 __all__ = [
     "POSES",

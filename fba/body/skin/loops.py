@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.skin.girdle_loops import Girdle, lift, straighten
+from fba.body.skin._girdle_loops import Girdle, lift, straighten
 from fba.compiled import compiled, inlined
 
 Float32 = npt.NDArray[np.float32]
@@ -20,7 +20,7 @@ Int64 = npt.NDArray[np.int64]
 
 
 class Twisting(NamedTuple):
-    """Which vertices are turned about which bones, of B: see `fba.body.skin.twisting`."""
+    """Which vertices are turned about which bones, of B: see `fba.body.skin._twisting`."""
 
     rows: Int64
     shares: Float64
@@ -124,7 +124,7 @@ def joint_duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Floa
 
 @compiled
 def _wring(vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, wrung: Float32) -> None:
-    """Vertices of limbs turned about their bones: see `fba.body.skin.twisting`."""
+    """Vertices of limbs turned about their bones: see `fba.body.skin._twisting`."""
     for bone in range(len(twists.joint)):
         own = twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
         child = twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body.skeleton import Skeleton
-from fba.body.skin.girdle import chosen_girdle, girdle
-from fba.body.skin.moving_normals import rings
-from fba.body.skin.twisting import chosen_twists, twists
+from fba.body.skin._girdle import chosen_girdle, girdle
+from fba.body.skin._moving_normals import rings
+from fba.body.skin._twisting import chosen_twists, twists
 from fba.mesh.meshes import result_array
 
 Float32 = npt.NDArray[np.float32]
@@ -37,9 +37,9 @@ class SkinTables(NamedTuple):
     """(V, 4), 0 where a joint does not carry it."""
     wring: Float32
     """(V, 4): the bone that it is turned about beforehand, -1 for none, its shares of both twists, and how
-    far matrices draw it straight (`fba.body.skin.girdle`)."""
+    far matrices draw it straight (`fba.body.skin._girdle`)."""
     around: Int32
-    """(V, 4), see `fba.body.skin.moving_normals`, -1 where the normal only turns."""
+    """(V, 4), see `fba.body.skin._moving_normals`, -1 where the normal only turns."""
     numbers: Float32
     """(V, 3), likewise."""
     axis: Float64
@@ -49,7 +49,7 @@ class SkinTables(NamedTuple):
 
 
 class JointMotion(NamedTuple):
-    """Joints in one pose: see `fba.body.skin.joint_motion.motion_of_joints`."""
+    """Joints in one pose: see `fba.body.skin._joint_motion.motion_of_joints`."""
 
     duals: Float32
     """(J, 8), from the root."""
@@ -64,7 +64,8 @@ class Skinner:
 
     vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
     sum to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32
-    (F, 3), by which normals follow the surface (`fba.body.skin.moving_normals`); without them they only turn.
+    (F, 3), by which normals follow the surface (`fba.body.skin._moving_normals`); without them they
+    only turn.
 
     Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
     several threads, one after the other.
@@ -179,7 +180,7 @@ class Skinner:
 
     def motion(self, matrices: npt.ArrayLike) -> JointMotion:
         """What joint matrices (J, 4, 4) do to any vertices, with dual quaternions. Errors as of `skin`."""
-        from fba.body.skin.joint_motion import motion_of_joints
+        from fba.body.skin._joint_motion import motion_of_joints
 
         frames, _ = self._frames(matrices)
         duals = np.empty((len(self._inverse), 8), dtype=np.float32)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.solve.fast_trig import sine_cosine
+from fba.body.solve._fast_trig import sine_cosine
 from fba.compiled import compiled
 
 Float = npt.NDArray[np.float64]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.solve.fast_trig import arc_tangent, sine_cosine
+from fba.body.solve._fast_trig import arc_tangent, sine_cosine
 from fba.body.solve.pose_loops import UNIT
 from fba.compiled import compiled, inlined
 

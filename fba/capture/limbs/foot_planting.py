@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba import rotations
-from fba.capture.limbs import bone_ik, ground, leg_ik, soles
+from fba.capture.limbs import _leg_ik as leg_ik
+from fba.capture.limbs import bone_ik, ground, soles
 
 if TYPE_CHECKING:
     from fba.capture.retarget import Retarget

@@ -7,7 +7,7 @@ array over frames.
 
 With the twist tau - phi of the hinge, a turn phi leaves c0 + c1 cos phi + c2 sin phi of the lower bone's
 direction sideways, which is zero for two phi: one bends the hinge the natural way, one the other way. Where
-the limb is almost straight, all phi leave little. `fba.capture.limbs.hinge_path` finds the path that misses
+the limb is almost straight, all phi leave little. `fba.capture.limbs._hinge_path` finds the path that misses
 the direction by little, bends the natural way, and does not jump.
 """
 
@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba import rotations
+from fba.capture.limbs._hinge_path import follow
 from fba.capture.limbs.bone_ik import aim, product
-from fba.capture.limbs.hinge_path import follow
 
 Float = npt.NDArray[np.float64]
 

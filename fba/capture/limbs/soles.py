@@ -4,7 +4,7 @@ Bones point where the source's point, but thigh, shank and foot have other propo
 length and the same angles, soles end up millimetres to centimetres higher or lower than the source's, slip a
 little where the source's stand, and sources differ in where their ground is. First the body is raised or
 lowered as a whole, frame by frame, such that the foot on the ground is as high above it as the source's is;
-what then is still lacking, legs make up for (`fba.capture.limbs.leg_ik`).
+what then is still lacking, legs make up for (`fba.capture.limbs._leg_ik`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fba import rotations
 from fba.body.skeleton import Skeleton
-from fba.capture.limbs.coupled_paths import chain
+from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
 
 Float = npt.NDArray[np.float64]

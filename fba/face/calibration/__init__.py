@@ -3,7 +3,7 @@
 model = fba.face.calibration.fit(FaceModel.default(), read_fdp("person.fdp"))
 """
 
-from fba.face.calibration.align import UNITS
-from fba.face.calibration.fitting import FAPU_DISTANCES, fit, points_of_distances
+from fba.face.calibration._align import UNITS
+from fba.face.calibration._fitting import FAPU_DISTANCES, fit, points_of_distances
 
 __all__ = ["FAPU_DISTANCES", "UNITS", "fit", "points_of_distances"]

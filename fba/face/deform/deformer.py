@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import RangeError
+from fba.face.deform._subset import ChosenVertices
 from fba.face.deform.flat_tables import (
     VALUE_MAX,
     Shifts,
@@ -21,7 +22,6 @@ from fba.face.deform.flat_tables import (
     flat_transforms,
 )
 from fba.face.deform.normals import Surface, surface
-from fba.face.deform.subset import ChosenVertices
 from fba.face.feature_points import names
 from fba.face.model import FaceModel
 from fba.mesh.meshes import result_array
@@ -45,7 +45,7 @@ class DeformerTables(NamedTuple):
 
 
 class FaceMotion(NamedTuple):
-    """A face in one pose: see `fba.face.deform.subset_loops.motion_of_parts`."""
+    """A face in one pose: see `fba.face.deform._subset_loops.motion_of_parts`."""
 
     tracks: Float32
     """(M, 4)"""
@@ -75,7 +75,7 @@ class Deformer:
 
     def __init__(self, model: FaceModel) -> None:
         # numba is imported here, with the first face that moves
-        from fba.face.deform import loops
+        from fba.face.deform import _loops as loops
 
         self.model = model
         self._loops = loops
@@ -136,7 +136,7 @@ class Deformer:
         values, _ = _frames(faps)
         tracks = np.empty((len(self._shifts.column), 4), dtype=np.float32)
         poses = np.empty((len(self.model.parts), 6, 4), dtype=np.float32)
-        from fba.face.deform.subset_loops import motion_of_parts
+        from fba.face.deform._subset_loops import motion_of_parts
 
         with np.errstate(all="ignore"):
             motion_of_parts(values[0], self._shifts, self._transforms, tracks, poses)

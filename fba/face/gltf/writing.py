@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.gltf.extension import NAME, extension
+from fba.face.gltf._extension import NAME, extension
 from fba.face.gltf.morphs import displacements
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fba.errors import OptionError
-from fba.face.importers.sniffing import KINDS, sniff
+from fba.face.importers._sniffing import KINDS, sniff
 from fba.face.model import FaceModel
 
 __all__ = ["KINDS", "import_model"]
@@ -51,7 +51,7 @@ def import_model(
         _no_more("an FDP file", points=points)
         return import_fdp(path, unit=unit, up=up, kinds=kinds, name=named)
     if chosen == "gltf":
-        from fba.face.importers.gltf import import_gltf
+        from fba.face.importers._gltf import import_gltf
 
         return import_gltf(path, points=points, unit=unit, up=up, kinds=kinds, name=named)
     from fba.face.importers.mesh import import_mesh

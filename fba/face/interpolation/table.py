@@ -106,27 +106,27 @@ class InterpolationTable:
 
     @classmethod
     def from_node(cls, node: Mapping[str, Sequence[float]]) -> InterpolationTable:
-        """The table that the fields of a BIFS node FIT describe; see `fba.face.interpolation.node`."""
-        from fba.face.interpolation.node import links_of
+        """The table that the fields of a BIFS node FIT describe; see `fba.face.interpolation._node`."""
+        from fba.face.interpolation._node import links_of
 
         return cls(links_of(node))
 
     def to_node(self) -> dict[str, list[int] | list[float]]:
         """The fields of a BIFS node FIT: `from_node` of them is this table again."""
-        from fba.face.interpolation.node import node_of
+        from fba.face.interpolation._node import node_of
 
         return node_of(self.links)
 
     @classmethod
     def from_dict(cls, data: object) -> InterpolationTable:
         """The table that `to_dict` gave; ModelError naming the place where it is something else."""
-        from fba.face.interpolation.json import links_of
+        from fba.face.interpolation._json import links_of
 
         return cls(links_of(data))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as lists, dicts, strings and numbers, for JSON."""
-        from fba.face.interpolation.json import data_of
+        from fba.face.interpolation._json import data_of
 
         return data_of(self.links)
 

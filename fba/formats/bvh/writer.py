@@ -53,8 +53,8 @@ def write(
     (`fba.body.convention_names()`). unit: lengths in the file for one metre, by default centimetres.
 
     The root's OFFSET is 0, its channels are its places in the world: some programs add the two. Read again,
-    the file gives the same BAPs (`fba.capture.standard_skeleton`); times begin at 0. Raises FormatError where
-    there is no body, no frame, or too many, OptionError for an unknown option's value.
+    the file gives the same BAPs (`fba.capture._standard_skeleton`); times begin at 0. Raises FormatError
+    where there is no body, no frame, or too many, OptionError for an unknown option's value.
     """
     from fba.body import BapSolver
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from fba.animation import Animation
 from fba.errors import UnsupportedError
-from fba.formats.epf.reader import read_epf
-from fba.formats.epf.tags import TAGS
-from fba.formats.epf.writer import write_epf
+from fba.formats.epf._reader import read_epf
+from fba.formats.epf._tags import TAGS
+from fba.formats.epf._writer import write_epf
 from fba.formats.text.lines import UTF8_MARK, content, decoded
 from fba.source import Path, read_head
 

@@ -18,8 +18,8 @@ from fba.animation import Animation
 from fba.capture import SkeletonMotion, from_skeleton, matching
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
-from fba.formats.gltf.own_files import note_of, read_note
-from fba.formats.gltf.pose import BindPose, Sampler, key_times
+from fba.formats.gltf._own_files import note_of, read_note
+from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
 from fba.source import Path

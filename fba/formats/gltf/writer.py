@@ -17,7 +17,7 @@ import numpy.typing as npt
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError
 from fba.formats.body_frames import held_baps
-from fba.formats.gltf.joints import Clip, move, nest
+from fba.formats.gltf._joints import Clip, move, nest
 from fba.gltf.writer import Builder
 from fba.source import Path
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fba.body import BapSolver
     from fba.body.model import BodyModel
     from fba.face.model import FaceModel
-    from fba.formats.gltf.head import HeadParts
+    from fba.formats.gltf._head import HeadParts
 
 Float64 = npt.NDArray[np.float64]
 
@@ -158,7 +158,7 @@ def _head_of(
     builder: Builder, clip: Clip, animation: Animation, person: BodyModel, model: FaceModel | None
 ) -> HeadParts | None:
     from fba.face.model import FaceModel
-    from fba.formats.gltf.head import HeadParts
+    from fba.formats.gltf._head import HeadParts
 
     if person.eyes is None:
         if animation.face is not None or model is not None:
@@ -177,7 +177,7 @@ def _head(
 ) -> list[int]:
     """A face by itself, in its own frame."""
     from fba.face.model import FaceModel
-    from fba.formats.gltf.head import HeadParts
+    from fba.formats.gltf._head import HeadParts
     from fba.gltf.part_materials import Looks
 
     face = model or FaceModel.default()
@@ -198,7 +198,7 @@ def _note_face(
 ) -> None:
     """Note which FAPs the head shows; without a head, their numbers."""
     from fba.face.model import FaceModel
-    from fba.formats.gltf.fap_tracks import face_note
+    from fba.formats.gltf._fap_tracks import face_note
 
     if animation.face is None:
         return

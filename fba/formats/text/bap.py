@@ -6,9 +6,9 @@ from fractions import Fraction
 
 from fba.animation import Animation, BodyTrack
 from fba.errors import FormatError
-from fba.formats.text.frame_reader import read_frames
-from fba.formats.text.frame_writer import write_frames
-from fba.formats.text.layout import bap_layout
+from fba.formats.text._frame_reader import read_frames
+from fba.formats.text._frame_writer import write_frames
+from fba.formats.text._layout import bap_layout
 from fba.formats.text.lines import sniff_layout
 from fba.source import Path
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from fba.animation import Animation, FaceTrack
 from fba.errors import FormatError
-from fba.formats.text.frame_reader import read_frames
-from fba.formats.text.frame_writer import write_frames
-from fba.formats.text.layout import fap_layout
+from fba.formats.text._frame_reader import read_frames
+from fba.formats.text._frame_writer import write_frames
+from fba.formats.text._layout import fap_layout
 from fba.formats.text.lines import sniff_layout
 from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.source import Path

@@ -19,7 +19,7 @@ from fba.recognition import HEAD_BYTES, but_recognised
 from fba.source import Path
 
 if TYPE_CHECKING:
-    from fba.formats.text.layout import Layout
+    from fba.formats.text._layout import Layout
 
 BLOCK_BYTES = 1 << 20
 MAX_LINE_BYTES = 1 << 16

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.formats.text.layout import Layout
+from fba.formats.text._layout import Layout
 
 Bool = npt.NDArray[np.bool_]
 Int32 = npt.NDArray[np.int32]

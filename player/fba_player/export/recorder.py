@@ -247,7 +247,7 @@ def _opened(
 
         return Mp4(path, size, rate, audio, audio_start)
     if suffix == ".gif":
-        from fba_player.export.gif import Gif
+        from fba_player.export._gif import Gif
 
         if audio is not None:
             raise UnsupportedError(f"{path}: a GIF has no sound; write an .mp4", what="sound in a GIF")

@@ -139,7 +139,7 @@ def record(
     if fps is None:
         rate = film_rate(shown.timeline.rate)
         if gif:
-            from fba_player.export.gif import gif_rate
+            from fba_player.export._gif import gif_rate
 
             rate = gif_rate(rate)
     else:

@@ -13,9 +13,9 @@ import numpy.typing as npt
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from fba.parameters import FAP_COUNT
-from fba_player.figure.eyeball import Eyeball, find_eyeball
+from fba_player.figure._eyeball import Eyeball, find_eyeball
+from fba_player.figure._face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
 from fba_player.figure.face_light import MOUTH_OPEN, FaceLight, LitFace
-from fba_player.figure.face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
 from fba_player.mesh.lazy_vertices import Places, Probe, Whole
 from fba_player.view.camera import Subject
 from fba_player.view.view import Eye, FaceMesh, FaceShape, rotation_vector

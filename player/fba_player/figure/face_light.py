@@ -15,7 +15,7 @@ from fba.cache import kept
 from fba.compiled import is_compiled
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
-from fba_player.figure.face_light_loops import Table, lit, sway
+from fba_player.figure._face_light_loops import Table, lit, sway
 from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
 
 Float32 = npt.NDArray[np.float32]

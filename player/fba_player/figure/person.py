@@ -13,9 +13,9 @@ import numpy.typing as npt
 from fba.body.head_attachment import HeadOnBody
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
+from fba_player.figure._face_parts import coarser_part, part_shape, with_triangles
 from fba_player.figure.body_light import BodyLight
 from fba_player.figure.face import FaceFigure, Pose
-from fba_player.figure.face_parts import coarser_part, part_shape, with_triangles
 from fba_player.mesh.lazy_vertices import Places, Probe, SomeRows, Whole
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fba.errors import DisplayError
-from fba_player.gl.antialias_region import Steps
+from fba_player.gl._antialias_region import Steps
 from fba_player.gl.context import import_moderngl
 
 

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.gl.annotation_renderer import ExtrasRenderer
-from fba_player.gl.antialias_region import Steps, steps
+from fba_player.gl._annotation_renderer import ExtrasRenderer
+from fba_player.gl._antialias_region import Steps, steps
+from fba_player.gl._ground_shadow import ShadowCaster
+from fba_player.gl._mesh_renderer import FaceRenderer
+from fba_player.gl._silhouette import Outliner
 from fba_player.gl.gpu.way import Way
-from fba_player.gl.ground_shadow import ShadowCaster
 from fba_player.gl.lod import Details
-from fba_player.gl.mesh_renderer import FaceRenderer
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
-from fba_player.gl.silhouette import Outliner
 from fba_player.mesh.primitives import capsule_mesh, sphere_mesh
 from fba_player.view.camera import Camera
 from fba_player.view.view import CAPSULE_FLOATS, Eye, FaceMesh, Mesh, MeshShape, View

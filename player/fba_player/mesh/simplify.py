@@ -82,7 +82,7 @@ def coarser(
 
     Borders keep their course, places where several vertices meet stay.
     """
-    from fba_player.mesh import simplify_loops as loops
+    from fba_player.mesh import _simplify_loops as loops
 
     count, size = points.shape
     left = np.ascontiguousarray(triangles, dtype=np.int32).copy()

@@ -20,7 +20,7 @@ from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec import Decoder, StreamInfo
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
-from fba_player.playback.frame_buffer import GrowingFrames
+from fba_player.playback._frame_buffer import GrowingFrames
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import BUFFER
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fba_player.scene.compare_timeline import CompareTimeline
+from fba_player.scene._compare_timeline import CompareTimeline
+from fba_player.scene._layout import Drawing, caption, joined, moved
 from fba_player.scene.differences import Differences, differences
-from fba_player.scene.layout import Drawing, caption, joined, moved
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.view.protocols import InTime

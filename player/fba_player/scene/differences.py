@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.parameters import baps, faps
-from fba_player.scene.compare_timeline import CompareTimeline
+from fba_player.scene._compare_timeline import CompareTimeline
 
 MOST_FRAMES = 20_000
 """Of longer performances, so many moments evenly chosen are looked at."""

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba_player.playback.timeline import Timeline
-from fba_player.scene.framing import Extent, body_extent
-from fba_player.scene.ground import no_shadows, shadows
+from fba_player.scene._framing import Extent, body_extent
+from fba_player.scene._ground import no_shadows, shadows
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import InTime
 from fba_player.view.switches import SWITCHES, Switches
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
     from fba_player.figure.face import FaceFigure
     from fba_player.figure.person import Person
-    from fba_player.scene.display_options import Dressing
-    from fba_player.scene.feature_points_view import PointView
+    from fba_player.scene._display_options import Dressing
+    from fba_player.scene._feature_points_view import PointView
 
 __all__ = ["LOOKS", "SWITCHES", "Scene", "default_camera"]
 
@@ -74,7 +74,7 @@ class Scene(InTime[Timeline]):
         if animation.body is not None:
             from fba.body import BapSolver
             from fba.body.model import BodyModel
-            from fba_player.scene.bones import Bones
+            from fba_player.scene._bones import Bones
 
             self._body = body or BodyModel.default()
             self._skeleton = self._body.skeleton
@@ -183,7 +183,7 @@ class Scene(InTime[Timeline]):
         view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
         if not self.switches.changed:
             return view
-        from fba_player.scene.display_options import Dressing, Posture
+        from fba_player.scene._display_options import Dressing, Posture
 
         if self._dressing is None:
             self._dressing = Dressing(self.figure, self._bones if self.has_body else None)
@@ -205,7 +205,7 @@ class Scene(InTime[Timeline]):
     def _points(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
         """The view as feature points and bones."""
         if self._point_view is None:
-            from fba_player.scene.feature_points_view import PointView
+            from fba_player.scene._feature_points_view import PointView
 
             self._point_view = PointView(self.figure)
         shown, matrix = self._point_view, self._face_matrix(joints)

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba_player.playback.transport import Transport
-from fba_player.session.camera_controller import Viewpoint
+from fba_player.session._camera_controller import Viewpoint
 from fba_player.session.keys import by_name
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera

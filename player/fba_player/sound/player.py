@@ -19,10 +19,10 @@ from typing import Any
 from fba.atomic_path import PathLike
 from fba.errors import FbaWarning
 from fba_player.playback.transport import Transport
+from fba_player.sound._device_clock import SoundClock
+from fba_player.sound._mixer import SoundMixer
+from fba_player.sound._read_ahead import SoundBlocks
 from fba_player.sound.audio_file import CHANNELS, SoundFile
-from fba_player.sound.device_clock import SoundClock
-from fba_player.sound.mixer import SoundMixer
-from fba_player.sound.read_ahead import SoundBlocks
 from fba_player.sound.soundtrack import beside
 
 __all__ = ["Audio", "beside", "open_audio"]

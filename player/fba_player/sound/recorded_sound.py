@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from fba.atomic_path import PathLike
 from fba_player.playback.transport import Transport
+from fba_player.sound._mixer import SoundMixer
 from fba_player.sound.audio_file import CHANNELS, SoundFile
-from fba_player.sound.mixer import SoundMixer
 from fba_player.sound.soundtrack import AAC_RATES, BLOCK
 
 Int16 = npt.NDArray[np.int16]

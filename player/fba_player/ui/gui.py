@@ -9,10 +9,10 @@ from imgui_bundle import imgui, implot
 from fba_player.session.controls import Controls
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.bar import Bar
-from fba_player.ui.hud import draw_buttons, draw_name, draw_notices, draw_recording
-from fba_player.ui.imgui_renderer import ImguiRenderer
-from fba_player.ui.panel_windows import Places
+from fba_player.ui._bar import Bar
+from fba_player.ui._hud import draw_buttons, draw_name, draw_notices, draw_recording
+from fba_player.ui._imgui_renderer import ImguiRenderer
+from fba_player.ui._panel_windows import Places
 from fba_player.ui.panels.registry import make_panels
 
 HIDES = 3.0

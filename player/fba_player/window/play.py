@@ -14,7 +14,7 @@ from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
-from fba_player.window.window import WARNED, Window
+from fba_player.window._window import WARNED, Window
 
 if TYPE_CHECKING:
     from fba_player.sound.player import Audio

@@ -13,10 +13,10 @@ import pytest
 
 from fba.errors import FbaWarning, ModelError
 from fba.face.calibration import UNITS, fit, points_of_distances
-from fba.face.calibration.align import align
-from fba.face.calibration.carry import stretches
-from fba.face.calibration.folds import turned_over
-from fba.face.checks.findings import Finding
+from fba.face.calibration._align import align
+from fba.face.calibration._carry import stretches
+from fba.face.calibration._folds import turned_over
+from fba.face.checks._findings import Finding
 from fba.face.eyeball import eyeballs
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names, row_of

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fba.face.checks.findings import Finding
-from fba.face.checks.locations import check_locations
-from fba.face.checks.neutral import check_neutral
+from fba.face.checks._findings import Finding
+from fba.face.checks._locations import check_locations
+from fba.face.checks._neutral import check_neutral
 from fba.face.eyeball import eyeballs, pupil_diameter, sphere
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.model import FaceModel, Part

@@ -20,8 +20,8 @@ from fba.face.gltf.reading import read_model
 from fba.face.gltf.writing import build
 from fba.face.model import FaceModel
 from fba.face.storage import load
+from fba.gltf._glb import join, split
 from fba.gltf.document import parse_document
-from fba.gltf.glb import join, split
 from json_places import REMOVED, put
 from stored_models import assert_same, face
 

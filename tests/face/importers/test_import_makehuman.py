@@ -13,8 +13,8 @@ from fba.face.checks import check_neutral
 from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
+from fba.face.importers.makehuman._targets import expression_shapes, read_target, shape_of
 from fba.face.importers.makehuman.makehuman import makehuman_parts, read_makehuman
-from fba.face.importers.makehuman.targets import expression_shapes, read_target, shape_of
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 

@@ -11,8 +11,8 @@ from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
-from fba.face.importers.assembly.kinds import kind_of
-from fba.face.importers.assembly.units import metres_per_unit
+from fba.face.importers.assembly._kinds import kind_of
+from fba.face.importers.assembly._units import metres_per_unit
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 from mesh_files import ply, write_obj, write_points

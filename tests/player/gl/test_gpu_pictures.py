@@ -15,7 +15,7 @@ import reference_cases
 from fba.animation import Animation
 from fba.errors import FbaWarning
 from fba.player import Camera, CompareScene, Offscreen, Scene
-from fba_player.gl.gpu.deformer import GpuDeformer
+from fba_player.gl.gpu._deformer import GpuDeformer
 from fba_player.gl.gpu.way import Way
 from fba_player.mesh.lazy_vertices import Places
 from picture_difference import difference

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fba.compiled import is_compiled
-from fba_player.gl.ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
+from fba_player.gl._ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
 from fba_player.mesh.lazy_vertices import Places
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.mesh.simplify import Coarser

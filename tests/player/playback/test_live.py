@@ -16,7 +16,7 @@ import fba
 from fba.animation import Animation
 from fba.codec import Decoder, EncoderOptions
 from fba.errors import FbaError
-from fba_player.playback.frame_buffer import GrowingFrames
+from fba_player.playback._frame_buffer import GrowingFrames
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import BUFFER, Transport

@@ -16,8 +16,8 @@ from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel
 from fba.player import Offscreen, Scene
 from fba_player.figure.face import FaceFigure
-from fba_player.scene.feature_points_view import PointView
-from fba_player.scene.skin_lines import skin_lines
+from fba_player.scene._feature_points_view import PointView
+from fba_player.scene._skin_lines import skin_lines
 from player_tracks import body_track, face_track
 
 ROW = {name: row for row, name in enumerate(feature_point_names())}

@@ -7,7 +7,7 @@ import pytest
 
 from fba.animation import Animation
 from fba_player.scene.scene import Scene
-from fba_player.session.camera_controller import GLIDE, Viewpoint
+from fba_player.session._camera_controller import GLIDE, Viewpoint
 from fba_player.view.camera import PRESETS, Camera
 from set_clock import Clock
 

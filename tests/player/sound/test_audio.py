@@ -16,9 +16,9 @@ from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
+from fba_player.sound._read_ahead import SoundBlocks
 from fba_player.sound.audio_file import SoundFile
 from fba_player.sound.player import Audio, beside, open_audio
-from fba_player.sound.read_ahead import SoundBlocks
 from player_tracks import face_track
 
 av = pytest.importorskip("av")

@@ -11,7 +11,7 @@ from fba.animation import Animation
 from fba_player.playback.playhead import Motion
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
-from fba_player.sound.mixer import FADE, SoundMixer
+from fba_player.sound._mixer import FADE, SoundMixer
 from player_tracks import face_track
 
 RATE = 1000

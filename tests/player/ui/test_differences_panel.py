@@ -19,7 +19,7 @@ from studio_hand import panel_of
 
 graphics.imported("imgui_bundle")
 
-from fba_player.ui.panels.differences_panel import DifferencesPanel, thinned  # noqa: E402 - needs imgui
+from fba_player.ui.panels._differences_panel import DifferencesPanel, thinned  # noqa: E402 - needs imgui
 from fba_player.ui.window_picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
@@ -89,7 +89,7 @@ def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
 
 
 def test_each_file_is_told_of(studio: Studio) -> None:
-    from fba_player.ui.panels.file_panel import _all
+    from fba_player.ui.panels._file_panel import _all
 
     told = _all(studio.session, studio.session.source.info)
     assert [title for title, _ in told] == ["1  a.fba", "2  b.fba"]
@@ -101,7 +101,7 @@ def test_each_file_is_told_of(studio: Studio) -> None:
 
 
 def test_why_nothing_differs() -> None:
-    from fba_player.ui.panels.differences_panel import _nothing
+    from fba_player.ui.panels._differences_panel import _nothing
 
     rest = body_track([{32: 0}] * 4)
     face, body = Scene(talk([0] * 4)), Scene(Animation(Fraction(10), np.arange(4), body=rest))

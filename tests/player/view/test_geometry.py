@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel, Part
-from fba_player.figure.eyeball import find_eyeball
-from fba_player.figure.face_parts import hairs
-from fba_player.gl.antialias_region import filled
-from fba_player.gl.silhouette import TILE, Outliner
+from fba_player.figure._eyeball import find_eyeball
+from fba_player.figure._face_parts import hairs
+from fba_player.gl._antialias_region import filled
+from fba_player.gl._silhouette import TILE, Outliner
 from fba_player.mesh.lazy_vertices import Places
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.view.camera import Camera

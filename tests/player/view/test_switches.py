@@ -16,10 +16,10 @@ from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.player import Camera, Offscreen, Scene
 from fba_player.figure.face import FaceFigure
-from fba_player.gl.labels import placed_names
-from fba_player.scene.fap_heatmap import Influence
+from fba_player.gl._labels import placed_names
+from fba_player.scene._fap_heatmap import Influence
+from fba_player.scene._wireframe import unique_edges
 from fba_player.scene.scene import SWITCHES
-from fba_player.scene.wireframe import unique_edges
 from fba_player.view.switches import Switches, parse_switch
 from player_tracks import body_track, face_track
 

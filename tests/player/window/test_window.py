@@ -13,8 +13,8 @@ import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
 from fba_player.scene.scene import Scene
+from fba_player.window._window import Window
 from fba_player.window.play import play
-from fba_player.window.window import Window
 from open_windows import opened, settle, shown, until
 
 glfw = graphics.imported("glfw")

@@ -12,7 +12,7 @@ import pytest
 
 import graphics
 from fba.animation import Animation
-from fba_player.window.window import Window
+from fba_player.window._window import Window
 from open_windows import opened, settle, shown, until
 
 glfw = graphics.imported("glfw")

@@ -18,7 +18,7 @@ from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.view.protocols import Showable
-from fba_player.window.window import Window
+from fba_player.window._window import Window
 from open_windows import settle, shown, until
 from player_tracks import face_track
 

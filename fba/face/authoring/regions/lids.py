@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from fba.face.authoring.regions._lid_clearance import Profile, bridged, edge_length, freed
 from fba.face.authoring.regions.eyes import Eye
-from fba.face.authoring.regions.lid_clearance import Profile, bridged, edge_length, freed
 from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, Opening, measure, slid
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks

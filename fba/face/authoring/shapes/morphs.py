@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from fba.errors import FbaWarning
 from fba.face.authoring.author import author
-from fba.face.authoring.shapes.mixing import GROUPS, Mixer, guarded_tables
+from fba.face.authoring.shapes._mixing import GROUPS, Mixer, guarded_tables
+from fba.face.authoring.shapes._shapes import Morphs, Shapes
 from fba.face.authoring.shapes.shape_names import canonical, fap_of
-from fba.face.authoring.shapes.shapes import Morphs, Shapes
 from fba.face.expressions import Definitions
 from fba.face.model import FaceModel, Part
 from fba.face.tables import FaceDefTables

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from fba.errors import ModelError, Remedy
 from fba.face.authoring.shapes.shape_names import canonical, fap_of
 from fba.face.eyeball import sphere
+from fba.face.importers.assembly._profile import profile_points
+from fba.face.importers.assembly._warping import warped
 from fba.face.importers.assembly.pieces import Piece
-from fba.face.importers.assembly.profile import profile_points
-from fba.face.importers.assembly.warping import warped
 from fba.parameters import faps
 
 Float64 = npt.NDArray[np.float64]

@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
+from fba.face.importers.assembly._units import metres_per_unit, pupil_distance
+from fba.face.importers.assembly._winding import outward
 from fba.face.importers.assembly.default_materials import with_looks
 from fba.face.importers.assembly.pieces import Piece, assembled, moved
-from fba.face.importers.assembly.units import metres_per_unit, pupil_distance
-from fba.face.importers.assembly.winding import outward
 from fba.face.model import FaceModel
 
 Float64 = npt.NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
+from fba.face.importers.assembly._kinds import DROPPED, checked_kinds, kind_of
 from fba.face.importers.assembly.components import shell_labels
-from fba.face.importers.assembly.kinds import DROPPED, checked_kinds, kind_of
 from fba.face.model import Part
 
 Float32 = npt.NDArray[np.float32]

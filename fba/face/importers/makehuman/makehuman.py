@@ -21,7 +21,7 @@ import numpy.typing as npt
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.default_materials import LOOKS
-from fba.face.importers.makehuman.mhclo import fitted
+from fba.face.importers.makehuman._mhclo import fitted
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons, Source, make_part

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from fba_player.figure.body_light import LitPart
 from fba_player.figure.face_light import LitFacePart
+from fba_player.gl.gpu._deformer import GpuDeformer
 from fba_player.gl.gpu.choice import FAILED, Choice
-from fba_player.gl.gpu.deformer import GpuDeformer
 from fba_player.gl.lod import same
 from fba_player.mesh.lazy_vertices import Places, Whole, spare
 from fba_player.view.view import ChosenLight, FaceMesh

@@ -10,10 +10,10 @@ from fba.errors import FbaError
 from fba_player.session.performer import Performer
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels.curve_data import parameter
+from fba_player.ui.panels._curve_data import parameter
+from fba_player.ui.panels._puppet_rows import Group, Row, groups
+from fba_player.ui.panels._puppet_speech import mood, speech
 from fba_player.ui.panels.panel import Panel, shortened, tooltip
-from fba_player.ui.panels.puppet_rows import Group, Row, groups
-from fba_player.ui.panels.puppet_speech import mood, speech
 
 TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
 """Points that a row's name takes, its value, and the button that gives it back."""

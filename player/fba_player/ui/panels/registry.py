@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from fba_player.ui.panels.camera_panel import CameraPanel
-from fba_player.ui.panels.curves_panel import CurvesPanel
-from fba_player.ui.panels.differences_panel import DifferencesPanel
-from fba_player.ui.panels.file_panel import FilePanel
-from fba_player.ui.panels.help_panel import HelpPanel
+from fba_player.ui.panels._camera_panel import CameraPanel
+from fba_player.ui.panels._curves_panel import CurvesPanel
+from fba_player.ui.panels._differences_panel import DifferencesPanel
+from fba_player.ui.panels._file_panel import FilePanel
+from fba_player.ui.panels._help_panel import HelpPanel
+from fba_player.ui.panels._rate_panel import RatePanel
+from fba_player.ui.panels._view_panel import ViewPanel
 from fba_player.ui.panels.panel import Panel
 from fba_player.ui.panels.puppet_panel import PuppetPanel
-from fba_player.ui.panels.rate_panel import RatePanel
-from fba_player.ui.panels.view_panel import ViewPanel
 
 PANELS: tuple[type[Panel], ...] = (
     FilePanel,

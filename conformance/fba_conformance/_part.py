@@ -1,0 +1,181 @@
+"""The FAP half or the BAP half of a plane, read element by element and turned into values.
+
+ISO/IEC 14496-2, FBA object plane, predictive mode: masks, range lists, quantiser, arithmetic segments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fba.errors import UnsupportedError
+from fba.parameters import bap_groups, baps, fap_groups, faps
+from fba_conformance._reader import Levels, Reader
+from fba_conformance._textbook import FrequencyTable
+
+RANGE_UNIT = 60
+LISTS = ("i_new_max", "i_new_min", "p_new_max", "p_new_min")
+MARKER_EVERY = 4
+"""A marker bit stands before the 1st, 5th, 9th ... parameter of a group in a range list."""
+INTENSITY_MAX = 63
+PREDICTION_SCALE = (
+    0, 1, 2, 3, 5, 7, 9, 11, 14, 17, 20, 23, 27, 31, 35, 39,
+    43, 47, 52, 57, 62, 67, 72, 77, 82, 88, 94, 100, 106, 113, 120, 127,
+)  # fmt: skip
+"""What bap_quant stands for."""
+
+
+@dataclass(slots=True)
+class Slot:
+    """One coded number: its label, step and limits (for I and P planes), model and last value."""
+
+    label: str
+    step: int
+    limits: dict[bool, tuple[int, int]]
+    model: FrequencyTable | None = None
+    value: int = 0
+
+
+@dataclass
+class Part:
+    """State of one half. `kind` is "fap" or "bap"; `quant` is None before its first I plane."""
+
+    kind: str
+    bap_steps: str = "iso"
+    quant: int | None = None
+    mask_types: list[int] = field(default_factory=list)
+    mask: frozenset[int] = frozenset()
+    lists_sent: str = "0000"
+    slots: dict[int, Slot] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.groups = fap_groups() if self.kind == "fap" else bap_groups()
+        self.ranged_groups = self.groups[1:] if self.kind == "fap" else self.groups
+        self.labels = {p.number: p.label for p in (faps() if self.kind == "fap" else baps())}
+        if self.kind == "fap":
+            self.steps = {f.number: f.step for f in faps()}
+        else:
+            self.steps = {b.number: getattr(b, f"step_{self.bap_steps}") for b in baps()}
+        self.limits: dict[str, dict[int, int]] = {name: {} for name in LISTS}
+        self._set_default_limits()
+
+    def _set_default_limits(self) -> None:
+        if self.kind == "bap":
+            for bap in baps():
+                if bap.i_limits is None or bap.p_limits is None:
+                    continue  # extension BAPs have none: their lists must be sent
+                for name, limit in zip(LISTS, (*bap.i_limits[::-1], *bap.p_limits[::-1]), strict=True):
+                    self.limits[name][bap.number] = limit
+            return
+        for fap in faps():
+            if fap.i_limits is None or fap.p_limits is None:
+                continue
+            intra, predicted = (1080, 420) if fap.number == 47 else (fap.i_limits[1], fap.p_limits[1])
+            for name, limit in zip(LISTS, (intra, -intra, predicted, -predicted), strict=True):
+                whole = -(-abs(limit) // RANGE_UNIT) * RANGE_UNIT
+                self.limits[name][fap.number] = whole if limit > 0 else -whole
+
+    @property
+    def divisor(self) -> int:
+        """What range limits are divided by, and steps multiplied with."""
+        quant = self.quant or 0
+        return max(1, quant if self.kind == "fap" else PREDICTION_SCALE[quant])
+
+    @property
+    def low_level(self) -> list[int]:
+        """Parameters of the main segment, in coding order."""
+        return [number for group in self.ranged_groups for number in group if number in self.mask]
+
+    def read_header(self, reader: Reader) -> None:
+        """What an I plane says about this half, and fresh models."""
+        kind = self.kind
+        self.quant = reader.number(f"{kind}_quant", 5, kind)
+        self._read_masks(reader)
+        reader.number("suggested_gender", 1, kind)
+        bit = reader.bit
+        if reader.number("object_coding_type", 1, kind):
+            raise UnsupportedError(
+                f"plane {reader.plane}, bit {bit}: object_coding_type of the {kind.upper()} part is 1 (DCT "
+                "segments), whose code tables are in no public source; only predictive coding can be read",
+                what="DCT segment mode",
+                plane=reader.plane,
+                bit=bit,
+            )
+        self.lists_sent = "".join(str(reader.number(f"is_{name}", 1, kind)) for name in LISTS)
+        for name, sent in zip(LISTS, self.lists_sent, strict=True):
+            if sent == "1":
+                self._read_list(reader, name)
+        self._make_slots(reader)
+
+    def _read_masks(self, reader: Reader) -> None:
+        self.mask_types, mask = [], set[int]()
+        for group, numbers in enumerate(self.groups, 1):
+            section = f"{self.kind} group {group}"
+            reader.marker(section)
+            mask_type = reader.number(f"{self.kind}_mask_type", 2, section)
+            self.mask_types.append(mask_type)
+            if mask_type == 2 and self.kind == "bap":
+                raise reader.error(
+                    f"bap_mask_type of group {group} is 2, which BAPs do not have (0 none, 1 masked, 3 all)",
+                    bit=reader.bit - 2,
+                )
+            if mask_type == 3:
+                mask.update(numbers)
+            elif mask_type:
+                flags = reader.flags(f"{self.kind}_group_mask", len(numbers), section)
+                mask.update(number for number, flag in zip(numbers, flags, strict=True) if flag == "1")
+        self.mask = frozenset(mask)
+
+    def _read_list(self, reader: Reader, name: str) -> None:
+        section = f"{self.kind} ranges"
+        sign = 1 if name.endswith("max") else -1
+        for numbers in self.ranged_groups:
+            for position, number in enumerate(numbers):
+                if position % MARKER_EVERY == 0:  # whether or not its parameters are masked in
+                    reader.marker(section)
+                if number in self.mask:
+                    code = reader.number(f"{name} {self.labels[number]}", 5, section)
+                    self.limits[name][number] = sign * RANGE_UNIT * code
+
+    def _make_slots(self, reader: Reader) -> None:
+        self.slots = {}
+        for number in self.low_level:
+            if any(number not in self.limits[name] for name in LISTS):
+                raise reader.error(
+                    f"{self.labels[number]} is masked in, but its range was never sent, and extension BAPs "
+                    "have none by default; a writer must send all four range lists"
+                )
+            # Integer division toward zero, of the limits as they were sent or stand in the table.
+            i_max, i_min, p_max, p_min = (
+                abs(self.limits[name][number]) // self.divisor * (1 if self.limits[name][number] > 0 else -1)
+                for name in LISTS
+            )
+            step = self.steps[number] * self.divisor if self.quant else 1
+            self.slots[number] = Slot(
+                self.labels[number], step, {True: (i_min, i_max), False: (p_min, p_max)}
+            )
+
+    def read_values(self, reader: Reader, *, intra: bool) -> dict[int, int]:
+        """The main segment; returns value by parameter number, in coding order."""
+        numbers = self.low_level
+        read_segment(reader, f"{self.kind}s", self.kind, [self.slots[n] for n in numbers], intra=intra)
+        return {number: self.slots[number].value for number in numbers}
+
+
+def read_segment(reader: Reader, name: str, section: str, slots: list[Slot], *, intra: bool) -> None:
+    """One arithmetic segment into its slots; noted as an element even where it codes nothing."""
+    tables = []
+    for slot in slots:
+        low, high = slot.limits[intra]
+        if intra:
+            low_p, high_p = slot.limits[False]
+            slot.model = FrequencyTable(high_p - low_p + 1)  # every I plane makes the P planes forget
+            tables.append(FrequencyTable(high - low + 1))
+        else:
+            assert slot.model is not None  # an I plane of this half came first: `Walker` saw to it
+            tables.append(slot.model)
+    symbols, start, inserted = reader.segment(f"{name} segment", tables, section, learn=not intra)
+    levels = tuple(symbol + slot.limits[intra][0] for symbol, slot in zip(symbols, slots, strict=True))
+    for slot, level in zip(slots, levels, strict=True):
+        slot.value = level * slot.step + (0 if intra else slot.value)
+    content = Levels(tuple(s.label for s in slots), levels, tuple(s.value for s in slots), inserted)
+    reader.note(start, f"{name} segment", content, section)

@@ -1,0 +1,128 @@
+"""What walking needs of a skeleton: the bones of legs and arms, and where soles touch the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.body.gait._limb import ELBOW, KNEE, Limb
+from fba.body.gait._rotations import Float
+from fba.body.skeleton import ROOT, Skeleton
+from fba.body.solve.conventions import convention
+from fba.errors import ModelError
+
+HEEL_BEHIND, TOES_AHEAD = 0.054, 0.062
+"""Metres from the ankle's centre back to where the heel touches, and from the metatarsal joint to the tip of
+the toes, for the default body."""
+HIP_HEIGHT = 0.9364
+"""Metres of the default body: other bodies are measured against it."""
+PALMS = ("middle0", "middle1", "index0", "wrist")
+"""Joints by which a palm is placed, the first that a skeleton has."""
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One side of a body; float64 (3,), metres, default posture.
+
+    way: +1 left, -1 right. hip: from the root. leg, arm: their bones. ankle: its centre, above the ground.
+    subtalar: from the ankle. heel, toe: from the subtalar joint to the heel's ground point and to the
+    metatarsal joint. tip: from there to the tip of the toes, on the ground. shoulder: its name.
+    """
+
+    letter: str
+    way: float
+    hip: Float
+    leg: Limb
+    ankle: Float
+    subtalar: Float
+    heel: Float
+    toe: Float
+    tip: Float
+    arm: Limb
+
+
+@dataclass(frozen=True, eq=False)
+class Anatomy:
+    """A skeleton, its sides by letter ("l", "r"), scale: its size against the default body, and pelvis: the
+    centre of the sacroiliac joint from the root."""
+
+    skeleton: Skeleton
+    sides: dict[str, Side]
+    scale: float
+    pelvis: Float
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> Anatomy:
+        """Measure a skeleton. ModelError where it lacks legs or arms, or cannot stand on them."""
+        wanted = [ROOT, "sacroiliac"]
+        for letter in "lr":
+            wanted += [f"{letter}_{j}" for j in ("hip", "knee", "ankle", "subtalar", "metatarsal")]
+            wanted += [f"{letter}_{j}" for j in ("shoulder", "elbow", "wrist")]
+        missing = [joint for joint in wanted if joint not in skeleton]
+        if missing:
+            raise ModelError(f"gait: the skeleton has no {', '.join(missing)}; it cannot walk without")
+        centre = {name: skeleton.centres[skeleton.number(name)] for name in skeleton.names}
+        height = float(centre["l_hip"][1])
+        scale = height / HIP_HEIGHT
+        sides = {}
+        for letter, way in (("l", 1.0), ("r", -1.0)):
+            hip, knee, ankle, subtalar, toe = (
+                centre[f"{letter}_{j}"] for j in ("hip", "knee", "ankle", "subtalar", "metatarsal")
+            )
+            shoulder, elbow = centre[f"{letter}_shoulder"], centre[f"{letter}_elbow"]
+            palm = next(centre[f"{letter}_{j}"] for j in PALMS if f"{letter}_{j}" in skeleton)
+            lengths = [np.linalg.norm(b) for b in (knee - hip, ankle - knee, elbow - shoulder, palm - elbow)]
+            if height <= 0.0 or ankle[1] < 0.0 or min(lengths) < 1e-3 * scale:
+                raise ModelError(
+                    "gait: the skeleton's legs and arms need bones of some length, and its feet "
+                    "must be above the ground (y = 0) in the default posture"
+                )
+            sides[letter] = Side(
+                letter,
+                way,
+                hip - centre[ROOT],
+                Limb(knee - hip, ankle - knee, KNEE),
+                ankle,
+                subtalar - ankle,
+                np.array([ankle[0], 0.0, ankle[2] - HEEL_BEHIND * scale]) - subtalar,
+                toe - subtalar,
+                np.array([0.0, -toe[1], TOES_AHEAD * scale]),
+                Limb(elbow - shoulder, palm - elbow, ELBOW),
+            )
+        return cls(skeleton, sides, scale, centre["sacroiliac"] - centre[ROOT])
+
+
+class Writer:
+    """Angles and places -> BAPs, in one convention."""
+
+    def __init__(self, frames: int, axes: str = "iso") -> None:
+        from fba.parameters import BAP_COUNT
+
+        self._rules = convention(axes)
+        self.values = np.zeros((frames, BAP_COUNT))
+        self.sent = np.zeros(BAP_COUNT, dtype=bool)
+
+    @property
+    def forward_column(self) -> int:
+        """Column of the root's translation along z."""
+        return int(self._rules.translation[2])
+
+    def turn(self, joint: str, axis: int, radians: Float | float) -> None:
+        """Set a joint's angle about x, y or z of the body's frame; KeyError where it has no such freedom."""
+        rules = self._rules
+        row = rules.joints.index(joint)
+        for place in range(3):
+            if rules.axis[row, place] == axis and rules.bap[row, place] >= 0:
+                column = rules.bap[row, place]
+                self.values[:, column] = np.asarray(radians) * rules.sign[row, place] * 1e5
+                self.sent[column] = True
+                return
+        raise KeyError(f"{joint} does not turn about {'xyz'[axis]}")
+
+    def move(self, metres: Float) -> None:
+        """Set the root's translation, (T, 3) from the default posture; rounded to whole mm."""
+        for axis in range(3):
+            column = self._rules.translation[axis]
+            self.values[:, column] = np.rint(metres[:, axis] * self._rules.translation_sign[axis] * 1e3)
+            self.sent[column] = True

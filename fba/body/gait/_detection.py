@@ -1,0 +1,222 @@
+"""Walking found in captured motion: contacts, cycles, the four characteristic poses.
+
+Digest faces-and-emotions.md, 2.4. A foot touches the ground where its heel is furthest ahead of the pelvis,
+and leaves it where its toes are furthest behind (Zeni, Richards, Higginson 2008): that holds on any ground,
+on a treadmill, and on curves, with "ahead" as where the pelvis faces. Recoil, passing and anticipation are
+extrema of the knees and of the swinging thigh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.body.gait._anatomy import Anatomy
+from fba.body.gait._characters import POSES
+from fba.body.gait._signals import SHORTEST_SWING, STEP_SECONDS, Curves
+from fba.body.skeleton import Skeleton
+from fba.body.solve.solver import BapSolver
+
+UNEVEN = 2.2
+"""How much longer one of the two steps of a cycle may take than the other."""
+_NAMES = {"l": "left", "r": "right"}
+
+
+@dataclass(frozen=True)
+class Step:
+    """Half a cycle: from the contact of one foot to that of the other.
+
+    side: "left" or "right", the foot that touches the ground first and carries. poses: frames of the four
+    poses, in order. end: frame of the other foot's contact. off: frame in which the other foot left the
+    ground, or None where that was not seen.
+    """
+
+    side: str
+    poses: tuple[int, int, int, int]
+    end: int
+    off: int | None
+
+    @property
+    def start(self) -> int:
+        return self.poses[0]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Two steps, from a contact of a foot to its next.
+
+    seconds: how long. stride: metres between the footprints. stance: share of the cycle for which the foot
+    was on the ground, NaN where its end was not seen. turn: degrees by which the body turned left.
+    running: whether both feet were off the ground at some time.
+    """
+
+    steps: tuple[Step, Step]
+    seconds: float
+    stride: float
+    stance: float
+    turn: float
+    running: bool
+
+    @property
+    def side(self) -> str:
+        return self.steps[0].side
+
+    @property
+    def start(self) -> int:
+        return self.steps[0].start
+
+    @property
+    def end(self) -> int:
+        return self.steps[1].end
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """When the eight poses came, as fractions of the cycle."""
+        length = self.end - self.start
+        return tuple((frame - self.start) / length for step in self.steps for frame in step.poses)
+
+
+@dataclass(frozen=True)
+class Gait:
+    """What `detect` found: steps in order of time, cycles, which overlap by a step. Frames are positions in
+    the animation, from 0."""
+
+    rate: Fraction
+    frames: int
+    steps: tuple[Step, ...]
+    cycles: tuple[Cycle, ...]
+
+    @property
+    def keys(self) -> tuple[int, ...]:
+        """Frames of all poses of all steps, and the contacts that end them, without repeats, in order."""
+        return tuple(sorted({frame for step in self.steps for frame in (*step.poses, step.end)}))
+
+    @property
+    def walking(self) -> npt.NDArray[np.bool_]:
+        """(T,), which frames belong to a step."""
+        result = np.zeros(self.frames, dtype=bool)
+        for step in self.steps:
+            result[step.start : step.end + 1] = True
+        return result
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON. Frames, seconds, metres, degrees."""
+        return {
+            "frames": self.frames,
+            "walking": int(self.walking.sum()),
+            "steps": [
+                {"side": s.side, **dict(zip(POSES, s.poses, strict=True)), "end": s.end} for s in self.steps
+            ],
+            "cycles": [
+                {
+                    "side": c.side, "start": c.start, "end": c.end, "seconds": c.seconds, "stride": c.stride,
+                    "stance": None if np.isnan(c.stance) else c.stance, "turn": c.turn, "running": c.running,
+                }
+                for c in self.cycles
+            ],
+        }  # fmt: skip
+
+    def lines(self) -> list[str]:
+        """For people."""
+        if not self.steps:
+            return ["no steps found: nobody walks here, or less than one step"]
+        result = [
+            f"{len(self.steps)} steps, {len(self.cycles)} cycles; "
+            f"walking in {int(self.walking.sum())} of {self.frames} frames",
+            "side   " + "".join(f"{pose:>13}" for pose in POSES) + "          end",
+        ]
+        result += [f"{s.side:7}" + "".join(f"{frame:13}" for frame in (*s.poses, s.end)) for s in self.steps]
+        for c in self.cycles:
+            stance = "" if np.isnan(c.stance) else f", stance {100 * c.stance:.0f} %"
+            kind = ", running" if c.running else ""
+            turn = f", turns {abs(c.turn):.0f} degrees {'left' if c.turn > 0 else 'right'}"
+            result.append(
+                f"{c.side} cycle {c.start}..{c.end}: {c.seconds:.2f} s, stride {c.stride:.2f} m"
+                f"{stance}{turn if abs(c.turn) >= 10 else ''}{kind}"
+            )
+        return result
+
+
+def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Gait:
+    """Find the steps, cycles and characteristic poses in which a body walks forward.
+
+    skeleton: whose joints the BAPs turn, the default body where None. axes: a convention's name.
+    A foot that never swings past the other, sideways and backward steps, and the first and last step of a
+    walk, whose beginning or end is not there, are not found. ValueError where there is no body track.
+    """
+    if animation.body is None:
+        raise ValueError("gait: the animation has no body track")
+    skeleton = Skeleton.default() if skeleton is None else skeleton
+    anatomy = Anatomy.of(skeleton)
+    count = len(animation)
+    none = Gait(animation.rate, count, (), ())
+    if count < 4:
+        return none
+    curves = Curves.of(anatomy, BapSolver(skeleton, axes).pose(animation.body.values), animation.times)
+    contacts = {letter: curves.contacts(letter) for letter in "lr"}
+    offs = {letter: curves.offs(letter) for letter in "lr"}
+    order = sorted((frame, letter) for letter, frames in contacts.items() for frame in frames)
+    steps = [
+        step
+        for (start, side), (end, other) in pairwise(order)
+        if side != other and (step := _step(curves, side, start, end, offs[other])) is not None
+    ]
+    cycles = [
+        cycle
+        for one, two in pairwise(steps)
+        if one.end == two.start and (cycle := _cycle(curves, one, two)) is not None
+    ]
+    return Gait(animation.rate, count, tuple(steps), tuple(cycles))
+
+
+def _step(curves: Curves, side: str, start: int, end: int, offs: list[int]) -> Step | None:
+    other = "l" if side == "r" else "r"
+    lasting = float(curves.times[end] - curves.times[start])
+    if not STEP_SECONDS[0] <= lasting <= STEP_SECONDS[1] or end - start < 4:
+        return None
+    swing = curves.heel[other]
+    if swing[end] - swing[start : end + 1].min() < SHORTEST_SWING * curves.reach:
+        return None
+    length = end - start
+    first, last = start + max(1, round(0.2 * length)), end - max(1, round(0.2 * length))
+    passing = first + int(np.argmax(curves.knee[other][first : last + 1]))
+    early = curves.knee[side][start + 1 : passing]
+    # where the carrying knee does not give way, the pose is where it would be, half way
+    recoil = start + 1 + int(np.argmax(early)) if len(early) else start + 1
+    if not start + 1 < recoil < passing - 1:
+        recoil = (start + passing) // 2
+    # a thigh that still rises as the foot comes down has no extremum before: half way again
+    late = curves.thigh[other][passing + 1 : end - round(0.1 * length)]
+    anticipation = passing + 1 + int(np.argmax(late)) if len(late) else passing
+    if not passing + 1 < anticipation < end - round(0.1 * length) - 1:
+        anticipation = (passing + end) // 2
+    if not passing < anticipation < end or not start < recoil < passing:
+        return None
+    before = [frame for frame in offs if start - length <= frame < passing]
+    return Step(_NAMES[side], (start, recoil, passing, anticipation), end, before[-1] if before else None)
+
+
+def _cycle(curves: Curves, one: Step, two: Step) -> Cycle | None:
+    lengths = sorted((one.end - one.start, two.end - two.start))
+    if lengths[1] > UNEVEN * lengths[0]:
+        return None
+    start, end = one.start, two.end
+    heel = curves.place[one.side[0]]
+    gap = heel[end] - heel[start]
+    # the foot that carries in the first step leaves the ground in the second
+    stance = (two.off - start) / (end - start) if two.off is not None else float("nan")
+    running = any(step.off is not None and step.off < step.start for step in (one, two))
+    return Cycle(
+        (one, two),
+        float(curves.times[end] - curves.times[start]),
+        float(np.hypot(gap[0], gap[2])),
+        stance,
+        float(np.degrees(curves.heading[end] - curves.heading[start])),
+        running,
+    )

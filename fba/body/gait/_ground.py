@@ -1,0 +1,133 @@
+"""Where the feet are while they stand, and the legs that reach them.
+
+A foot lands on its heel, lies flat, and rises over the metatarsal joint while the toes stay flat: what
+touches does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3 and 4);
+so does the `plan`. What that leaves open, two feet on the ground at once, is closed here, by the legs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.body.gait._anatomy import Side
+from fba.body.gait._curves import smoothstep
+from fba.body.gait._rotations import Float, about, foot_angles, limb_angles, turned
+
+TOE_OFF = 0.6
+"""Fraction of the cycle at which a foot leaves the ground."""
+_ROUNDS = 4
+_RISEN = np.sin(np.radians(12.0))
+"""Sine of the pitch of a foot whose heel is well off the ground."""
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """Frames of one foot. Float64.
+
+    turn: (T, 3, 3) rotation of the foot. subtalar: (T, 3) place of its joint.
+    """
+
+    turn: Float
+    subtalar: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """Frames of one leg: rotations of the thigh (T, 3, 3), in the world, and bends of the knee (T,), with
+    the foot's turn (T, 3, 3), all float64."""
+
+    thigh: Float
+    bend: Float
+    foot: Float
+
+    def ankle(self) -> tuple[Float, Float, Float]:
+        """Ankle flexion about x, twisting about y, and the subtalar joint's roll about z, radians."""
+        shin = self.thigh @ about(0, self.bend)
+        return foot_angles(np.swapaxes(shin, -1, -2) @ self.foot)
+
+
+def foot_turn(pitch: Float, yaw: Float | float) -> Float:
+    """Rotation of a foot with its toes raised by pitch and pointing aside by yaw (about +y), radians."""
+    return about(1, np.broadcast_to(yaw, pitch.shape)) @ about(0, -pitch)
+
+
+def standing(side: Side, place: Float, pitch: Float, yaw: float) -> Footing:
+    """A foot on the ground.
+
+    place: (T, 3), where its ankle's centre is above when the foot is flat, y = 0. pitch: (T,).
+    """
+    turn, flat = foot_turn(pitch, yaw), about(1, yaw)
+    level = place + (0.0, side.ankle[1], 0.0) + flat @ side.subtalar
+    on_heel = level + flat @ side.heel - turned(turn, side.heel)
+    on_toes = level + flat @ side.toe - turned(turn, side.toe)
+    return Footing(turn, np.where(pitch[..., None] > 0.0, on_heel, on_toes))
+
+
+def ankle_place(side: Side, footing: Footing, roll: Float | float = 0.0) -> Float:
+    """(T, 3), where the ankle is that carries a foot, turned back by the subtalar joint's roll."""
+    shape = footing.subtalar.shape[:-1]
+    turn = footing.turn @ about(2, -np.broadcast_to(roll, shape))
+    return footing.subtalar - turned(turn, side.subtalar)
+
+
+def reach(side: Side, hip: Float, footing: Footing, knee_yaw: float, level_roll: float = 0.0) -> Leg:
+    """The leg from a hip (T, 3) to a foot. knee_yaw: where the knee points, about +y, radians.
+
+    The heel hangs on the ankle, which rolls with the shin where the foot does not. So that neither heel nor
+    ball leaves its place, a flat foot turns a little about the metatarsal joint: by nothing where that roll
+    is level_roll, and less as the heel rises.
+    """
+    roll: Float | float = 0.0
+    held = footing
+    down = smoothstep(1.0 + footing.turn[..., 1, 2] / _RISEN)
+    joint = footing.subtalar + turned(footing.turn, side.toe)
+    for _ in range(_ROUNDS):  # the subtalar joint's roll moves ankle and heel, by less each time
+        thigh, bend = side.leg.solve(ankle_place(side, held, roll) - hip, knee_yaw)
+        leg = Leg(thigh, bend, held.turn)
+        _, _, roll = leg.ankle()
+        aside = side.heel[1] / (side.toe[2] - side.heel[2]) * (np.sin(roll) - np.sin(level_roll))
+        turn = about(1, down * aside) @ footing.turn
+        held = Footing(turn, joint - turned(turn, side.toe))
+    return leg
+
+
+def hanging(side: Side, hip: Float, thigh: Float, bend: Float, foot: Float) -> Footing:
+    """The foot (turned so in the world, (T, 3, 3)) of a leg from the hip with given thigh and knee."""
+    shin = thigh @ about(0, bend)
+    angles = foot_angles(np.swapaxes(shin, -1, -2) @ foot)
+    ankle = shin @ about(0, angles[0]) @ about(1, angles[1])
+    at = hip + turned(thigh, side.leg.upper) + turned(shin, side.leg.lower)
+    return Footing(foot, at + turned(ankle, side.subtalar))
+
+
+def lowest(side: Side, footing: Footing, toes: Float | float = 0.0) -> Float:
+    """(T,), height of the lowest of heel, ball and tip of the toes; toes: bent up by so much, radians."""
+    heel = footing.subtalar + turned(footing.turn, side.heel)
+    joint = footing.subtalar + turned(footing.turn, side.toe)
+    bent = footing.turn @ about(0, -np.broadcast_to(toes, footing.subtalar.shape[:-1]))
+    ball = joint + turned(footing.turn, side.tip * (0.0, 1.0, 0.0))
+    tip = joint + turned(bent, side.tip)
+    result: Float = np.minimum(np.minimum(heel[..., 1], ball[..., 1]), tip[..., 1])
+    return result
+
+
+def hip_angles(pelvis: Float, thigh: Float) -> tuple[Float, Float, Float]:
+    """Angles about x, y, z of the hip between pelvis and thigh, both in the world: as the pelvis turns one
+    way, they turn the other, and the leg keeps its direction."""
+    return limb_angles(np.swapaxes(pelvis, -1, -2) @ thigh)
+
+
+def hip_place(side: Side, pelvis_centre: Float, root: Float, lean: Float, pelvis: Float) -> Float:
+    """(T, 3), where a hip is. root: (T, 3), its centre; lean: (T, 3, 3), its rotation; pelvis: in it."""
+    local = pelvis_centre + turned(pelvis, side.hip - pelvis_centre)
+    return root + turned(lean, local)
+
+
+def hip_height(side: Side, hip: Float, ankle: Float, bend: Float) -> Float:
+    """(T,), height of the hip over the ground at which the leg to the ankle has that bend."""
+    gap = hip - ankle
+    rest = np.square(side.leg.length(bend)) - np.square(gap[..., 0]) - np.square(gap[..., 2])
+    result: Float = ankle[..., 1] + np.sqrt(np.maximum(rest, 1e-6))
+    return result

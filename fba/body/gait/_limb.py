@@ -1,0 +1,68 @@
+"""Two bones and a hinge, solved in closed form: the thigh and shin of a leg, the upper arm and forearm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.gait._rotations import Float, about, turned
+
+KNEE, ELBOW = 1.0, -1.0
+"""Which way a hinge bends: about +x a knee (backward), about -x an elbow (forward)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """Upper and lower: float64 (3,), the bones in the default posture, metres. way: `KNEE` or `ELBOW`."""
+
+    upper: Float
+    lower: Float
+    way: float
+
+    def _hinge(self) -> tuple[float, float, float]:
+        """The squared reach at a bend b is constant + 2 m cos(b - straight): constant, m, straight."""
+        u, w = self.upper, self.lower
+        along, across = u[1] * w[1] + u[2] * w[2], u[2] * w[1] - u[1] * w[2]
+        constant = float(u @ u + w @ w + 2.0 * u[0] * w[0])
+        return constant, float(np.hypot(along, across)), float(np.arctan2(across, along))
+
+    @property
+    def reach(self) -> float:
+        """Metres from end to end where the limb is straight."""
+        constant, m, _ = self._hinge()
+        return float(np.sqrt(constant + 2.0 * m))
+
+    def length(self, bend: npt.ArrayLike) -> Float:
+        """Metres from end to end at a bend, radians (the rotation about x, times `way`)."""
+        constant, m, straight = self._hinge()
+        result: Float = np.sqrt(
+            constant + 2.0 * m * np.cos(self.way * np.asarray(bend, dtype=np.float64) - straight)
+        )
+        return result
+
+    def bend(self, length: npt.ArrayLike) -> Float:
+        """The bend at which the ends are that far apart; where they cannot be, the closest."""
+        constant, m, straight = self._hinge()
+        cosine = (np.square(np.asarray(length, dtype=np.float64)) - constant) / (2.0 * m)
+        result: Float = self.way * straight + np.arccos(np.clip(cosine, -1.0, 1.0))
+        return result
+
+    def solve(self, target: Float, twist: npt.ArrayLike) -> tuple[Float, Float]:
+        """Rotations (..., 3, 3) of the upper bone and bends (...) that take the end to target (..., 3).
+
+        target: from the limb's root, in the frame of its parent. twist: about the upper bone's own length,
+        the innermost of its turns (abduction, then flexion follow). Out of reach, the limb points at it.
+        """
+        twist = np.asarray(twist, dtype=np.float64)
+        bend = self.bend(np.linalg.norm(target, axis=-1))
+        end = self.upper + turned(about(0, self.way * bend), self.lower)
+        end = turned(about(1, twist), end)
+        size = np.linalg.norm(end, axis=-1) / np.linalg.norm(target, axis=-1)
+        wanted = target * size[..., None]
+        flat = np.hypot(end[..., 0], end[..., 1])
+        aside = -np.arccos(np.clip(wanted[..., 0] / flat, -1.0, 1.0)) - np.arctan2(end[..., 1], end[..., 0])
+        leant = turned(about(2, aside), end)
+        forward = np.arctan2(wanted[..., 2], wanted[..., 1]) - np.arctan2(leant[..., 2], leant[..., 1])
+        return about(0, forward) @ about(2, aside) @ about(1, twist), bend

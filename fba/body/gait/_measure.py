@@ -1,0 +1,92 @@
+"""What a walk does: contacts, slip, depth under the ground, measured on the posed body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.body.gait._anatomy import Anatomy
+from fba.body.gait._rotations import Float
+from fba.body.skeleton import Skeleton
+from fba.body.solve.conventions import convention
+from fba.body.solve.solver import BapSolver
+
+ON_GROUND = 0.002
+"""Metres above the ground at which a point still touches."""
+
+
+@dataclass(frozen=True, eq=False)
+class Soles:
+    """Points of the feet in every frame. Float64 (2, 3, T, 3), metres: left and right; heel, ball of the
+    foot, tip of the toes."""
+
+    points: Float
+
+    @property
+    def touching(self) -> npt.NDArray[np.bool_]:
+        """(2, 3, T), whether a point is on the ground."""
+        result: npt.NDArray[np.bool_] = self.points[..., 1] <= ON_GROUND
+        return result
+
+    @property
+    def deepest(self) -> float:
+        """Metres that the lowest point of all is under the ground; negative where it is above."""
+        return float(-self.points[..., 1].min())
+
+    @property
+    def slip(self) -> float:
+        """Metres that a point moves along the ground at most while it touches it, from first to last."""
+        worst = 0.0
+        for point, touches in zip(self.points.reshape(6, -1, 3), self.touching.reshape(6, -1), strict=True):
+            edges = np.flatnonzero(np.diff(np.concatenate([[False], touches, [False]]).astype(int)))
+            for start, stop in zip(edges[::2], edges[1::2], strict=True):
+                path = point[start:stop][:, [0, 2]]
+                worst = max(worst, float(np.linalg.norm(path - path[0], axis=1).max()))
+        return worst
+
+    @property
+    def stance(self) -> tuple[float, float]:
+        """Share of the frames in which the left and the right foot are on the ground."""
+        left, right = self.touching.any(axis=1).mean(axis=1)
+        return float(left), float(right)
+
+    @property
+    def carried(self) -> bool:
+        """Whether a foot is on the ground in every frame: what tells walking from running."""
+        return bool(self.touching.any(axis=(0, 1)).all())
+
+
+def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Soles:
+    """Pose an animation's body and look at its feet. ValueError where it has no body track."""
+    if animation.body is None:
+        raise ValueError("gait: the animation has no body track")
+    skeleton = Skeleton.default() if skeleton is None else skeleton
+    anatomy = Anatomy.of(skeleton)
+    return sole_points(anatomy, BapSolver(skeleton, axes).pose(animation.body.values))
+
+
+def sole_points(anatomy: Anatomy, matrices: Float) -> Soles:
+    """The feet in poses (T, J, 4, 4)."""
+    points = np.zeros((2, 3, len(matrices), 3))
+    for number, letter in enumerate("lr"):
+        side = anatomy.sides[letter]
+        for place, (joint, offset) in enumerate((
+            ("ankle", side.subtalar + side.heel),
+            ("metatarsal", side.tip * (0.0, 1.0, 0.0)),
+            ("metatarsal", side.tip),
+        )):  # fmt: skip
+            frame = matrices[:, anatomy.skeleton.number(f"{letter}_{joint}")]
+            points[number, place] = frame[:, :3, 3] + frame[:, :3, :3] @ offset
+    return Soles(points)
+
+
+def advance(animation: Animation, axes: str = "iso") -> float:
+    """Millimetres over the ground from the first frame's root to the last's, as the crow flies."""
+    if animation.body is None:
+        raise ValueError("gait: the animation has no body track")
+    columns = convention(axes).translation
+    gap = animation.body.values[-1, columns].astype(float) - animation.body.values[0, columns]
+    return float(np.hypot(gap[0], gap[2]))

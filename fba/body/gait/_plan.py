@@ -1,0 +1,278 @@
+"""One cycle of a character on a body: where root, pelvis and feet are at any phase.
+
+Phases are fractions of the cycle, from the contact of the right foot on. The body walks along +z.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from fba.body.gait import _ground as ground
+from fba.body.gait._anatomy import Anatomy, Side
+from fba.body.gait._characters import CYCLE, PHASES, Character
+from fba.body.gait._curves import Interpolation, cosine, periodic, smoothstep, spline
+from fba.body.gait._ground import TOE_OFF, Footing, Leg
+from fba.body.gait._rotations import Float, about, limb_angles
+from fba.errors import ModelError
+
+KNOTS = np.array([*PHASES, *(phase + 0.5 for phase in PHASES)])
+FLAT = 0.09
+"""Fraction of the cycle after which a foot that landed on its heel lies flat."""
+SHORTEST = 0.1
+"""Metres: the shortest stride."""
+_DOUBLE = TOE_OFF - 0.5
+"""Fraction of the cycle over which the height goes over from the leg behind to the one in front."""
+_STRAIGHT = 0.9985
+"""Share of its length that a leg keeps to: a knee is never locked."""
+_RISES = 0.33
+"""Fraction of the cycle at which a heel begins to rise."""
+_STRAIN = 0.03
+"""Share of the length of a leg by which legs that are too short may hold the body down."""
+_FREED = 4.0
+"""Metres of height a cycle at which a leg that has left the ground stops holding the body down."""
+_CLEAR = 0.012
+"""Metres that a swinging foot keeps off the ground."""
+_TINY = 1e-4
+"""A step of phase, for slopes."""
+
+
+class Plan:
+    """anatomy, character, and stride, metres; ModelError where the legs cannot take it."""
+
+    def __init__(
+        self,
+        anatomy: Anatomy,
+        character: Character,
+        stride: float,
+        interpolation: Interpolation = "smooth",
+    ) -> None:
+        self.anatomy, self.character, self.stride = anatomy, character, stride
+        self.interpolation: Interpolation = interpolation
+        self.size = stride / (character.stride * anatomy.scale)
+        """The stride against the character's own."""
+        share = np.clip(self.size, 0.0, 1.3)
+        foot = np.array(character.curve("foot"))
+        foot[0] *= share
+        foot[4:6] *= 0.3 + 0.7 * share
+        foot[6:] *= 0.6 + 0.4 * share
+        self._foot = np.radians(foot)
+        # between its contact and lying flat, a foot falls freely; the other poses lead to the contact
+        self._foot_knots = np.array([0.0, FLAT, *KNOTS[1:]])
+        self._foot_values = np.array([self._foot[0], min(self._foot[0], self._foot[1]), *self._foot[1:]])
+        knee = np.array(character.curve("knee"))
+        knee[5:7] *= 0.55 + 0.45 * share
+        self._knee = np.radians(knee)
+        self._yaw = np.radians(character.toes_out)
+        self._ahead = self._split()
+        if self._held_down() > _STRAIN * anatomy.sides["r"].leg.reach:
+            raise self._too_long()
+
+    def pitch(self, phase: Float) -> Float:
+        """Of a foot at a phase of its own leg."""
+        phase = np.mod(phase, 1.0)
+        flat = self._foot_values[1]
+        landing = flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / FLAT, 0.0) ** 1.5
+        later = periodic(self._foot_knots, self._foot_values, phase, self.interpolation)
+        return np.where(phase < FLAT, landing, later)
+
+    def knee(self, phase: Float) -> Float:
+        """Bend that the poses ask for, at a phase of the leg's own."""
+        return periodic(KNOTS, self._knee, phase, self.interpolation)
+
+    def toes(self, phase: Float) -> Float:
+        """Bend of the toes against the foot, up, radians: they lie flat until they leave the ground."""
+        phase = np.mod(phase, 1.0)
+        flat = np.maximum(-self.pitch(np.minimum(phase, TOE_OFF)), 0.0)
+        return np.where(phase < 0.9, flat * (1.0 - smoothstep((phase - TOE_OFF) / 0.15)), 0.0)
+
+    def lean(self, phase: Float) -> Float:
+        """(T, 3, 3) rotation of the root."""
+        return about(0, np.full(phase.shape, np.radians(self.character.pelvis.tilt)))
+
+    def pelvis_angles(self, phase: Float) -> tuple[Float, Float]:
+        """Torsion about y and roll about z of the pelvis, against the root."""
+        pelvis = self.character.pelvis
+        turn = np.radians(pelvis.turn) * np.clip(self.size, 0.0, 1.5)
+        ahead = cosine(KNOTS, phase, self.interpolation)
+        hangs = cosine(KNOTS, phase - 0.25, self.interpolation)
+        return turn * ahead, -np.radians(pelvis.list) * hangs
+
+    def pelvis(self, phase: Float) -> Float:
+        turn, roll = self.pelvis_angles(phase)
+        return about(1, turn) @ about(2, roll)
+
+    def side_phase(self, side: Side, phase: Float) -> Float:
+        return phase if side.letter == "r" else phase - 0.5
+
+    def place(self, side: Side, phase: Float) -> Float:
+        """(T, 3), footprint of the foot that stands, or stood last, at a phase of the cycle."""
+        own = self.side_phase(side, phase)
+        result = np.zeros((*phase.shape, 3))
+        result[..., 0] = side.way * self.character.width / 2.0 * self.anatomy.scale
+        result[..., 2] = self.stride * (np.floor(own + 1e-9) + (0.0 if side.letter == "r" else 0.5))
+        return result
+
+    def footing(self, side: Side, phase: Float) -> Footing:
+        """The foot as it stands; meaningless while it swings."""
+        own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
+        return ground.standing(side, self.place(side, phase), self.pitch(own), side.way * self._yaw)
+
+    def _along(self, phase: Float) -> Float:
+        """(T, 3), the root's place over the ground, its height still 0."""
+        pelvis, scale = self.character.pelvis, self.anatomy.scale
+        result = np.zeros((*phase.shape, 3))
+        result[..., 0] = -pelvis.sway * scale * np.sin(2.0 * np.pi * (phase - 0.02))
+        wave = np.sin(4.0 * np.pi * (phase - 0.05)) + np.sin(4.0 * np.pi * 0.05)
+        result[..., 2] = self.stride * (phase + pelvis.surge / (4.0 * np.pi) * wave)
+        return result
+
+    def hip(self, side: Side, root: Float, phase: Float) -> Float:
+        return ground.hip_place(side, self.anatomy.pelvis, root, self.lean(phase), self.pelvis(phase))
+
+    def _root_height(self, side: Side, root: Float, phase: Float, bend: Float | None = None) -> Float:
+        """Height of the root at which a standing leg has the bend its poses ask for (or the one given)."""
+        own = self.side_phase(side, phase)
+        hip = self.hip(side, root, phase)
+        ankle = ground.ankle_place(side, self.footing(side, phase))
+        bend = self.knee(own) if bend is None else bend
+        return ground.hip_height(side, hip, ankle, bend) - (hip[..., 1] - root[..., 1])
+
+    def _split(self) -> float:
+        """Metres that the front foot is ahead of the root in the extended pose.
+
+        Both feet are on the ground: what one leg's height is, the other's must be.
+        """
+        right, left = self.anatomy.sides["r"], self.anatomy.sides["l"]
+        at = np.zeros(1)
+        legs = right.leg.reach + left.leg.reach
+
+        def gap(ahead: float) -> float:
+            root = self._along(at) - (0.0, 0.0, ahead)
+            front = self._root_height(right, root, at)
+            rear = self._root_height(left, root, at)
+            return float((front - rear)[0])
+
+        low, high = -0.25 * legs, 0.5 * self.stride + 0.25 * legs
+        if not gap(low) > 0.0 > gap(high):
+            raise self._too_long()
+        for _ in range(60):
+            middle = (low + high) / 2.0
+            low, high = (middle, high) if gap(middle) > 0.0 else (low, middle)
+        root = self._along(at) - (0.0, 0.0, low)
+        root[..., 1] = self._root_height(right, root, at)
+        if float(root[0, 1]) < 0.45 * self.anatomy.skeleton.centres[0][1]:
+            raise self._too_long()
+        return low
+
+    def _too_long(self) -> ModelError:
+        return ModelError(
+            f"gait: a stride of {self.stride:g} m is too long for {self.character.name!r} on legs of "
+            f"{self.anatomy.sides['r'].leg.reach:.2f} m; a stride is two steps, from the contact of a foot "
+            f"to its next, and {self.character.stride * self.anatomy.scale:.2f} m of this character's own"
+        )
+
+    def root(self, phase: Float) -> Float:
+        """(T, 3), place of the root: as high as the standing leg is long, over the standing foot."""
+        root, wanted, limit = self._heights(phase)
+        root[..., 1] = np.minimum(wanted, limit)
+        return root
+
+    def _heights(self, phase: Float) -> tuple[Float, Float, Float]:
+        """The root over the ground (T, 3), the height that its poses give it, and the most its legs allow."""
+        root = self._along(phase) - (0.0, 0.0, self._ahead)
+        share = smoothstep(np.mod(phase, 0.5) / _DOUBLE)
+        right_leads = np.mod(phase, 1.0) < 0.5
+        heights, limits = {}, []
+        for letter, side in self.anatomy.sides.items():
+            heights[letter] = self._root_height(side, root, phase)
+            limit = self._root_height(side, root, phase, side.leg.bend(_STRAIGHT * side.leg.reach))
+            own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0)
+            freed = np.maximum(own - TOE_OFF, 0.0) * _FREED * self.anatomy.scale
+            limits.append(np.where(own < KNOTS[6], limit + freed, np.inf))
+        front = np.where(right_leads, heights["r"], heights["l"])
+        rear = np.where(right_leads, heights["l"], heights["r"])
+        return root, share * front + (1.0 - share) * rear, np.minimum(*limits)
+
+    def _held_down(self) -> float:
+        """Metres that the legs hold the body down at most, because they are too short for the stride."""
+        _, wanted, limit = self._heights(np.arange(2 * CYCLE) / (2 * CYCLE))
+        return float((wanted - limit).max())
+
+    def standing_leg(self, side: Side, phase: Float, root: Float | None = None) -> Leg:
+        """The leg while its foot is on the ground."""
+        root = self.root(phase) if root is None else root
+        footing = self.footing(side, phase)
+        yaw, roll = side.way * self._yaw, side.way * self._level_roll
+        return ground.reach(side, self.hip(side, root, phase), footing, yaw, roll)
+
+    @cached_property
+    def _level_roll(self) -> float:
+        """Of the left subtalar joint as the heel is about to rise."""
+        side, at = self.anatomy.sides["l"], np.array([0.5 + _RISES])
+        hip = self.hip(side, self.root(at), at)
+        leg = ground.reach(side, hip, self.footing(side, at), self._yaw)
+        return float(leg.ankle()[2][0])
+
+    @cached_property
+    def _swings(self) -> dict[str, tuple[Float, Float, Float, Float]]:
+        """For each side: knots, values and end slopes of thigh (x, z), in the world, and knee."""
+        return {letter: self._swing(side) for letter, side in self.anatomy.sides.items()}
+
+    def _swing(self, side: Side) -> tuple[Float, Float, Float, Float]:
+        start = 0.0 if side.letter == "r" else 0.5
+        ends = start + np.array([TOE_OFF - _TINY, TOE_OFF, 1.0, 1.0 + _TINY])
+        leg = self.standing_leg(side, ends)
+        x, _, z = limb_angles(leg.thigh)
+        solved = np.stack([x, z, leg.bend], axis=-1)
+        off, on = (solved[1] - solved[0]) / _TINY, (solved[3] - solved[2]) / _TINY
+        knots = np.array([TOE_OFF, KNOTS[6], KNOTS[7], 1.0])
+        poses = self.character.poses
+        landing = -np.degrees(solved[2][0])
+        own = landing if abs(self.size - 1.0) < 1e-9 else self._own_landing(side)
+        values = [solved[1]]
+        for number, (pose, follow) in enumerate((("passing", 0.6), ("anticipation", 1.0))):
+            thigh = poses[pose, "swing"].thigh + follow * (landing - own)
+            share = (knots[number + 1] - TOE_OFF) / (1.0 - TOE_OFF)
+            aside = solved[1][1] + share * (solved[2][1] - solved[1][1])
+            values.append(np.array([-np.radians(thigh), aside, self._knee[6 + number]]))
+        values.append(solved[2])
+        natural = 1.5 * (values[3] - values[2]) / (knots[3] - knots[2])
+        natural -= 0.5 * (values[3] - values[1]) / (knots[3] - knots[1])
+        return knots, np.stack(values), off, 0.5 * (natural + on)
+
+    def _own_landing(self, side: Side) -> float:
+        plan = Plan(
+            self.anatomy, self.character, self.character.stride * self.anatomy.scale, self.interpolation
+        )
+        start = np.array([0.0 if side.letter == "r" else 0.5])
+        return float(-np.degrees(limb_angles(plan.standing_leg(side, start).thigh)[0][0]))
+
+    def leg(self, side: Side, phase: Float, root: Float) -> Leg:
+        """The leg at any phase, standing or swinging, under a root that is where it is (T, 3)."""
+        own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
+        stands = own <= TOE_OFF
+        yaw = side.way * self._yaw
+        knots, values, off, on = self._swings[side.letter]
+        swing = np.clip(own, TOE_OFF, 1.0)
+        if self.interpolation == "linear":
+            x, z, bend = (np.interp(swing, knots, column) for column in values.T)
+        else:
+            x, z, bend = np.moveaxis(spline(knots, values, off, on, swing), -1, 0)
+        thigh = about(0, x) @ about(2, z) @ about(1, np.full(x.shape, yaw))
+        hip = self.hip(side, root, phase)
+        swinging = ground.hanging(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
+        rise = np.minimum((own - TOE_OFF) / 0.03, (1.0 - own) / 0.06)
+        room = _CLEAR * self.anatomy.scale * np.clip(rise, 0.0, 1.0)
+        lift = np.maximum(room - ground.lowest(side, swinging, self.toes(own)), 0.0)
+        swinging.subtalar[..., 1] += lift
+        standing = self.footing(side, phase)
+        footing = Footing(
+            np.where(stands[..., None, None], standing.turn, swinging.turn),
+            np.where(stands[..., None], standing.subtalar, swinging.subtalar),
+        )
+        return ground.reach(side, hip, footing, yaw, side.way * self._level_roll)
+
+
+__all__ = ["CYCLE", "KNOTS", "SHORTEST", "Plan"]

@@ -1,0 +1,148 @@
+"""A walk kept as its characteristic poses, and made whole again by interpolation.
+
+Digest faces-and-emotions.md, 2.5: "from all joint angles at each frame to four sets at symmetric times".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation, BodyTrack
+from fba.body.gait._curves import Interpolation
+from fba.body.gait._detection import Gait, detect
+from fba.body.skeleton import Skeleton
+from fba.body.solve.angle_wrap import wrapped
+from fba.body.solve.solver import BapSolver
+from fba.parameters import baps
+
+_STILL = 1e-6
+"""Change of a rotation's entries below which a joint stays as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """keys: an `Animation` of the poses alone, at their own times, and of the frames between them in which
+    nobody walks. frames: how many there were from the first key to the last. walking, poses: how many of them
+    belonged to steps, and how many keys stand for those.
+    """
+
+    keys: Animation
+    frames: int
+    walking: int
+    poses: int
+
+    @property
+    def factor(self) -> float:
+        """How many frames of walking a pose stands for."""
+        return self.walking / self.poses
+
+    def whole(self, interpolation: Interpolation = "smooth") -> Animation:
+        """Every frame from the first key to the last, evenly spaced.
+
+        interpolation: "linear", as in the digest, or "smooth": cubic curves that rise and fall only where the
+        keys do. ValueError on another.
+        """
+        index, values = self.keys.index, _unwound(_values(self.keys))
+        every = np.arange(int(index[0]), int(index[-1]) + 1)
+        if interpolation == "linear":
+            between = np.stack([np.interp(every, index, column) for column in values.T], axis=1)
+        elif interpolation == "smooth":
+            from scipy.interpolate import PchipInterpolator
+
+            between = PchipInterpolator(index - index[0], values)(every - index[0])
+        else:
+            raise ValueError(f"interpolation must be linear or smooth, not {interpolation!r}")
+        assert self.keys.body is not None
+        before = np.searchsorted(index, every, side="right") - 1
+        track = BodyTrack(wrapped(np.rint(between)), self.keys.body.mask[before])
+        return Animation(self.keys.rate, every, None, track, self.keys.name)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How far one motion is from another: degrees of each joint's own rotation; centimetres of its place in
+    the world, and against the root. worst_joint: whose rotation is furthest off."""
+
+    mean_degrees: float
+    worst_degrees: float
+    worst_joint: str
+    mean_cm: float
+    worst_cm: float
+    mean_cm_local: float
+    worst_cm_local: float
+
+
+def reduce(animation: Animation, found: Gait | None = None, skeleton: Skeleton | None = None) -> Reduced:
+    """Keep the poses that `detect` finds (or found). ValueError where there is no step."""
+    found = detect(animation, skeleton) if found is None else found
+    keys = found.keys
+    if not keys:
+        raise ValueError("gait: no steps to reduce this motion to")
+    span = np.zeros(len(animation), dtype=bool)
+    span[keys[0] : keys[-1] + 1] = True
+    kept = span & ~found.walking
+    kept[list(keys)] = True
+    places = np.flatnonzero(kept)
+    assert animation.body is not None
+    track = BodyTrack(animation.body.values[places], animation.body.mask[places])
+    thin = Animation(animation.rate, animation.index[places], None, track, animation.name)
+    return Reduced(thin, int(span.sum()), int((span & found.walking).sum()), len(keys))
+
+
+def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
+    """How far two bodies are apart in the frames that both have, over the joints that turn in `one`.
+
+    ValueError where rates differ, or no frame is in both.
+    """
+    if one.rate != other.rate:
+        raise ValueError(f"compare: frame rates differ: {one.rate} and {other.rate}")
+    skeleton = Skeleton.default() if skeleton is None else skeleton
+    _, first, second = np.intersect1d(one.index, other.index, return_indices=True)
+    if not len(first):
+        raise ValueError("compare: the two have no frame in common")
+    solver = BapSolver(skeleton)
+    a, b = solver.pose(_values(one)[first]), solver.pose(_values(other)[second])
+    places = a[:, :, :3, 3] - b[:, :, :3, 3]
+    inner = places - places[:, :1]
+    own = _own(a, skeleton)
+    moved = np.flatnonzero(np.ptp(own, axis=0).max(axis=(1, 2)) > _STILL)
+    if not len(moved):
+        moved = np.arange(len(skeleton))
+    angles = np.degrees(_angles(own, _own(b, skeleton)))[:, moved]
+    far, near = (100.0 * np.linalg.norm(p[:, moved], axis=-1) for p in (places, inner))
+    return Errors(
+        float(angles.mean()), float(angles.max()), skeleton.names[moved[int(angles.max(axis=0).argmax())]],
+        float(far.mean()), float(far.max()), float(near.mean()), float(near.max()),
+    )  # fmt: skip
+
+
+def _values(animation: Animation) -> npt.NDArray[np.int32]:
+    if animation.body is None:
+        raise ValueError("gait: the animation has no body track")
+    return animation.body.values
+
+
+def _unwound(values: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
+    """Angles that follow each other without a whole turn between."""
+    result = values.astype(np.float64)
+    angles = [bap.number - 1 for bap in baps() if bap.unit == "1e-5 rad"]
+    result[:, angles] = np.unwrap(result[:, angles], axis=0, period=2e5 * np.pi)
+    return result
+
+
+def _own(matrices: npt.NDArray[np.float64], skeleton: Skeleton) -> npt.NDArray[np.float64]:
+    """(T, J, 3, 3), each joint's rotation in its parent."""
+    turns = matrices[:, :, :3, :3]
+    result = turns.copy()
+    result[:, 1:] = np.swapaxes(turns[:, skeleton.parents[1:]], -1, -2) @ turns[:, 1:]
+    return result
+
+
+def _angles(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Radians between rotations; by the chord, which keeps its accuracy near 0."""
+    chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
+    result: npt.NDArray[np.float64] = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
+    return result

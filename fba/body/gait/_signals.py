@@ -1,0 +1,122 @@
+"""The curves of a motion in which steps show: feet ahead of the pelvis, knees, thighs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.body.gait._anatomy import Anatomy
+from fba.body.gait._measure import sole_points
+from fba.body.gait._rotations import Float
+
+STEP_SECONDS = (0.2, 1.8)
+"""Shortest and longest time from the contact of one foot to that of the other."""
+SHORTEST_SWING = 0.12
+"""Share of the leg's length by which a foot must come forward, against the pelvis, to have made a step."""
+SHORTEST_STEP = 0.08
+"""Share of the leg's length by which a foot must be ahead of the other as it comes to the ground."""
+SINKING, LEAVING = 0.06, 0.08
+"""Seconds after a foot's foremost place, and about its hindmost, in which its height says when it meets or
+leaves the ground."""
+TOUCH = 0.008
+"""Share of the leg's length that a foot on the ground may be above its lowest place."""
+SMOOTH = 0.02
+"""Seconds over which curves are smoothed before their extrema are looked for."""
+FACING = 0.2
+"""Seconds over which the direction is smoothed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """times: (T,). By side: heel and toes ahead of the pelvis (T,), metres; knee bent (T,), thigh raised
+    (T,), radians; heel in the world (T, 3), height of the foot's lowest point (T,).
+    heading: (T,), radians about y. reach: metres, of a leg."""
+
+    times: Float
+    heel: dict[str, Float]
+    toes: dict[str, Float]
+    knee: dict[str, Float]
+    thigh: dict[str, Float]
+    place: dict[str, Float]
+    lowest: dict[str, Float]
+    heading: Float
+    reach: float
+
+    @classmethod
+    def of(cls, anatomy: Anatomy, matrices: Float, times: Float) -> Curves:
+        number = anatomy.skeleton.number
+        rate = (len(times) - 1) / max(float(times[-1] - times[0]), 1e-9)
+        pelvis = matrices[:, number("sacroiliac")]
+        facing = _smoothed(pelvis[:, :3, 2], FACING * rate)
+        facing[:, 1] = 0.0
+        facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
+        points = sole_points(anatomy, matrices).points
+        heel, toes, knee, thigh, place, lowest = {}, {}, {}, {}, {}, {}
+        for row, letter in enumerate("lr"):
+            hip, knee_at, ankle = (
+                matrices[:, number(f"{letter}_{j}"), :3, 3] for j in ("hip", "knee", "ankle")
+            )
+
+            def ahead(point: Float) -> Float:
+                return _smoothed(np.sum((point - pelvis[:, :3, 3]) * facing, axis=1), SMOOTH * rate)
+
+            upper, lower = knee_at - hip, ankle - knee_at
+            cosine = np.sum(upper * lower, axis=1)
+            cosine /= np.linalg.norm(upper, axis=1) * np.linalg.norm(lower, axis=1)
+            heel[letter], toes[letter] = ahead(points[row, 0]), ahead(points[row, 1])
+            knee[letter] = _smoothed(np.arccos(np.clip(cosine, -1.0, 1.0)), SMOOTH * rate)
+            raised = np.arctan2(np.sum(upper * facing, axis=1), -upper[:, 1])
+            thigh[letter] = _smoothed(raised, SMOOTH * rate)
+            place[letter] = points[row, 0]
+            lowest[letter] = points[row, ..., 1].min(axis=0)
+        heading = np.unwrap(np.arctan2(facing[:, 0], facing[:, 2]))
+        return cls(times, heel, toes, knee, thigh, place, lowest, heading, anatomy.sides["l"].leg.reach)
+
+    def contacts(self, letter: str) -> list[int]:
+        """Frames in which the foot comes to the ground, ahead of the other."""
+        height, other = self.lowest[letter], self.heel["l" if letter == "r" else "r"]
+        found = []
+        for peak in self._peaks(self.heel[letter]):
+            if self.heel[letter][peak] - other[peak] < SHORTEST_STEP * self.reach:
+                continue
+            coming = height[peak : peak + self._frames(SINKING) + 1]
+            found.append(peak + int(np.argmax(coming <= coming.min() + TOUCH * self.reach)))
+        return found
+
+    def offs(self, letter: str) -> list[int]:
+        """Frames in which the foot is off the ground for the first time."""
+        height = self.lowest[letter]
+        found = []
+        for peak in self._peaks(-self.toes[letter]):
+            near = self._frames(LEAVING)
+            first = max(0, peak - near)
+            low = height[max(0, first - near) : peak + 1].min()
+            down = np.flatnonzero(height[first : peak + near // 2 + 1] <= low + TOUCH * self.reach)
+            found.append(first + int(down[-1]) + 1 if len(down) else peak)
+        return found
+
+    def _frames(self, seconds: float) -> int:
+        """At least one."""
+        return max(1, round(seconds / max(float(np.median(np.diff(self.times))), 1e-9)))
+
+    def _peaks(self, curve: Float) -> list[int]:
+        """Maxima that stand out; also of a curve that begins or ends at one, as loops do."""
+        from scipy.signal import find_peaks
+
+        edge = [float(curve.min()) - 1.0]
+        padded = np.concatenate([edge, curve, edge])
+        found, _ = find_peaks(
+            padded, prominence=SHORTEST_SWING * self.reach, distance=self._frames(STEP_SECONDS[0])
+        )
+        return [int(frame) - 1 for frame in found]
+
+
+def _smoothed(curve: Float, width: float) -> Float:
+    """A Gaussian of that many frames; the ends go on as they are."""
+    if width < 0.3:
+        return curve.copy()
+    from scipy.ndimage import gaussian_filter1d
+
+    result: Float = gaussian_filter1d(curve, width, axis=0, mode="nearest")
+    return result

@@ -1,0 +1,151 @@
+"""Walking, made of four poses: `walk`."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation, BodyTrack
+from fba.body.gait import _arms as arms
+from fba.body.gait import _ground as ground
+from fba.body.gait import _posture as posture
+from fba.body.gait._anatomy import Anatomy, Writer
+from fba.body.gait._characters import Character
+from fba.body.gait._curves import Interpolation, checked
+from fba.body.gait._plan import SHORTEST, Plan
+from fba.body.gait._rotations import Float
+from fba.body.skeleton import Skeleton
+from fba.errors import ModelError
+
+FEWEST = 8
+"""Frames of a cycle: one for each pose of it."""
+MOST = 100_000
+"""Frames that are made at once: an hour and more."""
+
+
+def walk(
+    stride: float | None = None,
+    character: str | Character = "normal",
+    *,
+    cycles: float | None = None,
+    seconds: float | None = None,
+    rate: Fraction | int | str = 30,
+    interpolation: Interpolation = "smooth",
+    in_place: bool = False,
+    skeleton: Skeleton | None = None,
+) -> Animation:
+    """Someone walks along +z, from the contact of the right foot on: BAPs of legs, arms, spine and root.
+
+    stride: metres from one contact of a foot to its next, two steps; the character's own, at the size of
+        the skeleton, where None. As the time of a cycle is the character's, it sets the speed. Rounded to mm.
+    character: a name of `characters()`, or a `Character`.
+    cycles: how many (4 where neither is given); the last frame is the first pose again, one stride on.
+        seconds: in place of cycles, how long, without that last frame.
+    rate: frames a second; a cycle has a whole number of frames, 32 of the normal character at 30.
+    interpolation: between the poses "smooth", by cubic curves, or "linear", as in the digest.
+    in_place: leave out the way forward: the ground moves back instead.
+    skeleton: the default body where None.
+
+    ModelError where a stride is too long for the legs, or a character or a skeleton cannot walk;
+    ValueError for other arguments that make no sense.
+    """
+    if not isinstance(character, Character):
+        character = Character.named(character)
+    anatomy = Anatomy.of(Skeleton.default() if skeleton is None else skeleton)
+    stride = _stride(stride, character, anatomy)
+    rate = Fraction(rate)
+    if rate <= 0:
+        raise ValueError(f"walk: the frame rate must be positive, not {rate}")
+    period = round(float(character.seconds * rate)) if rate < MOST else 0
+    if not FEWEST <= period <= MOST:
+        raise ValueError(
+            f"walk: {rate} frames/s make {float(character.seconds * rate):.4g} frames of a cycle of "
+            f"{character.seconds:g} s; needs at least {FEWEST}, and a plausible rate"
+        )
+    count = _count(cycles, seconds, rate, period)
+    one = cycle(Plan(anatomy, character, stride, checked(interpolation)), period)
+    frames = np.arange(count)
+    values = one.values[frames % period]
+    forward = one.forward_column
+    if not in_place:
+        values[:, forward] += frames // period * round(1000.0 * stride)
+    else:
+        share = np.arange(period) / period * 1000.0 * stride
+        values[:, forward] -= np.rint(share[frames % period])
+    integers = np.rint(values).astype(np.int32)
+    mask = np.broadcast_to(one.sent, integers.shape)
+    name = f"{character.name} walk"
+    return Animation(rate, frames, None, BodyTrack(integers, mask), name)
+
+
+def cycle(plan: Plan, period: int) -> Writer:
+    """One cycle of `period` frames, as BAPs."""
+    anatomy, character = plan.anatomy, plan.character
+    phase = np.arange(period) / period
+    writer = Writer(period)
+    posture.hold(writer, anatomy.skeleton, plan, phase)
+    writer.turn("HumanoidRoot", 0, np.full(period, np.radians(character.pelvis.tilt)))
+    turn, roll = plan.pelvis_angles(phase)
+    writer.turn("sacroiliac", 1, turn)
+    writer.turn("sacroiliac", 2, roll)
+    arms.swing(writer, plan, phase)
+    rest = anatomy.skeleton.centres[0]
+    root = plan.root(phase) - rest
+    start = root[0, 2]
+    root[:, 2] -= start  # the walk begins where the body stands by default
+    writer.move(root)
+    # BAPs are whole millimetres: the legs start from where the root will be, so feet do not slip. Not in
+    # height: half a millimetre there would bend a nearly straight knee by degrees, up and down.
+    root[:, [0, 2]] = np.rint(root[:, [0, 2]] * 1e3) / 1e3
+    pelvis = plan.lean(phase) @ plan.pelvis(phase)
+    for side in anatomy.sides.values():
+        leg = plan.leg(side, phase, root + rest + (0.0, 0.0, start))
+        _write_leg(writer, side.letter, pelvis, leg)
+        own = plan.side_phase(side, phase)
+        writer.turn(f"{side.letter}_metatarsal", 0, -plan.toes(own))
+    return writer
+
+
+def _write_leg(writer: Writer, letter: str, pelvis: Float, leg: ground.Leg) -> None:
+    for axis, angle in enumerate(ground.hip_angles(pelvis, leg.thigh)):
+        writer.turn(f"{letter}_hip", axis, angle)
+    writer.turn(f"{letter}_knee", 0, leg.bend)
+    x, y, z = leg.ankle()
+    writer.turn(f"{letter}_ankle", 0, x)
+    writer.turn(f"{letter}_ankle", 1, y)
+    writer.turn(f"{letter}_subtalar", 2, z)
+
+
+def _stride(stride: float | None, character: Character, anatomy: Anatomy) -> float:
+    if stride is None:
+        return round(character.stride * anatomy.scale, 3)
+    try:
+        metres = float(stride)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"walk: the stride must be a number of metres, not {stride!r}") from error
+    if not (np.isfinite(metres) and metres >= SHORTEST * anatomy.scale):
+        raise ModelError(
+            f"gait: the stride must be at least {SHORTEST * anatomy.scale:.2g} m, not {stride!r}; it is the "
+            "way from one contact of a foot to its next, two steps: 1.4 m in an even walk"
+        )
+    if metres > 4.0 * anatomy.sides["r"].leg.reach:
+        raise ModelError(
+            f"gait: a stride of {metres:g} m is too long on legs of {anatomy.sides['r'].leg.reach:.2f} m; it "
+            "is given in metres, and 1.4 m in an even walk"
+        )
+    return round(metres, 3)
+
+
+def _count(cycles: float | None, seconds: float | None, rate: Fraction, period: int) -> int:
+    """How many frames."""
+    if cycles is not None and seconds is not None:
+        raise ValueError("walk: give either cycles or seconds, not both")
+    wanted = seconds if seconds is not None else 4 if cycles is None else cycles
+    what = "seconds" if seconds is not None else "cycles"
+    if not (np.isfinite(wanted) and wanted > 0):
+        raise ValueError(f"walk: {what} must be a positive number, not {wanted!r}")
+    frames = float(wanted) * float(rate) if seconds is not None else float(wanted) * period + 1
+    if frames > MOST:
+        raise ValueError(f"walk: {wanted:g} {what} would be {frames:.3g} frames (at most {MOST})")
+    return max(1, round(frames))

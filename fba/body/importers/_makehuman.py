@@ -1,0 +1,274 @@
+"""MakeHuman's base mesh with its default rig, as a body that BAPs move.
+
+Users point it at a copy of their own (the files are CC0): the base mesh "hm08" (`base.obj`), its rig
+(`default.mhskel`) and the weights (`default_weights.mhw`) in one folder. `makehuman.csv` says which places
+and bones of the rig each joint of the standard takes; the vertebrae are spread along its spine.
+`makehuman_neck.csv` is the ring of vertices where its heads end.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body.importers._obj_mesh import ObjMesh, read_obj_mesh, read_text
+from fba.body.model import BodyModel, BodyPart, Material
+from fba.body.skeleton import Skeleton
+from fba.body.skin.skin_weights import strongest
+from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
+from fba.errors import ModelError
+from fba.gltf.document import MAX_ITEMS, parse_json
+from fba.gltf.values import Value
+from fba.mesh.meshes import vertex_normals
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+METRES = 0.1
+"""Metres per unit of the base mesh."""
+VERTICES = 19158
+"""How many vertices the base mesh hm08 has."""
+SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01", "neck01", "neck02", "neck03", "head")
+"""Bones of the spine, upwards."""
+NECK = ("neck01", "neck02", "neck03")
+TRUNK = (
+    "root",
+    "pelvis.L",
+    "pelvis.R",
+    "spine01",
+    "spine02",
+    "spine03",
+    "spine04",
+    "spine05",
+    "breast.L",
+    "breast.R",
+)
+HEAD = "head"
+BLADE = (0.3, 0.75)
+"""Shares of the way from the breastbone to the arm over which the shoulder blade takes over."""
+WHOLE = 0.999
+"""What the skull carries by more is head."""
+SKIN = Material("skin", (0.71, 0.47, 0.36), 0.55)
+EYE = Material("eye", (0.75, 0.72, 0.70), 0.2)
+MAX_WEIGHTS = 1 << 20
+
+
+def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> BodyModel:
+    """The body of MakeHuman's base mesh on the standard's joints.
+
+    path: the folder with base.obj, default.mhskel and default_weights.mhw, or that base.obj. Its own head is
+    a part of kind "head", left out where a face is put on the body. Raises FormatError where a file is
+    missing, ModelError, which names the place in it, where it is damaged or another mesh or rig.
+    """
+    folder = Path(path) if Path(path).is_dir() else Path(path).parent
+    mesh = read_obj_mesh(folder / "base.obj" if Path(path).is_dir() else path)
+    if len(mesh.vertices) != VERTICES or "body" not in mesh.groups or not len(mesh.of("body")):
+        raise ModelError(
+            f"{folder}: this is not MakeHuman's base mesh hm08: {len(mesh.vertices)} vertices instead of "
+            f"{VERTICES}"
+        )
+    low = mesh.vertices[mesh.of("body")].reshape(-1, 3)[:, 1].min()
+    vertices = (mesh.vertices - (0.0, low, 0.0)) * METRES
+    rig = _json(folder / "default.mhskel")
+    bones, at = _rig(rig, vertices)
+    places = _places(at, rig)
+    bind = bind_matrices(places)
+    weights = _weights(_json(folder / "default_weights.mhw"), bones, vertices, places)
+    pupils = np.array([at(rig, f"eye.{side}____head") for side in "LR"])
+    pupils[:, 2] += _eye_radius(mesh, vertices)
+    return BodyModel(
+        parts=_parts(mesh, vertices, weights),
+        skeleton=unposed(bind),
+        bind=bind,
+        eyes=pupils,
+        name=name,
+        notes={
+            "source": "MakeHuman base mesh hm08 with its default rig",
+            "licence": "CC0, as stated in the files",
+        },
+    )
+
+
+class _At:
+    """Places of a rig's joints: each the middle of some vertices."""
+
+    def __init__(self, listed: Mapping[str, Value], vertices: Float64) -> None:
+        self._listed = listed
+        self._vertices = vertices
+
+    def __call__(self, rig: Value, name: str) -> Float64:
+        if name not in self._listed:
+            raise rig.error(f"there is no joint {name!r}; is it MakeHuman's default rig?")
+        entry = self._listed[name]
+        rows = [value.index(len(self._vertices), "vertex") for value in entry.elements(1000)]
+        if not rows:
+            raise entry.error("a joint needs at least one vertex")
+        middle: Float64 = self._vertices[rows].mean(axis=0)
+        return middle
+
+
+def _json(path: Path) -> Value:
+    text = read_text(path)
+    return Value(parse_json(memoryview(text.encode()), path.name), path.name)
+
+
+def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _At]:
+    """Each bone's parent, and the places of the joints."""
+    bones: dict[str, str | None] = {}
+    for name, entry in rig.member("bones").members():
+        parent = entry.get("parent")
+        bones[name] = None if parent is None or parent.data is None else parent.text(200)
+        if len(bones) > MAX_ITEMS:
+            raise rig.error("more bones than are read")
+    return bones, _At(dict(rig.member("joints").members()), vertices)
+
+
+@cache
+def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
+    """joint, from, to, share, bones; both sides."""
+    found = []
+    with (files(__package__) / "makehuman.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            for mine, theirs in (("l", "L"), ("r", "R")) if "?" in row["joint"] else (("", ""),):
+                words = [row[key].replace("?", theirs) for key in ("from", "to", "bones")]
+                joint = row["joint"].replace("?", mine)
+                found.append((joint, words[0], words[1], float(row["share"]), tuple(words[2].split())))
+    return tuple(found)
+
+
+def _places(at: _At, rig: Value) -> Float64:
+    """(J, 3) where the standard's joints are, metres."""
+    default = Skeleton.default()
+    places = np.full((len(default), 3), np.nan)
+    for joint, start, end, share, _ in _rows():
+        first = at(rig, start)
+        places[default.number(joint)] = first + ((at(rig, end) - first) * share if end else 0.0)
+    for side in "lr":  # the foot's joints lie lower than the line between ankle and toes
+        ankle = places[default.number(f"{side}_ankle")]
+        places[default.number(f"{side}_subtalar"), 1] = ankle[1] * 0.55
+    knots = np.array([at(rig, f"{bone}____head") for bone in SPINE])
+    knots = np.concatenate([places[default.number("HumanoidRoot")][None], knots])
+    knots = knots[np.concatenate([[True], np.diff(np.maximum.accumulate(knots[:, 1])) > 0])]
+    places[default.number("skullbase")] = knots[-1]
+    neck = int(np.abs(knots[:, 1] - at(rig, "neck01____head")[1]).argmin())
+    vertebrae(places, knots, neck)
+    return places
+
+
+def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, places: Float64) -> Float64:
+    """(V, J) how far each of the standard's joints carries each vertex."""
+    default = Skeleton.default()
+    given = {name: np.zeros(len(vertices)) for name in bones}
+    for bone, listed in content.member("weights").members():
+        if bone not in given:
+            raise listed.error(f"the rig has no bone {bone!r}")
+        for entry in listed.elements(MAX_WEIGHTS):
+            pair = entry.elements(2)
+            if len(pair) != 2:
+                raise entry.error("expected a vertex and its weight")
+            given[bone][pair[0].index(len(vertices), "vertex")] += pair[1].number(0.0, 1e6)
+    weights = np.zeros((len(vertices), len(default)))
+    taken = set(TRUNK) | set(NECK)
+    for joint, _, _, _, names in _rows():
+        for bone in names:
+            if bone not in given:
+                raise content.error(f"the rig has no bone {bone!r}; is it MakeHuman's default rig?")
+            weights[:, default.number(joint)] += given[bone]
+            taken.add(bone)
+    for names, row in (
+        (TRUNK, ("sacroiliac", *chain("vl5", "vc7"))),
+        (NECK, (*chain("vt1", "vc1"), "skullbase")),
+    ):
+        numbers = [default.number(name) for name in row]
+        share = np.sum([given[name] for name in names if name in given], axis=0)
+        weights[:, numbers] += share[:, None] * shares(
+            vertices[:, 1], places[numbers, 1], 1 if names is TRUNK else 0
+        )
+    for side in "lr":  # the shoulder girdle: what is near the arm goes with the blade
+        inner, outer, arm = (
+            default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular", "shoulder")
+        )
+        way = places[arm] - places[inner]
+        along = (vertices - places[inner]) @ way / max(float(way @ way), 1e-12)
+        far = np.clip((along - BLADE[0]) / (BLADE[1] - BLADE[0]), 0.0, 1.0)
+        weights[:, outer] += weights[:, inner] * far * far * (3 - 2 * far)
+        weights[:, inner] -= weights[:, outer]
+    skull = default.number("skullbase")
+    for bone in bones:
+        if bone not in taken:  # the head, and all that hangs on it
+            weights[:, skull] += given[bone]
+    total = weights.sum(axis=1, keepdims=True)
+    weights[total[:, 0] <= 0, skull] = 1.0
+    whole: Float64 = weights / weights.sum(axis=1, keepdims=True)
+    return whole
+
+
+def _eye_radius(mesh: ObjMesh, vertices: Float64) -> float:
+    eye = vertices[np.unique(mesh.of("helper-l-eye"))]
+    return float(np.ptp(eye[:, 2])) / 2 if len(eye) else 0.0
+
+
+@cache
+def _neckline() -> tuple[int, ...]:
+    with (files(__package__) / "makehuman_neck.csv").open(encoding="utf-8") as file:
+        return tuple(int(row["vertex"]) for row in csv.DictReader(file))
+
+
+def _above(triangles: Int64, vertices: Float64) -> npt.NDArray[np.bool_]:
+    """(F,) triangles above the neckline, where heads made of this mesh end too, so that both meet."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    sides = sides[~np.isin(sides, _neckline()).any(axis=1)]
+    links = (np.ones(len(sides)), (sides[:, 0], sides[:, 1]))
+    _, label = connected_components(coo_array(links, shape=(len(vertices),) * 2), directed=False)
+    used = np.unique(triangles)
+    crown = used[vertices[used, 1].argmax()]
+    above: npt.NDArray[np.bool_] = (label[triangles] == label[crown]).any(axis=1)
+    return above
+
+
+def _parts(mesh: ObjMesh, vertices: Float64, weights: Float64) -> tuple[BodyPart, ...]:
+    """Body, neck and head, and the eyes of that."""
+    default = Skeleton.default()
+    skull = weights[:, default.number("skullbase")]
+    body = mesh.of("body")
+    above = _above(body, vertices)
+    head = above & (skull[body] > WHOLE).all(axis=1)
+    throat = above & ~head
+    spine = [name[0] == "v" or name == "sacroiliac" for name in default.names]
+    joints, strong = strongest(weights, spine)
+    normals = vertex_normals(vertices, body)
+    eyes = mesh.of("helper-l-eye", "helper-r-eye")
+    chosen = (
+        ("skin", "skin", body[~head & ~throat], normals, SKIN),
+        ("neck", "neck", body[throat], normals, SKIN),
+        ("head", "head", body[head], normals, SKIN),
+        ("eyes", "head", eyes, vertex_normals(vertices, eyes) if len(eyes) else normals, EYE),
+    )
+    found = []
+    for name, kind, triangles, upright, material in chosen:
+        if not len(triangles):
+            continue
+        used, corners = np.unique(triangles, return_inverse=True)
+        found.append(
+            BodyPart(
+                name,
+                kind,
+                vertices[used].astype(np.float32),
+                corners.reshape(-1, 3).astype(np.int32),
+                joints[used],
+                strong[used],
+                normals=upright[used],
+                material=material,
+            )
+        )
+    return tuple(found)

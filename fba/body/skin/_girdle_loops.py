@@ -1,0 +1,112 @@
+"""The loops of `fba.body.skin._girdle`. Compiled; plain functions over NumPy arrays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import compiled, inlined
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+Int64 = npt.NDArray[np.int64]
+
+
+class Girdle(NamedTuple):
+    """The shoulder girdles that turn with the arms, and armpits: see `fba.body.skin._girdle`."""
+
+    joints: Int64
+    centre: Float64
+    arm: Float64
+    rows: Int64
+    shares: Float32
+
+
+LIFT = 0.16
+"""The share of an arm's swing that its shoulder blade takes part in; of this, the collar bone half."""
+
+
+@compiled
+def lift(duals: Float32, girdle: Girdle) -> None:
+    """Shoulder girdles turned with their arms: see `fba.body.skin._girdle`."""
+    for side in range(len(girdle.joints)):
+        trunk, inner, outer, shoulder = girdle.joints[side]
+        arm, centre = girdle.arm[side], girdle.centre[side]
+        w, x, y, z = _relative(duals, trunk, shoulder)
+        # Where the arm points now, seen from the trunk, and the shortest way there from where it was.
+        ux, uy, uz = y * arm[2] - z * arm[1], z * arm[0] - x * arm[2], x * arm[1] - y * arm[0]
+        dx = arm[0] + 2.0 * (w * ux + y * uz - z * uy)
+        dy = arm[1] + 2.0 * (w * uy + z * ux - x * uz)
+        dz = arm[2] + 2.0 * (w * uz + x * uy - y * ux)
+        cx, cy, cz = arm[1] * dz - arm[2] * dy, arm[2] * dx - arm[0] * dz, arm[0] * dy - arm[1] * dx
+        sine = np.sqrt(cx * cx + cy * cy + cz * cz)
+        cosine = arm[0] * dx + arm[1] * dy + arm[2] * dz
+        if sine < 1e-6:
+            continue
+        cx, cy, cz = cx / sine, cy / sine, cz / sine
+        fade = min(max((cosine + 1.0) / 0.15, 0.0), 1.0)  # straight backwards there is no one way
+        wanted = LIFT * np.arctan2(sine, cosine) * fade * fade * (3.0 - 2.0 * fade)
+        a, b, c, d = _relative(duals, trunk, outer)
+        along = b * cx + c * cy + d * cz
+        done = 2.0 * np.arctan2(along if a >= 0.0 else -along, abs(a))
+        angle = wanted - min(max(done, 0.0), wanted)
+        _turn(duals, outer, angle, cx, cy, cz, centre)
+        _turn(duals, inner, 0.5 * angle, cx, cy, cz, centre)
+
+
+@inlined
+def _relative(duals: Float32, one: int, other: int) -> tuple[float, float, float, float]:
+    """The rotation of one joint seen from another: the quaternion w, x, y, z."""
+    w, x, y, z = duals[one, 0], duals[one, 1], duals[one, 2], duals[one, 3]
+    a, b, c, d = duals[other, 0], duals[other, 1], duals[other, 2], duals[other, 3]
+    return (
+        w * a + x * b + y * c + z * d,
+        w * b - x * a - y * d + z * c,
+        w * c + x * d - y * a - z * b,
+        w * d - x * c + y * b - z * a,
+    )
+
+
+@inlined
+def _turn(duals: Float32, joint: int, angle: float, cx: float, cy: float, cz: float, centre: Float64) -> None:
+    """A joint first turned about a unit axis through a place."""
+    s, g = np.sin(0.5 * angle), np.cos(0.5 * angle)
+    h, i, j = s * cx, s * cy, s * cz
+    # The turn's dual part: a place p is kept by e = p x (h, i, j).
+    px, py, pz = centre[0], centre[1], centre[2]
+    e, f, k = py * j - pz * i, pz * h - px * j, px * i - py * h
+    w, x, y, z = duals[joint, 0], duals[joint, 1], duals[joint, 2], duals[joint, 3]
+    a, b, c, d = duals[joint, 4], duals[joint, 5], duals[joint, 6], duals[joint, 7]
+    duals[joint, 0] = w * g - x * h - y * i - z * j
+    duals[joint, 1] = w * h + x * g + y * j - z * i
+    duals[joint, 2] = w * i + y * g + z * h - x * j
+    duals[joint, 3] = w * j + z * g + x * i - y * h
+    duals[joint, 4] = a * g - b * h - c * i - d * j - x * e - y * f - z * k
+    duals[joint, 5] = a * h + b * g + c * j - d * i + w * e + y * k - z * f
+    duals[joint, 6] = a * i + c * g + d * h - b * j + w * f + z * e - x * k
+    duals[joint, 7] = a * j + d * g + b * i - c * h + w * k + x * f - y * e
+
+
+@compiled
+def straighten(
+    vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
+    girdle: Girdle, out: Float32,
+) -> None:  # fmt: skip
+    """Some vertices drawn towards where matrices would have them: see `fba.body.skin._girdle`."""
+    for n in range(len(girdle.rows)):
+        i, straight = girdle.rows[n], girdle.shares[n]
+        px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        kept, two = np.float32(1.0) - straight, np.float32(2.0)
+        for axis in range(3):
+            out[i, axis] *= kept
+        for k in range(counts[i]):
+            j, share = joints[i, k], straight * weights[i, k]
+            w, x, y, z = duals[j, 0], duals[j, 1], duals[j, 2], duals[j, 3]
+            a, b, c, d = duals[j, 4], duals[j, 5], duals[j, 6], duals[j, 7]
+            ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
+            out[i, 0] += share * (px + two * (y * uz - z * uy + w * b - x * a + y * d - z * c))
+            out[i, 1] += share * (py + two * (z * ux - x * uz + w * c - y * a + z * b - x * d))
+            out[i, 2] += share * (pz + two * (x * uy - y * ux + w * d - z * a + x * c - y * b))

@@ -1,0 +1,183 @@
+"""How close body animation parameters come to the captured motion that they were made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation
+from fba.body import BapSolver
+from fba.capture import _rest_alignment as rest_alignment
+from fba.capture import matching
+from fba.capture.limbs import ground, soles
+from fba.capture.motion import SkeletonMotion
+from fba.errors import ModelError
+
+Float = npt.NDArray[np.float64]
+
+CHUNK = 2048
+"""Frames posed at a time."""
+CLOSE = 0.01
+"""Metres above the source's ground within which a foot stands on it; also how well feet are to match."""
+
+
+@dataclass(frozen=True)
+class BoneError:
+    """The angle between a bone of the source and the body's, in degrees over all frames.
+
+    joint, aim: joints of the standard at its ends. source: name of the source's joint. frame: of the worst.
+    """
+
+    joint: str
+    aim: str
+    source: str
+    mean: float
+    worst: float
+    frame: int
+
+
+@dataclass(frozen=True)
+class FeetError:
+    """Heights of soles above the ground, in metres, where the source's foot is on its ground.
+
+    ground: the source's own. frames: feet on the ground, both counted. mean and worst: of the magnitude of
+    the difference between the source, scaled, and the body. within: share that differs by 1 cm or less.
+    """
+
+    ground: float
+    frames: int
+    mean: float
+    worst: float
+    within: float
+
+
+@dataclass(frozen=True)
+class RetargetReport:
+    """What became of a captured skeleton.
+
+    family: of joint names, empty where they were given. bones: in the body's order. feet: None where the
+    source has no ankles, or feet that are never on the ground. unused: joints of the source that move no
+    joint of the body. missing: joints that BAPs could turn, but the source has not.
+    """
+
+    family: str
+    frames: int
+    bones: tuple[BoneError, ...]
+    soles: FeetError | None
+    unused: tuple[str, ...]
+    missing: tuple[str, ...]
+
+    @property
+    def mean(self) -> float:
+        """Mean angle over all bones and frames, degrees; 0 without bones."""
+        return float(np.mean([bone.mean for bone in self.bones])) if self.bones else 0.0
+
+    @property
+    def worst(self) -> float:
+        """Largest angle of any bone in any frame, degrees; 0 without bones."""
+        return max((bone.worst for bone in self.bones), default=0.0)
+
+
+def retarget_report(
+    motion: SkeletonMotion,
+    animation: Animation,
+    *,
+    joints: Mapping[str, str] | None = None,
+    scale: float | None = None,
+    solver: BapSolver | None = None,
+) -> RetargetReport:
+    """Compares an animation, say what came out of a stream, with the motion it was made from.
+
+    joints, scale, solver: as they were given to `from_skeleton`. Where frame rates differ, the motion is
+    resampled; frames that only one of both has are left out. ModelError where the animation has no body, no
+    frame in common, or no family of names fits.
+    """
+    solver = solver if solver is not None else BapSolver()
+    skeleton = solver.skeleton
+    if joints is None:
+        family, mapped = matching.match(motion.names)
+    else:
+        family, mapped = "", {ours: motion.names.index(theirs) for theirs, ours in joints.items()}
+    mapped = {joint: number for joint, number in mapped.items() if joint in skeleton}
+    if animation.body is None:
+        raise ModelError("retarget_report: the animation has no body")
+    motion = motion.resample(animation.rate)
+    count = min(len(motion), len(animation))
+    if not count:
+        raise ModelError("retarget_report: the motion and the animation have no frame in common")
+
+    alignment = rest_alignment.align(motion, mapped, skeleton)
+    turned, places = motion.world()
+    places = places @ alignment.upright.T
+    order = {name: number for number, name in enumerate(skeleton.names)}
+    aims = sorted(alignment.aims.items(), key=lambda pair: order[pair[0]])
+    angles = np.zeros((count, len(aims)))
+    heights = np.zeros((2, count))
+    has_feet = True
+    toes = "l_metatarsal" in mapped
+    for begin in range(0, count, CHUNK):
+        end = min(begin + CHUNK, count)
+        matrices = solver.pose(animation.body.values[begin:end])
+        for column, (joint, aim) in enumerate(aims):
+            ours = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
+            theirs = places[begin:end, mapped[aim]] - places[begin:end, mapped[joint]]
+            angles[begin:end, column] = _between(ours, theirs)
+        frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
+        own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3], toes)
+        has_feet = own is not None
+        if own is not None:
+            heights[:, begin:end] = own.lowest
+    bones = tuple(
+        BoneError(
+            joint,
+            aim,
+            motion.names[mapped[joint]],
+            float(angles[:, column].mean()),
+            float(angles[:, column].max()),
+            int(angles[:, column].argmax()),
+        )
+        for column, (joint, aim) in enumerate(aims)
+    )
+    metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
+    standing = None
+    if has_feet and metres:
+        source = soles.source_soles(motion, mapped, alignment.upright, turned, places, metres)
+        standing = _feet(source, heights) if source is not None else None
+    used = set(mapped.values())
+    return RetargetReport(
+        family,
+        count,
+        bones,
+        standing,
+        tuple(name for number, name in enumerate(motion.names) if number not in used),
+        tuple(joint for joint in solver.convention.joints if joint in skeleton and joint not in mapped),
+    )
+
+
+def _between(a: Float, b: Float) -> Float:
+    """Degrees (T,) between vectors (T, 3)."""
+    sine = np.linalg.norm(np.cross(a, b), axis=1)
+    result: Float = np.degrees(np.arctan2(sine, np.sum(a * b, axis=1)))
+    return result
+
+
+def _feet(source: soles.Soles, body: Float) -> FeetError | None:
+    middles = source.points.mean(axis=1)
+    level = ground.found(source.lowest, middles).under(middles)[:, : body.shape[1]]
+    above = source.lowest[:, : body.shape[1]] - level
+    on = above < CLOSE
+    if not on.any():
+        return None
+    # the body's ground is height 0, or where the source's is: whichever its feet say
+    errors = [np.abs(body - floor - above)[on] for floor in (np.zeros_like(level), level)]
+    error = min(errors, key=lambda e: float(np.median(e)))
+    return FeetError(
+        float(np.median(level[on])),
+        int(on.sum()),
+        float(error.mean()),
+        float(error.max()),
+        float((error <= CLOSE).mean()),
+    )

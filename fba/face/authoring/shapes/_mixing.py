@@ -1,0 +1,266 @@
+"""Shapes mixed for one FAP: solved at the feature points, put right there, kept from folding."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.authoring.shapes._shapes import Shapes
+from fba.face.authoring.surface.fold_limits import Limiter
+from fba.face.authoring.surface.motion import Motion, by_part, limits, tables
+from fba.face.authoring.surface.motion_limits import EASE, MODERATE, straight
+from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.unfold import eased_field
+from fba.face.feature_points import row_of
+from fba.face.model import FaceModel
+from fba.face.points import DIRECTIONS
+from fba.face.tables import FaceDefTables
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+
+OWN, ELSEWHERE, ACROSS = 3.0, 1.0, 0.5
+"""Weights of the points that are to move, of the other points, and of directions across the way."""
+RIDGE = 0.05
+"""Holds weights small: a shape at weight 1 costs as much as a twentieth of the way at another point."""
+MOST_WEIGHT = 1.25
+"""A shape is used up to this weight for a typical value of the FAP."""
+LEAST_SHARE, LEAST_OF_ONE = 0.5, 0.25
+"""Shapes that bring the points of a group less than this share of the way, or one of them less than the
+second, do not serve it."""
+FULL_WEIGHT = 0.15
+"""From this weight of the mesh's own tables on, shapes show in full; they fade out below."""
+GROUPS = (
+    (31, 33, 35), (32, 34, 36), (37,), (38,), (39,), (40,), (41,), (42,),
+    (51, 55, 56), (52, 57, 58), (53,), (54,), (59,), (60,), (61,), (62,), (63,), (64,),
+)  # fmt: skip
+"""FAPs that sculptors move together: a shape raises a whole brow, a whole lip. Inner lips follow from
+the mesh, as shapes always move both contours."""
+REGIONS = (
+    (*range(31, 39),),
+    (*range(39, 43),),
+    (*range(4, 14), 16, 17, *range(51, 61)),
+    (*range(61, 65),),
+)
+"""FAPs that move the same stretch of skin."""
+SKIN_KINDS = ("skin", "mouth")
+
+
+class Mixer:
+    """Mixes shapes for the FAPs of a face that `author` has made."""
+
+    def __init__(self, base: FaceModel, shapes: Shapes) -> None:
+        self.base, self.shapes = base, shapes
+        self.unit = {fap.number: base.fapu[fap.unit] for fap in faps() if fap.unit}
+        self.points = self._points()
+        vertices = np.array([base.bound[row_of()[name]] for name in self.points], dtype=np.intp)
+        self.vertices = vertices
+        self.at = shapes.at(vertices)
+        columns = [self.weight(fap) for fap in self.points.values()]
+        self.weights = np.stack(columns, axis=1) if columns else np.zeros((len(base.vertices), 0))
+        # how far each point follows when another one is moved by its own table
+        self.coupling = self.weights[vertices]
+
+    def _points(self) -> dict[str, int]:
+        """Feature points of the skin that a FAP moves straight, and the FAP whose table shows their hold."""
+        found: dict[str, int] = {}
+        for region in REGIONS:
+            for fap in region:
+                names = faps()[fap - 1].feature_points
+                if len(names) == 1 and fap in self.base.table_of and self.base.bound[row_of()[names[0]]] >= 0:
+                    found.setdefault(names[0], fap)
+        return found
+
+    def weight(self, fap: int) -> Float64:
+        """(V,): how much of the way of its point each vertex goes when a FAP is small."""
+        field = first_steps(self.base, fap, 1.0)
+        return np.asarray(field @ np.array(DIRECTIONS[faps()[fap - 1].positive]) / self.unit[fap])
+
+    def tables(self, group: tuple[int, ...]) -> tuple[dict[int, FaceDefTables], set[str]]:
+        """Tables of a group of FAPs from shapes, and the shapes; none where these do not reach."""
+        group = tuple(fap for fap in group if fap in self.base.table_of)
+        group = tuple(fap for fap in group if faps()[fap - 1].feature_points[0] in self.points)
+        details: dict[float, Float64] = {}
+        used: set[str] = set()
+        for sign in (-1.0, 1.0) if group else ():
+            solved = self._solved(group, sign)
+            if solved is not None:
+                step = self._put_right(group, self.shapes.mixed(solved))
+                plain = sum(first_steps(self.base, fap, sign) for fap in self._together(group).values())
+                details[sign] = step - plain
+                halves = zip(self.shapes.halves, solved, strict=True)
+                used |= {half.shape for half, weight in halves if weight * self._value(group[0]) > 0.02}
+        made: dict[int, FaceDefTables] = {}
+        if not details:
+            return made, used
+        # what the sculptor adds is shared out, so that it shows once when all of the group move
+        holds = {fap: np.abs(self.weight(fap)) for fap in group}
+        total = np.sum(list(holds.values()), axis=0)
+        shown = _eased(total / FULL_WEIGHT)
+        for fap in group:
+            share = (holds[fap] / np.where(total > 1e-6, total, 1.0) * shown)[:, None]
+            down, up = (
+                first_steps(self.base, fap, sign) + (share * details[sign] if sign in details else 0.0)
+                for sign in (-1.0, 1.0)
+            )
+            table = guarded_tables(self.base, fap, down, up)
+            if table is not None:
+                made[fap] = table
+        return made, used
+
+    def _together(self, group: tuple[int, ...]) -> dict[str, int]:
+        """Points that shapes move at once, and their FAPs: those of a group and of the inner lip's."""
+        found = {faps()[fap - 1].feature_points[0]: fap for fap in group}
+        for fap in group:
+            mate = faps()[fap - 1].lip_mate
+            if mate is not None and mate in self.base.table_of:
+                name = faps()[mate - 1].feature_points[0]
+                if name in self.points:
+                    found[name] = mate
+        return found
+
+    def _value(self, fap: int) -> float:
+        from fba.face.gltf.morphs import morph_values
+
+        return float(morph_values()[fap])
+
+    def _steps(self, group: tuple[int, ...]) -> Float64:
+        """(P, 3): where one step of all FAPs of a group, and of their inner mates, brings each point."""
+        wanted = np.zeros((len(self.points), 3))
+        names = list(self.points)
+        for name, fap in self._together(group).items():
+            wanted[names.index(name)] = np.array(DIRECTIONS[faps()[fap - 1].positive]) * self.unit[fap]
+        return wanted
+
+    def _solved(self, group: tuple[int, ...], sign: float) -> Float64 | None:
+        """(H,) weights of the halves that bring the points of a group one step in its direction."""
+        from scipy.optimize import lsq_linear
+
+        value = self._value(group[0])
+        target = self._steps(group) * sign * value
+        length = np.linalg.norm(target, axis=1)
+        own = length > 0
+        weight = np.full(target.shape, ELSEWHERE)
+        weight[own] = np.where(np.abs(target[own]) > 0, OWN, ACROSS)
+        weight /= length.max()
+        halves = len(self.shapes.halves)
+        system = (self.at * weight).reshape(halves, -1).T
+        solution = lsq_linear(
+            np.concatenate([system, RIDGE * np.eye(halves)]),
+            np.concatenate([(target * weight).reshape(-1), np.zeros(halves)]),
+            bounds=(0.0, MOST_WEIGHT),
+        ).x
+        solution[solution < 1e-3] = 0.0
+        moved = np.einsum("h,hpk->pk", solution, self.at)
+        outer = [list(self.points).index(faps()[fap - 1].feature_points[0]) for fap in group]
+        shares = (moved[outer] * target[outer]).sum(axis=1) / length[outer] ** 2
+        if shares.mean() < LEAST_SHARE or shares.min() < LEAST_OF_ONE:
+            return None
+        return np.asarray(solution / (shares.mean() * value) * sign)
+
+    def _put_right(self, group: tuple[int, ...], step: Float64) -> Float64:
+        """(V, 3) for one step of a group: faded out of its region, and exact at all feature points."""
+        region = next(region for region in REGIONS if group[0] in region)
+        inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
+        step = step * _eased(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
+        rest, *_ = np.linalg.lstsq(self.coupling, self._steps(group) - step[self.vertices], rcond=1e-6)
+        return np.asarray(step + self.weights @ rest)
+
+    def standing_in(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
+        """A FAP that the mesh alone cannot serve, straight along shapes, in one direction."""
+        entry = faps()[fap - 1]
+        name = entry.feature_points[0]
+        vertex = int(self.base.bound[row_of()[name]])
+        if vertex < 0 or entry.positive not in DIRECTIONS:
+            return None
+        field = np.sum([self.shapes.whole(shape) for shape in shapes], axis=0)
+        way = np.array(DIRECTIONS[entry.positive])
+        along = float(field[vertex] @ way)
+        if not along > 0:
+            return None
+        step = field * self.unit[fap] / along
+        return guarded_tables(self.base, fap, step, step)
+
+
+def _eased(share: Float64) -> Float64:
+    """From 0 to 1 without a corner at either end."""
+    inside = np.clip(share, 0.0, 1.0)
+    return np.asarray(inside * inside * (3 - 2 * inside))
+
+
+def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
+    """(V, 3) metres a step: what a FAP does to all vertices of a model next to 0, above or below it."""
+    unit = model.fapu[faps()[fap - 1].unit]
+    field = np.zeros((len(model.vertices), 3))
+    for mesh in model.table_of[fap].meshes:
+        zero = int(np.flatnonzero(mesh.borders == 0)[0])
+        column = min(max(zero - (sign < 0), 0), len(mesh.borders) - 2)
+        field[model.starts[mesh.part] + mesh.vertices] = mesh.displacements[:, column] * unit
+    return field
+
+
+def guarded_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
+    """Tables of a FAP that moves vertices by `down` (V, 3) a step below 0 and by `up` above, metres, up
+    to where the skin would fold; None where nothing moves."""
+    skins = [part for part in model.parts if part.kind in SKIN_KINDS]
+    surface = Surface(skins)
+    pool = np.concatenate(
+        [np.arange(model.starts[part.name], model.starts[part.name] + len(part.vertices)) for part in skins]
+    )
+    pinned = np.zeros(len(surface), dtype=bool)
+    place = np.full(len(model.vertices), -1)
+    place[pool] = surface.number
+    held = model.bound[model.bound >= 0]
+    pinned[place[held][place[held] >= 0]] = True
+    low, high = limits(fap)
+    below = _side(surface, surface_field(surface, down[pool]), low, pinned)
+    above = _side(surface, surface_field(surface, up[pool]), high, pinned)
+    values = np.array([*below.values[below.values < 0], 0.0, *above.values[above.values > 0]])
+    moving = np.union1d(below.vertices, above.vertices)
+    shifts = np.zeros((len(values), len(surface), 3))
+    # what the skin is held back by, teeth, brows and lashes are held back by too
+    share = np.zeros(len(values))
+    for k, value in enumerate(values):
+        side = below if value < 0 else above
+        shifts[k, side.vertices] = side.at(value)
+        share[k] = _progress(side, value)
+    motions = by_part(surface, Motion(values, moving, shifts[:, moving]))
+    for part in model.parts:
+        if part.kind in SKIN_KINDS:
+            continue
+        own = slice(model.starts[part.name], model.starts[part.name] + len(part.vertices))
+        which = np.flatnonzero(np.abs(down[own]).max(axis=1) + np.abs(up[own]).max(axis=1) > 0)
+        if len(which):
+            steps = np.where((share < 0)[:, None, None], down[own][which], up[own][which])
+            motions[part.name] = Motion(values, which, steps * share[:, None, None])
+    made = tables(fap, model.fapu[faps()[fap - 1].unit], motions)
+    return made if made.meshes else None
+
+
+def surface_field(surface: Surface, moves: Float64) -> Float64:
+    """(N, 3) on the welded surface of displacements of the parts that it was made of."""
+    field = np.zeros((len(surface), 3))
+    field[surface.number] = moves
+    return field
+
+
+def _side(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
+    """A straight motion from 0 to one end, held back where triangles would fold."""
+    limiter = Limiter(surface.vertices, surface.triangles)
+    if not field.any() or not end:
+        return Motion(np.array(sorted((0.0, end or 1.0))), np.zeros(0, dtype=np.intp), np.zeros((2, 0, 3)))
+    goal = float(np.sign(end)) * min(MODERATE / EASE[0], abs(end))
+    eased = eased_field(surface, limiter, field, [goal], pinned)
+    vertices = np.flatnonzero(eased.any(axis=1))
+    return straight(limiter, vertices, eased[vertices], min(end, 0.0), max(end, 0.0))
+
+
+def _progress(side: Motion, value: float) -> float:
+    """How many unhindered steps a straight motion has gone at a value."""
+    first = side.values[side.values != 0]
+    if not value or not side.shifts.size or not len(first):
+        return float(value)
+    near = float(first[np.abs(first).argmin()])
+    step = side.at(near) / near
+    return float((side.at(value) * step).sum() / max(float((step**2).sum()), 1e-30))

@@ -1,0 +1,197 @@
+"""What FAPs do to a face, carried over to the same face in another shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.calibration._align import known_rows
+from fba.face.calibration._eyes import FittedEye
+from fba.face.calibration._lid_paths import LID_FAPS, slid
+from fba.face.calibration._shape import Shape, similar
+from fba.face.feature_points import row_of
+from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
+from fba.parameters import faps
+
+if TYPE_CHECKING:
+    from fba.face.fapu import Fapu
+    from fba.face.model import FaceModel, Part
+
+Float64 = npt.NDArray[np.float64]
+
+LEAST = 1e-6
+"""How much a direction that no edge has counts as stretched like the others."""
+
+
+def carried_tables(
+    model: FaceModel, parts: tuple[Part, ...], points: Float64, fapu: Fapu, shape: Shape
+) -> tuple[FaceDefTables, ...]:
+    """The model's tables for its parts in another shape.
+
+    A displacement stays so many FAPU, turned with the face around it. Those of lids stretch with the skin
+    instead, as the opening between them does, and keep to the eyeball. Each FAP's own vertex then moves by
+    as many FAPU as before, in the same direction, and the others with it. Transforms keep their angles; if
+    these are counted in a length, they keep what the chin does at its distance.
+    """
+    names = {part.name: place for place, part in enumerate(parts)}
+    turns = {part.name: shape.turns.get(part.name) for part in model.parts}
+    stretched = _lid_stretches(model, parts) if LID_FAPS.keys() & model.table_of.keys() else {}
+    tables = []
+    for table in model.tables:
+        fap = faps()[table.fap - 1]
+        units = model.fapu[fap.unit], fapu[fap.unit]
+        lid = table.fap in LID_FAPS
+        local = stretched if lid else turns
+        moved = {}
+        for mesh in table.meshes:
+            moves = mesh.displacements.astype(np.float64)
+            matrices = local.get(mesh.part)
+            if matrices is not None:
+                moves = np.einsum("vij,vkj->vki", matrices[mesh.vertices], moves)
+            if fap.unit == "AU":  # an angle, so the way is as long as the part is big
+                old, new = model.parts[names[mesh.part]], parts[names[mesh.part]]
+                moves = moves * similar(old.vertices, new.vertices.astype(np.float64)).size
+            moved[mesh.part] = moves * (units[0] / units[1] if lid else 1.0)
+        right = _correction(model, table, moved) if fap.unit != "AU" else None
+        meshes = []
+        for mesh in table.meshes:
+            moves = moved[mesh.part]
+            if right is not None and len(right) == moves.shape[1]:
+                moves = np.einsum("kij,vkj->vki", right, moves)
+            if lid:
+                old, new = model.parts[names[mesh.part]], parts[names[mesh.part]]
+                places = [part.vertices[mesh.vertices].astype(np.float64) for part in (old, new)]
+                before = places[0], mesh.displacements.astype(np.float64) * units[0]
+                after = places[1], moves * units[1]
+                moves = slid(shape.eyes, table.fap, mesh.borders, before, after) / units[1]
+            meshes.append(FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, moves.astype(np.float32)))
+        balls = {eye.was.part: eye for eye in shape.eyes.values()}
+        ratio = units[0] / units[1]
+        transforms = [_moved(model, one, points, fap.unit, ratio, balls) for one in table.transforms]
+        tables.append(FaceDefTables(table.fap, tuple(meshes), tuple(transforms)))
+    return tuple(tables)
+
+
+def _lid_stretches(model: FaceModel, parts: tuple[Part, ...]) -> dict[str, Float64]:
+    """How the skin stretched, for skin and for what stands on it: (V, 3, 3) by name of the part."""
+    from scipy.spatial import cKDTree
+
+    found = {
+        old.name: stretches(old, new.vertices)
+        for old, new in zip(model.parts, parts, strict=True)
+        if old.kind in ("skin", "mouth")
+    }
+    skin = [part for part in model.parts if part.name in found]
+    if skin:
+        tree = cKDTree(np.concatenate([part.vertices for part in skin]))
+        joined = np.concatenate([found[part.name] for part in skin])
+        for part in model.parts:
+            if part.name not in found and len(part.vertices):
+                found[part.name] = joined[tree.query(part.vertices)[1]]
+    return found
+
+
+def _moved(
+    model: FaceModel,
+    transform: FaceDefTransform,
+    points: Float64,
+    unit: str,
+    ratio: float,
+    eyes: Mapping[str, FittedEye],
+) -> FaceDefTransform:
+    centre = np.array(transform.centre)
+    amount = np.array(transform.amount)
+    size = 1.0
+    if transform.part in eyes:
+        eye = eyes[transform.part]
+        centre, size = eye(centre[None])[0], eye.size
+    elif transform.part == HEAD:
+        head = row_of()["7.1"]
+        if np.isfinite(points[head]).all() and np.isfinite(model.points[head]).all():
+            centre = centre + points[head] - model.points[head]
+    else:
+        centre, size = _hinge(model, points, centre)
+    if transform.kind == "rotation" and unit != "AU":
+        amount = amount / size  # a longer arm turns by less for the same distance
+    if transform.kind == "scale":
+        amount = amount * ratio
+    return FaceDefTransform(transform.part, transform.kind, tuple(amount), tuple(centre))
+
+
+def _hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Float64, float]:
+    """A hinge inside the head: it keeps its place among the points around, and its distance from the chin."""
+    known = known_rows(points, model.points)
+    here, there = model.points[known], points[known]
+    a = np.column_stack([here - here.mean(axis=0), np.ones(len(here))])
+    affine = np.linalg.lstsq(a.T @ a + 1e-6 * np.eye(4), a.T @ there, rcond=None)[0]
+    moved: Float64 = np.append(centre - here.mean(axis=0), 1.0) @ affine
+    chin = row_of()["2.1"]
+    if not known[chin]:
+        return moved, 1.0
+    arms = [
+        np.hypot(*(chin_at - at)[1:]) for chin_at, at in ((points[chin], moved), (model.points[chin], centre))
+    ]
+    return moved, float(arms[0] / arms[1]) if arms[1] > 0 else 1.0
+
+
+def _correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
+    """(K, 3, 3) that give the FAP's own point its motion per FAPU back; None where it has none."""
+    for name in faps()[table.fap - 1].feature_points:
+        vertex = int(model.bound[row_of()[name]])
+        for mesh in table.meshes:
+            own = vertex - model.starts[mesh.part]
+            found = np.flatnonzero((mesh.vertices == own) & (vertex >= 0))
+            if len(found):
+                wanted = mesh.displacements[found[0]].astype(np.float64)
+                got = moved[mesh.part][found[0]]
+                return np.stack([_turn(a, b) for a, b in zip(got, wanted, strict=True)])
+    return None
+
+
+def _turn(a: Float64, b: Float64) -> Float64:
+    """The smallest turn, with a scale, that takes a to b; the unit matrix where one of them is nothing."""
+    lengths = float(np.linalg.norm(a)), float(np.linalg.norm(b))
+    if min(lengths) < 1e-9:
+        return np.eye(3)
+    u, v = a / lengths[0], b / lengths[1]
+    axis, cosine = np.cross(u, v), float(u @ v)
+    if cosine < -0.99:
+        return np.eye(3) * lengths[1] / lengths[0]
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    turn: Float64 = (np.eye(3) + cross + cross @ cross / (1 + cosine)) * lengths[1] / lengths[0]
+    return turn
+
+
+def stretches(part: Part, after: npt.NDArray[np.floating]) -> Float64:
+    """(V, 3, 3): how the surface around each vertex was turned and stretched.
+
+    Least squares over the edges around it; along the normal it is turned with the surface and grows as
+    much as the surface does.
+    """
+    from fba.face.normals import vertex_normals
+
+    before = part.vertices.astype(np.float64)
+    now = np.asarray(after, dtype=np.float64)
+    normals = vertex_normals(before, part.triangles), vertex_normals(now, part.triangles)
+    edges = np.concatenate([part.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
+    old, new = before[edges[:, 1]] - before[edges[:, 0]], now[edges[:, 1]] - now[edges[:, 0]]
+    squares, products = np.zeros((len(before), 3, 3)), np.zeros((len(before), 3, 3))
+    np.add.at(squares, edges[:, 0], old[:, :, None] * old[:, None, :])
+    np.add.at(products, edges[:, 0], new[:, :, None] * old[:, None, :])
+    grown = np.zeros(len(before)), np.zeros(len(before))
+    np.add.at(grown[0], edges[:, 0], (old**2).sum(axis=1))
+    np.add.at(grown[1], edges[:, 0], (new**2).sum(axis=1))
+    size = np.sqrt(grown[1] / np.maximum(grown[0], 1e-30))
+    size[grown[0] < 1e-20] = 1.0
+    weight = np.maximum(grown[0], 1e-20)
+    along = [n.astype(np.float64) for n in normals]
+    squares += weight[:, None, None] * along[0][:, :, None] * along[0][:, None, :]
+    products += (weight * size)[:, None, None] * along[1][:, :, None] * along[0][:, None, :]
+    squares += (LEAST * weight)[:, None, None] * np.eye(3)
+    products += (LEAST * weight * size)[:, None, None] * np.eye(3)
+    matrices: Float64 = products @ np.linalg.inv(squares)
+    return matrices

@@ -1,0 +1,281 @@
+"""The parts of a face deformed: skin smoothly, eyeballs and teeth as rigid bodies of another size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.calibration._align import known_rows
+from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lids_on
+from fba.face.calibration._field import Field, bumps
+from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
+from fba.face.feature_points import names, row_of
+from fba.face.normals import vertex_normals
+
+if TYPE_CHECKING:
+    from fba.face.model import FaceModel, Part
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+
+TEETH = {"upper": ("9.10", "9.8"), "lower": ("9.11", "9.9")}
+"""Points of each jaw: the edge of the teeth first, then the gums."""
+TONGUE = ("6.1", "6.2", "6.3", "6.4")
+INNER = ("3.5", "3.6", *TEETH["upper"], *TEETH["lower"], *TONGUE, "7.1", "11.5")
+"""Points on rigid parts, inside the mouth or on no surface: they do not deform the skin."""
+ON_LIDS = ("lash", "brow", "hair", "other")
+"""Kinds of parts that are carried by the skin under them."""
+LIPS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")
+SNAP = 2e-5
+"""Metres that no eye sees."""
+BESIDE = 0.005
+"""Metres sideways within which teeth are behind a point of the lips."""
+TONGUE_WIDTH = 0.012
+"""Metres within which the tongue follows a given point of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Vertices of every part by name, the feature points (84, 3), and what became of the eyes.
+
+    turns: (V, 3, 3), by how much the surroundings of each vertex were turned, for parts that are not rigid.
+    """
+
+    vertices: Mapping[str, Float64]
+    points: Float64
+    eyes: Mapping[str, FittedEye]
+    turns: Mapping[str, Float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Similar:
+    """A scale and a shift, that leave a rigid body what it is: called with places (N, 3)."""
+
+    origin: Float64
+    target: Float64
+    size: float
+
+    def __call__(self, places: npt.NDArray[np.floating]) -> Float64:
+        moved: Float64 = self.target + self.size * (np.asarray(places, dtype=np.float64) - self.origin)
+        return moved
+
+
+def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: tuple[float, float]) -> Shape:
+    """All parts and points of a model after a deformation.
+
+    targets: (84, 3), where the feature points must come to stand, NaN where only the field says. given:
+    (84,), those that the person's data say for sure. iris: its diameter before and after.
+    """
+    row = row_of()
+    vertices = {part.name: field(part.vertices) for part in model.parts}
+    fixed = _fixed(model, targets)
+    eyes: dict[str, FittedEye] = {}
+    lids = {side: [row[name] for name in pair if given[row[name]]] for side, pair in LID_POINTS.items()}
+    skin = [part for part in model.parts if part.kind in ("skin", "mouth")]
+    joined = np.concatenate([part.vertices for part in skin]).astype(np.float64) if skin else np.zeros((0, 3))
+    moved = np.concatenate([vertices[part.name] for part in skin]) if skin else joined
+    plain = moved
+    for side, eye in eyeballs(model).items():
+        pupil = model.points[row[PUPIL_POINT[side]]]
+        if np.isnan(pupil).any():
+            pupil = eye.centre + np.array([0.0, 0.0, eye.radius])
+        wanted = targets[row[PUPIL_POINT[side]]]
+        wanted = field(pupil[None])[0] if np.isnan(wanted).any() else wanted
+        around = similar(model.part(eye.part).vertices, vertices[eye.part]).size
+        eyes[side] = fit_eye(
+            eye,
+            joined,
+            moved,
+            (pupil, wanted),
+            size=around,
+            pupil_given=bool(given[row[PUPIL_POINT[side]]]),
+            iris=iris,
+            given=(model.points[lids[side]], targets[lids[side]]),
+        )
+        moved = lids_on(eyes[side], joined, moved, *fixed)
+    start = 0
+    for part in skin:
+        vertices[part.name] = moved[start : start + len(part.vertices)]
+        start += len(part.vertices)
+    for part in model.of_kind("eye"):
+        if eyes:
+            middle = part.vertices.mean(axis=0)
+            nearest = min(eyes.values(), key=lambda eye: float(np.linalg.norm(eye.was.centre - middle)))
+            vertices[part.name] = nearest(part.vertices)
+    for part in model.parts:
+        if part.kind in ON_LIDS and eyes and len(joined):
+            vertices[part.name] += _carried(part.vertices, joined, moved - plain, eyes)
+    _snap(model, vertices, targets)
+    teeth, tongue = _mouth(model, field, targets, given)
+    for part in model.of_kind("teeth"):
+        vertices[part.name] = teeth[_jaw(model, part)](part.vertices)
+    for part in model.of_kind("tongue"):
+        vertices[part.name] = tongue(part.vertices)
+    points = _points(model, vertices, field, targets, teeth, tongue)
+    soft = [part for part in model.parts if part.kind not in ("eye", "teeth", "tongue")]
+    turns = {part.name: field.turns(part.vertices) for part in soft} if model.tables else {}
+    return Shape(vertices, points, eyes, turns)
+
+
+def _snap(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> None:
+    """Vertices of feature points put exactly where they are within a hair's breadth already.
+
+    Points that nearly coincide, such as those of two lips, go through one place of the deformation.
+    """
+    for row in np.flatnonzero(known_rows(targets) & (model.bound >= 0)):
+        for part in model.parts:
+            own = int(model.bound[row]) - model.starts[part.name]
+            if part.kind not in ("skin", "mouth") or not 0 <= own < len(part.vertices):
+                continue
+            if np.linalg.norm(vertices[part.name][own] - targets[row]) < SNAP:
+                vertices[part.name][own] = targets[row]
+
+
+def _fixed(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
+    """Where points of the surface were, and where they must be."""
+    outer = np.array([name not in INNER for name in names()])
+    known = known_rows(targets, model.points) & outer
+    return model.points[known], targets[known]
+
+
+def similar(before: npt.NDArray[np.floating], after: Float64) -> Similar:
+    """The scale and shift that come nearest to a deformation of some vertices."""
+    places = np.asarray(before, dtype=np.float64)
+    a, b = places - places.mean(axis=0), after - after.mean(axis=0)
+    squares = float((a**2).sum())
+    size = float((a * b).sum()) / squares if squares > 0 else 1.0
+    return Similar(places.mean(axis=0), after.mean(axis=0), size)
+
+
+def _mouth(
+    model: FaceModel, field: Field, targets: Float64, given: Bool
+) -> tuple[dict[str, Similar], _Tongue]:
+    """What becomes of each row of teeth, and of the tongue."""
+    row = row_of()
+    teeth = [part.vertices for part in model.of_kind("teeth")]
+    inside = teeth or [part.vertices for part in model.of_kind("tongue")] or [model.vertices]
+    places = np.concatenate(inside).astype(np.float64)
+    both = similar(places, field(places))
+    both = _behind_lips(model, field, both) if teeth else both
+    jaws = {}
+    for jaw, (edge, gum) in TEETH.items():
+        jaws[jaw] = both
+        here, there = model.points[[row[edge], row[gum]]], targets[[row[edge], row[gum]]]
+        if np.isfinite(here[0]).all() and np.isfinite(there[0]).all() and given[row[edge]]:
+            size = both.size
+            if given[row[gum]] and np.isfinite(here).all() and np.isfinite(there).all():
+                tall = float(np.linalg.norm(there[1] - there[0]) / np.linalg.norm(here[1] - here[0]))
+                size = tall if 0.7 * both.size < tall < 1.4 * both.size else size
+            jaws[jaw] = Similar(here[0], there[0], size)
+    wanted = [row[name] for name in TONGUE if given[row[name]] and np.isfinite(model.points[row[name]]).all()]
+    return jaws, _Tongue(jaws["lower"], model.points[wanted], targets[wanted])
+
+
+def _behind_lips(model: FaceModel, field: Field, teeth: Similar) -> Similar:
+    """Teeth moved back until they are as far behind the inner contour of the lips as they were."""
+    known = [row for row in (row_of()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
+    places = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
+    lips, moved = field(model.points[known]), teeth(places)
+    back = 0.0
+    for before, after in zip(model.points[known], lips, strict=True):
+        room = before[2] - _foremost(places, before)
+        wanted = after[2] - teeth.size * room
+        if np.isfinite(room):
+            back = max(back, _foremost(moved, after) - wanted)
+    return Similar(teeth.origin, teeth.target - (0.0, 0.0, max(back, 0.0)), teeth.size)
+
+
+def _foremost(places: Float64, point: Float64) -> float:
+    """The greatest z of places right behind or before a point, -inf where there are none."""
+    near = np.hypot(places[:, 0] - point[0], places[:, 1] - point[1]) < BESIDE
+    return float(places[near, 2].max()) if near.any() else -np.inf
+
+
+class _Tongue:
+    """The tongue goes with the lower teeth, and through points of it that are given."""
+
+    def __init__(self, base: Similar, here: Float64, there: Float64) -> None:
+        self._base = base
+        self._rest = bumps(here, there - base(here), TONGUE_WIDTH) if len(here) else None
+
+    def __call__(self, places: npt.NDArray[np.floating]) -> Float64:
+        moved = self._base(places)
+        return moved if self._rest is None else moved + self._rest(np.asarray(places, dtype=np.float64))
+
+
+def _jaw(model: FaceModel, part: Part) -> str:
+    """The jaw that a part of the teeth belongs to: by its height against the line where they meet."""
+    edges = model.points[[row_of()["9.10"], row_of()["9.11"]], 1]
+    heights = [float(one.vertices[:, 1].mean()) for one in model.of_kind("teeth")]
+    boundary = float(edges.mean()) if np.isfinite(edges).all() else float(np.mean(heights))
+    return "upper" if float(part.vertices[:, 1].mean()) >= boundary else "lower"
+
+
+def _carried(
+    vertices: npt.NDArray[np.floating], skin: Float64, shift: Float64, eyes: Mapping[str, FittedEye]
+) -> Float64:
+    """What laying the skin on the eyeballs did to it, for parts that stand on it: (V, 3)."""
+    from scipy.spatial import cKDTree
+
+    near = np.zeros(len(skin), dtype=bool)
+    for eye in eyes.values():
+        near |= np.linalg.norm(skin - eye.was.centre, axis=1) < 1.2 * REACH * eye.was.radius
+    if near.sum() < 4:
+        return np.zeros(np.shape(vertices))
+    distance, found = cKDTree(skin[near]).query(vertices, k=4)
+    weight = 1.0 / np.maximum(distance, 1e-6)
+    weight /= weight.sum(axis=1, keepdims=True)
+    mean: Float64 = (shift[near][found] * weight[..., None]).sum(axis=1)
+    return mean
+
+
+def _points(
+    model: FaceModel,
+    vertices: Mapping[str, Float64],
+    field: Field,
+    targets: Float64,
+    teeth: Mapping[str, Similar],
+    tongue: _Tongue,
+) -> Float64:
+    """Feature points after the deformation: bound ones on their vertices, free ones as given or carried."""
+    points = field(np.nan_to_num(model.points))
+    for jaw, group in TEETH.items():
+        for name in group:
+            points[row_of()[name]] = teeth[jaw](model.points[row_of()[name]][None])[0]
+    for name in TONGUE:
+        points[row_of()[name]] = tongue(model.points[row_of()[name]][None])[0]
+    known = known_rows(targets)
+    free = [row_of()[name] for name in ("7.1", "11.5")]
+    points[free] = np.where(known[free, None], targets[free], points[free])
+    joined = np.concatenate([vertices[part.name].astype(np.float32) for part in model.parts])
+    bound = model.bound >= 0
+    points[bound] = joined[model.bound[bound]]
+    loose = ~bound & known & np.array([name not in INNER for name in names()])
+    points[loose] = targets[loose]
+    points[np.isnan(model.points).any(axis=1)] = np.nan
+    return points
+
+
+def rebuilt(part: Part, vertices: Float64) -> Part:
+    """The part with other vertices; normals turned as the surface was, so that seams stay unseen."""
+    before = vertex_normals(part.vertices, part.triangles).astype(np.float64)
+    after = vertex_normals(vertices, part.triangles).astype(np.float64)
+    normals = np.asarray(part.normals, dtype=np.float64)
+    axis = np.cross(before, after)
+    cosine = (before * after).sum(axis=1, keepdims=True)
+    # Rodrigues' formula for the smallest turn that takes one unit vector to another
+    turned = (
+        normals * cosine
+        + np.cross(axis, normals)
+        + axis * (axis * normals).sum(axis=1, keepdims=True) / np.maximum(1 + cosine, 1e-6)
+    )
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    return replace(
+        part,
+        vertices=vertices.astype(np.float32),
+        normals=np.where(length > 0.1, turned / np.maximum(length, 0.1), after).astype(np.float32),
+    )

@@ -1,0 +1,126 @@
+"""Do triangles turn over or tear where a FAP goes to the limits of its range?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.checks._findings import Finding
+from fba.face.checks._posing import Poser
+from fba.face.model import Part
+from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_ROLL
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+
+TURNING = {OPEN_JAW, 19, 20, 21, 22, TONGUE_ROLL}
+"""Where these move the skin, it turns: a triangle has turned over when it faces away from its neighbours."""
+HAIR = ("lash", "hair")
+"""Has two sides: it cannot turn over."""
+LIDS = {19, 20, 21, 22}
+EYE_CORNERS = ("3.7", "3.11", "3.8", "3.12")
+CORNER = 0.12
+"""Share of the eye's width about its corners that is not looked at."""
+RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
+LONGEST = 8.0
+"""Edges may get this many times as long..."""
+SHORT = 0.3
+"""... where they are not shorter than this share of the typical edge of their part."""
+SPECK = 0.003
+"""Share of the moving surface that may turn over where skin closes on itself: in the corners of eyes."""
+DEGENERATE = 1e-5
+FACING = -0.3
+
+
+def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
+    """Findings at both ends of the range of a FAP."""
+    entry = faps()[fap - 1]
+    if fap in RIGID or entry.i_limits is None:
+        return
+    for limit in entry.i_limits:
+        if not limit:
+            continue
+        value = float(limit * entry.step)
+        moved = poser.pose({fap: value})
+        for part in poser.model.parts:
+            own = slice(poser.model.starts[part.name], poser.model.starts[part.name] + len(part.vertices))
+            before, after = poser.neutral[own], moved[own]
+            if np.abs(after - before).max(initial=0.0) < 1e-9 or _rigid(before, after):
+                continue
+            over, torn, share = damage(before, after, _counted(poser, part, fap), turning=fap in TURNING)
+            if part.kind in HAIR:
+                over = 0
+            if over and not (fap in TURNING and share <= SPECK):
+                yield Finding(
+                    entry.label,
+                    "no triangle turns over at the limits of its range",
+                    f"{over} of part {part.name!r}, {share:.2%} of what moves, at {value:g}",
+                    "none",
+                )
+            if torn:
+                yield Finding(
+                    entry.label,
+                    "no triangle explodes at the limits of its range",
+                    f"{torn} edges of part {part.name!r} more than {LONGEST:g} times as long at {value:g}",
+                    "none",
+                )
+
+
+def _counted(poser: Poser, part: Part, fap: int) -> npt.NDArray[np.integer]:
+    """Triangles of a part, without those about the corners of the eyes where lids close on themselves."""
+    if fap not in LIDS:
+        return part.triangles
+    corners = np.array([poser.place(name) for name in EYE_CORNERS])
+    wide = np.linalg.norm(corners[0] - corners[1]), np.linalg.norm(corners[2] - corners[3])
+    away = np.linalg.norm(part.vertices[:, None] - corners, axis=2)
+    within = (np.nan_to_num(away, nan=np.inf) < CORNER * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
+    counted: npt.NDArray[np.integer] = part.triangles[~within[part.triangles].any(axis=1)]
+    return counted
+
+
+def damage(
+    before: Float64, after: Float64, triangles: npt.NDArray[np.integer], *, turning: bool
+) -> tuple[int, int, float]:
+    """(triangles turned over, edges torn, share of the moving area turned over)."""
+    moving = (np.abs(after - before).max(axis=1) > 1e-9)[triangles].any(axis=1)
+    chosen = triangles[moving]
+    sides = [
+        (before[chosen[:, k]] - before[chosen[:, k - 1]], after[chosen[:, k]] - after[chosen[:, k - 1]])
+        for k in range(3)
+    ]
+    normals = [np.cross(sides[0][which], sides[1][which]) for which in (0, 1)]
+    areas = np.linalg.norm(normals[0], axis=1)
+    whole = areas > DEGENERATE * np.median(areas) if len(areas) else areas > 0
+    if turning:
+        facing = [_facing(normal, chosen, len(before)) for normal in normals]
+        over = (facing[0] > 0) & (facing[1] < FACING)
+    else:
+        over = (normals[0] * normals[1]).sum(axis=1) <= 0
+    over &= whole
+    lengths = np.array([[np.linalg.norm(side[which], axis=1) for side in sides] for which in (0, 1)])
+    typical = float(np.median(lengths[0])) if lengths.size else 0.0
+    torn = lengths[1] > LONGEST * np.maximum(lengths[0], SHORT * typical)
+    share = float(areas[over].sum() / max(areas.sum(), 1e-30))
+    return int(over.sum()), int(torn.sum()), share
+
+
+def _facing(normals: Float64, triangles: npt.NDArray[np.integer], count: int) -> Float64:
+    """(F,) cosine between each triangle's normal and that of the triangles around it."""
+    sums = np.zeros((count, 3))
+    for corner in range(3):
+        np.add.at(sums, triangles[:, corner], normals)
+    around = sums[triangles].sum(axis=1) - 3 * normals
+    lengths = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
+    result: Float64 = np.where(lengths > 0, (around * normals).sum(axis=1) / np.maximum(lengths, 1e-300), 1.0)
+    return result
+
+
+def _rigid(before: Float64, after: Float64) -> bool:
+    """Whether a part moved as a whole, which harms no triangle."""
+    a, b = before - before.mean(axis=0), after - after.mean(axis=0)
+    left, _, right = np.linalg.svd(a.T @ b)
+    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    return bool(np.abs(a @ left @ flip @ right - b).max() < 1e-4 * max(float(np.ptp(a)), 1e-9))

@@ -1,0 +1,230 @@
+"""Does each FAP move its own feature point, that far, in that direction, and leave its mate alone?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.checks._findings import Finding
+from fba.face.checks._posing import Poser
+from fba.face.points import (
+    DILATE_PUPIL,
+    DIRECTIONS,
+    HEAD_PITCH,
+    HEAD_ROLL,
+    HEAD_YAW,
+    OPEN_JAW,
+    PITCH_EYE,
+    TONGUE_ROLL,
+    YAW_EYE,
+)
+from fba.face.tables import HEAD
+from fba.parameters import faps
+
+Float64 = npt.NDArray[np.float64]
+
+SMALL = 10.0
+"""A value that every face can follow."""
+SMALL_ANGLE = 5000.0
+"""The same for FAPs that count in 1e-5 rad."""
+ACCURACY = 0.05
+MATE = 0.01
+"""How much of its mate's way a feature point may make."""
+ARC = {OPEN_JAW, 19, 20, 21, 22}
+"""FAPs whose points follow an arc: only the way along the direction is prescribed."""
+THRUST_EYE = {27: "3.5", 28: "3.6"}
+EYE_POINT = {23: "3.5", 24: "3.6", 25: "3.5", 26: "3.6", **THRUST_EYE, 29: "3.5", 30: "3.6"}
+HEAD_AXIS = {HEAD_PITCH: (1.0, 0.0, 0.0), HEAD_YAW: (0.0, 1.0, 0.0), HEAD_ROLL: (0.0, 0.0, 1.0)}
+
+
+def check_point(poser: Poser, fap: int) -> Iterator[Finding]:
+    """What is wrong with how a FAP moves its feature point."""
+    if fap in HEAD_AXIS:
+        yield from _head(poser, fap)
+    elif fap in (*YAW_EYE, *PITCH_EYE):
+        yield from _gaze(poser, fap)
+    elif fap in DILATE_PUPIL:
+        yield from _pupil(poser, fap)
+    elif fap == TONGUE_ROLL:
+        yield from _roll(poser, fap)
+    else:
+        yield from _shift(poser, fap)
+
+
+def point_error(poser: Poser, fap: int, value: float) -> float:
+    """How far off a shifted feature point is, as a share of the way it should make; nan where unknown.
+
+    Of points on arcs, only the way along the standard's direction counts.
+    """
+    entry = faps()[fap - 1]
+    point = EYE_POINT.get(fap) or entry.feature_points[0]
+    direction = np.array(DIRECTIONS[entry.positive])
+    wanted = value * poser.model.fapu[entry.unit]
+    if not poser.has(point):
+        return float("nan")
+    moved = poser.shift({fap: value})[poser.vertex(point)]
+    off = np.array([moved @ direction - wanted, moved[0]]) if fap in ARC else moved - wanted * direction
+    return float(np.linalg.norm(off) / abs(wanted))
+
+
+def _shift(poser: Poser, fap: int) -> Iterator[Finding]:
+    entry = faps()[fap - 1]
+    point = EYE_POINT.get(fap) or entry.feature_points[0]
+    if not poser.has(point):
+        yield Finding(entry.label, "its feature point stands on a vertex", f"{point} is free", "a vertex")
+        return
+    for value in (SMALL, -SMALL) if entry.direction == "B" else (SMALL,):
+        error = point_error(poser, fap, value)
+        if not error <= ACCURACY:
+            moved = poser.shift({fap: value})[poser.vertex(point)] * 1000
+            wanted = value * poser.model.fapu[entry.unit] * np.array(DIRECTIONS[entry.positive]) * 1000
+            yield Finding(
+                entry.label,
+                f"{point} moves by value x {entry.unit} {entry.positive}",
+                f"{_vector(moved)} mm at {value:g}",
+                f"{_vector(wanted)} mm within {ACCURACY:.0%}",
+            )
+    mate = entry.left_right_mate
+    if mate is None:
+        return
+    other = EYE_POINT.get(mate) or faps()[mate - 1].feature_points[0]
+    if other != point and poser.has(other):
+        moved = poser.shift({fap: SMALL})
+        share = float(np.linalg.norm(moved[poser.vertex(other)]))
+        share /= max(float(np.linalg.norm(moved[poser.vertex(point)])), 1e-12)
+        if share > MATE:
+            yield Finding(
+                entry.label,
+                f"{other}, the mate, stays",
+                f"{share:.1%} of the way of {point}",
+                f"under {MATE:.0%}",
+            )
+
+
+def _head(poser: Poser, fap: int) -> Iterator[Finding]:
+    entry = faps()[fap - 1]
+    turns = [t for t in poser.model.table_of[fap].transforms if t.part == HEAD and t.kind == "rotation"]
+    total = np.sum([t.amount for t in turns], axis=0) if turns else np.zeros(3)
+    axis = np.array(HEAD_AXIS[fap])
+    if np.linalg.norm(total - axis) > ACCURACY:
+        yield Finding(
+            entry.label,
+            f"the head turns {entry.positive} by value x 1e-5 rad",
+            f"axis times rate {_vector(total)}",
+            _vector(axis),
+        )
+    centre = poser.place("7.1")
+    for turn in turns:
+        away = np.linalg.norm(np.array(turn.centre) - centre)
+        if np.isfinite(away) and away > 1e-3:
+            yield Finding(
+                entry.label,
+                "the head turns about 7.1",
+                f"{away * 1000:.1f} mm away",
+                "at most 1 mm",
+                "warning",
+            )
+
+
+def _gaze(poser: Poser, fap: int) -> Iterator[Finding]:
+    entry = faps()[fap - 1]
+    side = "left" if EYE_POINT[fap] == "3.5" else "right"
+    eye = poser.eyes[side]
+    own = _eye_vertices(poser, side)
+    axis, sign = (1, 1.0) if fap in YAW_EYE else (0, 1.0)
+    for value in (SMALL_ANGLE, -SMALL_ANGLE):
+        moved = poser.pose({fap: value})[own]
+        turn = _rotation(poser.neutral[own] - eye.centre, moved - eye.centre)
+        wanted = np.zeros(3)
+        wanted[axis] = sign * value * poser.model.fapu.AU
+        if np.linalg.norm(turn - wanted) > ACCURACY * np.linalg.norm(wanted):
+            yield Finding(
+                entry.label,
+                f"the eyeball turns {entry.positive} about its centre",
+                f"{_vector(np.degrees(turn))} degrees at {value:g}",
+                f"{_vector(np.degrees(wanted))} degrees",
+            )
+    other = _eye_vertices(poser, "right" if side == "left" else "left")
+    if len(other) and np.abs(poser.shift({fap: SMALL_ANGLE})[other]).max() > 1e-6:
+        yield Finding(entry.label, "the other eyeball stays", "it moves", "no motion")
+
+
+def _pupil(poser: Poser, fap: int) -> Iterator[Finding]:
+    entry = faps()[fap - 1]
+    side = "left" if EYE_POINT[fap] == "3.5" else "right"
+    eye, unit = poser.eyes[side], poser.model.fapu.IRISD
+    own = _eye_vertices(poser, side)
+
+    def off_axis(points: Float64) -> Float64:
+        arms = points - eye.centre
+        return np.asarray(np.linalg.norm(arms - np.outer(arms @ eye.gaze, eye.gaze), axis=1))
+
+    radius = unit * 1024 / 6
+    distance = off_axis(poser.neutral[own])
+    front = (poser.neutral[own] - eye.centre) @ eye.gaze > 0
+    rim = own[front & (np.abs(distance - radius) < 0.25 * radius)]
+    if not len(rim):
+        rim = own[front & (distance < 1.5 * radius) & (distance > 1e-6)]
+    before = off_axis(poser.neutral[rim])
+    for value in (6 * SMALL, -6 * SMALL):
+        # vertices inside the pupil grow in proportion, those outside it less and less
+        grown = off_axis(poser.pose({fap: value})[rim]) - before
+        wanted = (
+            value
+            * unit
+            / 2
+            * np.where(before <= radius, before / radius, np.clip((3 * radius - before) / (2 * radius), 0, 1))
+        )
+        if not len(rim) or np.abs(grown - wanted).max() > 0.15 * abs(value * unit / 2):
+            found = f"{float(np.mean(grown)) * 2000:.2f} mm" if len(rim) else "no vertices there"
+            yield Finding(
+                entry.label,
+                "the pupil's diameter grows by value x IRISD",
+                f"{found} at {value:g}",
+                f"{float(np.mean(wanted)) * 2000 if len(rim) else value * unit * 1000:.2f} mm",
+            )
+
+
+def _roll(poser: Poser, fap: int) -> Iterator[Finding]:
+    entry = faps()[fap - 1]
+    if not poser.has("6.2", "6.3", "6.4"):
+        yield Finding(entry.label, "6.2, 6.3 and 6.4 stand on vertices", "one is free", "vertices")
+        return
+    moved = poser.pose({fap: SMALL_ANGLE})
+    for name, sign in (("6.3", 1.0), ("6.4", -1.0)):
+        before = poser.neutral[poser.vertex(name)] - poser.neutral[poser.vertex("6.2")]
+        after = moved[poser.vertex(name)] - moved[poser.vertex("6.2")]
+        turn = sign * (np.arctan2(after[1], after[0]) - np.arctan2(before[1], before[0]))
+        turn = (turn + np.pi) % (2 * np.pi) - np.pi
+        wanted = SMALL_ANGLE * poser.model.fapu.AU
+        if abs(turn - wanted) > 2 * ACCURACY * wanted:
+            yield Finding(
+                entry.label,
+                f"{name} turns up about the tongue's middle",
+                f"{np.degrees(turn):.2f} degrees at {SMALL_ANGLE:g}",
+                f"{np.degrees(wanted):.2f} degrees",
+            )
+
+
+def _eye_vertices(poser: Poser, side: str) -> npt.NDArray[np.intp]:
+    found = [np.zeros(0, dtype=np.intp)]
+    for name in poser.eyes[side].parts:
+        start = poser.model.starts[name]
+        found.append(np.arange(start, start + len(poser.model.part(name).vertices)))
+    return np.concatenate(found)
+
+
+def _rotation(before: Float64, after: Float64) -> Float64:
+    """The rotation vector that takes points (N, 3) about the origin to others best."""
+    from scipy.spatial.transform import Rotation
+
+    if len(before) < 3:
+        return np.full(3, np.nan)
+    found: Float64 = Rotation.align_vectors(after, before)[0].as_rotvec()
+    return found
+
+
+def _vector(numbers: Float64) -> str:
+    return "(" + ", ".join(f"{n:.3f}" for n in np.asarray(numbers)) + ")"

@@ -1,0 +1,289 @@
+"""Is a model's rest position the standard's neutral face?
+
+Gaze along +z, lids tangent to the iris, the pupil a third of it, lips touching on a line through the
+corners of the mouth, teeth touching, the tongue flat with its tip where they meet; feature points where
+the standard puts them, and sizes of a human being (ISO/IEC 14496-2, neutral face; digest
+faces-and-emotions.md, 4.3). Tolerances are shares of the face's own units: 1 mm on an adult is 0.016 of
+the distance between the pupils or 0.02 of the mouth's width.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.checks._findings import Finding
+from fba.face.checks._locations import check_locations
+from fba.face.checks._sizes import check_sizes
+from fba.face.eyeball import LID_POINTS, PUPIL_POINT, Eyeball, eyeballs, gaze, pupil_diameter
+from fba.face.fapu import PER_DISTANCE
+from fba.face.feature_points import MIRRORED, row_of
+
+if TYPE_CHECKING:
+    from fba.face.model import FaceModel, Part
+
+Float64 = npt.NDArray[np.float64]
+Limits = tuple[float, float]
+"""Above the first a deviation is a warning, above the second an error."""
+
+GAZE: Limits = (3.0, 8.0)
+"""Degrees between gaze and +z."""
+TANGENT: Limits = (0.08, 0.25)
+"""Of the iris's diameter: how far the edge of the iris may be from a lid margin."""
+PUPIL: Limits = (0.15, 0.5)
+"""Relative deviation of the pupil's diameter from a third of the iris's."""
+IRIS_OF_EYEBALL = (0.38, 0.62)
+"""Diameter of the iris by that of the eyeball: 11.7 by 24 mm, with room."""
+ROUND = 0.02
+"""Of the radius: root mean square deviation of an eyeball from a sphere."""
+LIPS: Limits = (0.01, 0.03)
+LIP_LINE: Limits = (0.05, 0.15)
+TEETH: Limits = (0.02, 0.06)
+TONGUE: Limits = (0.08, 0.25)
+"""Shares of the width of the mouth."""
+SYMMETRY = 0.04
+"""Of the distance between the pupils: mean deviation from the mirror image that is worth a word."""
+
+
+def check_neutral(model: FaceModel) -> list[Finding]:
+    """Whatever about the model's rest position is not as the standard's neutral face; [] for a good one.
+
+    "error" where FAPs would play wrongly, "warning" where it merely looks odd or cannot be checked.
+    """
+    return [
+        *_missing(model),
+        *check_locations(model.points),
+        *_eyes(model),
+        *_mouth(model),
+        *_teeth(model),
+        *_tongue(model),
+        *_symmetry(model.points),
+        *check_sizes(model.points),
+    ]
+
+
+def _missing(model: FaceModel) -> Iterator[Finding]:
+    if model.missing:
+        count = len(model.missing)
+        yield Finding(
+            f"{count} feature point{'s' if count > 1 else ''}",
+            "present",
+            f"no {', '.join(model.missing)}",
+            "all 84: what depends on these is not checked",
+            "warning",
+        )
+
+
+def _eyes(model: FaceModel) -> Iterator[Finding]:
+    found = eyeballs(model)
+    for side in PUPIL_POINT:
+        if side not in found:
+            yield Finding(f"{side} eye", "eyeball", "no part of kind eye", "one on each side", "warning")
+            continue
+        yield from _eye(model, found[side])
+    for side, (upper, lower) in LID_POINTS.items():
+        yield from _lids(model, side, upper, lower)
+
+
+def _eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
+    subject = f"{eye.side} eye"
+    if eye.error > ROUND * eye.radius:
+        yield Finding(
+            subject,
+            "eyeball is a sphere",
+            f"{_mm(eye.error)} off it on average",
+            f"at most {_mm(ROUND * eye.radius)}",
+            "warning",
+        )
+    direction = gaze(model, eye)
+    if direction is not None:
+        angle = float(np.degrees(np.arccos(np.clip(direction[2], -1.0, 1.0))))
+        severity = _severity(angle, GAZE)
+        if severity:
+            yield Finding(
+                subject, "gaze along +z", f"{angle:.1f} degrees off", f"at most {GAZE[0]:g} degrees", severity
+            )
+    iris = model.fapu.IRISD * PER_DISTANCE
+    share = iris / (2 * eye.radius)
+    if not IRIS_OF_EYEBALL[0] <= share <= IRIS_OF_EYEBALL[1]:
+        yield Finding(
+            subject,
+            "iris fits the eyeball",
+            f"iris {_mm(iris)} on an eyeball of {_mm(2 * eye.radius)}, {share:.2f} of it",
+            f"{IRIS_OF_EYEBALL[0]:g} to {IRIS_OF_EYEBALL[1]:g} of it",
+            "warning",
+        )
+    pupil = pupil_diameter(model, eye)
+    if pupil is not None:
+        severity = _severity(abs(pupil / (iris / 3) - 1), PUPIL)
+        if severity:
+            yield Finding(
+                subject,
+                "pupil a third of the iris",
+                f"{_mm(pupil)}, {pupil / iris:.2f} of it",
+                f"{_mm(iris / 3)} +- {100 * PUPIL[0]:.0f} %",
+                severity,
+            )
+
+
+def _lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
+    """The iris, as big as IRISD0 and centred on the pupil, touches both lid margins."""
+    iris = model.fapu.IRISD * PER_DISTANCE
+    pupil = _point(model, PUPIL_POINT[side])
+    for name, edge in ((upper, 0.5 * iris), (lower, -0.5 * iris)):
+        height = float(_point(model, name)[1] - pupil[1])
+        severity = _severity(abs(height - edge) / iris, TANGENT)
+        if severity:
+            yield Finding(
+                f"feature point {name}",
+                "lid tangent to the iris",
+                f"{_mm(height)} above the pupil" if edge > 0 else f"{_mm(-height)} below the pupil",
+                f"{_mm(abs(edge))} +- {_mm(TANGENT[0] * iris)}, half of the iris",
+                severity,
+            )
+
+
+def _mouth(model: FaceModel) -> Iterator[Finding]:
+    width = model.fapu.MW * PER_DISTANCE
+    for upper, lower in (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9")):
+        gap = float(_point(model, upper)[1] - _point(model, lower)[1])
+        severity = _severity(abs(gap) / width, LIPS)
+        if severity:
+            yield Finding(
+                f"feature points {upper} and {lower}",
+                "lips touch",
+                f"{_mm(abs(gap))} {'apart' if gap > 0 else 'into each other'}",
+                f"at most {_mm(LIPS[0] * width)}",
+                severity,
+            )
+    heights = np.array([_point(model, name)[1] for name in ("2.2", "2.3", "2.4", "2.5")])
+    middle = float(heights[:2].mean())
+    for name, height in (("2.4", heights[2]), ("2.5", heights[3])):
+        severity = _severity(abs(height - middle) / width, LIP_LINE)
+        if severity:
+            yield Finding(
+                f"feature point {name}",
+                "lips meet on a level line through the corners",
+                f"{_mm(height - middle, sign=True)} against their middle",
+                f"at most {_mm(LIP_LINE[0] * width)}",
+                severity,
+            )
+
+
+def _teeth(model: FaceModel) -> Iterator[Finding]:
+    width = model.fapu.MW * PER_DISTANCE
+    gap = float(_point(model, "9.10")[1] - _point(model, "9.11")[1])
+    severity = _severity(abs(gap) / width, TEETH)
+    if severity:
+        yield Finding(
+            "feature points 9.10 and 9.11",
+            "teeth touch",
+            f"{_mm(abs(gap))} {'apart' if gap > 0 else 'into each other'}",
+            f"at most {_mm(TEETH[0] * width)}",
+            severity,
+        )
+    jaws = _jaws(model.of_kind("teeth"))
+    if jaws is not None:
+        from scipy.spatial import cKDTree
+
+        apart = float(cKDTree(_surface(jaws[0])).query(_surface(jaws[1]))[0].min())
+        severity = _severity(apart / width, TEETH)
+        if severity:
+            yield Finding(
+                f"parts {jaws[0].name} and {jaws[1].name}",
+                "teeth touch",
+                f"{_mm(apart)} apart where they are nearest",
+                f"at most {_mm(TEETH[0] * width)}",
+                severity,
+            )
+
+
+def _surface(part: Part) -> Float64:
+    """Corners, edge midpoints and centres of a part's triangles: dense enough even for coarse teeth."""
+    corners = part.vertices[part.triangles].astype(np.float64)
+    edges = (corners + np.roll(corners, 1, axis=1)) / 2
+    return np.concatenate([part.vertices, edges.reshape(-1, 3), corners.mean(axis=1)])
+
+
+def _jaws(parts: tuple[Part, ...]) -> tuple[Part, Part] | None:
+    """The highest and the lowest part of the teeth, where there are two."""
+    ordered = sorted(
+        (p for p in parts if len(p.vertices)), key=lambda part: float(part.vertices[:, 1].mean())
+    )
+    return (ordered[-1], ordered[0]) if len(ordered) > 1 else None
+
+
+def _tongue(model: FaceModel) -> Iterator[Finding]:
+    width = model.fapu.MW * PER_DISTANCE
+    tip = _point(model, "6.1")
+    for name in ("6.2", "6.3", "6.4"):
+        rise = float(_point(model, name)[1] - tip[1])
+        severity = _severity(abs(rise) / width, TONGUE)
+        if severity:
+            yield Finding(
+                f"feature point {name}",
+                "tongue flat",
+                f"{_mm(rise, sign=True)} against the tip (6.1)",
+                f"at most {_mm(TONGUE[0] * width)}",
+                "warning",
+            )
+    boundary = (_point(model, "9.10") + _point(model, "9.11")) / 2
+    off = float(tip[1] - boundary[1])
+    severity = _severity(abs(off) / width, TONGUE)
+    if severity:
+        yield Finding(
+            "feature point 6.1",
+            "tip of the tongue where the teeth meet",
+            f"{_mm(off, sign=True)} against 9.10 and 9.11",
+            f"at most {_mm(TONGUE[0] * width)}",
+            severity,
+        )
+    behind = float(_point(model, "9.11")[2] - tip[2])
+    if np.isfinite(behind) and not -0.01 * width <= behind <= 0.2 * width:
+        yield Finding(
+            "feature point 6.1",
+            "tip of the tongue at the teeth",
+            f"{_mm(behind)} behind 9.11",
+            f"0.0 mm to {_mm(0.2 * width)}",
+            "error" if behind < -0.05 * width else "warning",
+        )
+
+
+def _symmetry(points: Float64) -> Iterator[Finding]:
+    rows = np.array([(row_of()[left], row_of()[right]) for left, right in MIRRORED.items()])
+    left, right = points[rows[:, 0]], points[rows[:, 1]] * (-1.0, 1.0, 1.0)
+    known = np.isfinite(left).all(axis=1) & np.isfinite(right).all(axis=1)
+    unit = float(points[row_of()["3.5"], 0] - points[row_of()["3.6"], 0])
+    if known.sum() < 3:
+        return
+    apart = left[known] - right[known]
+    apart[:, 0] -= np.median(apart[:, 0])  # the face need not stand on x = 0
+    distance = np.linalg.norm(apart, axis=1)
+    if distance.mean() > SYMMETRY * unit:
+        worst = list(MIRRORED.items())[int(np.flatnonzero(known)[int(distance.argmax())])]
+        yield Finding(
+            "left and right",
+            "symmetry",
+            f"{_mm(distance.mean())} on average, {_mm(distance.max())} for {worst[0]} and {worst[1]}",
+            f"{_mm(SYMMETRY * unit)} on average, unless the face is meant so",
+            "warning",
+        )
+
+
+def _point(model: FaceModel, name: str) -> Float64:
+    place: Float64 = model.points[row_of()[name]]
+    return place
+
+
+def _severity(deviation: float, limits: Limits) -> Literal["error", "warning"] | None:
+    """None for a small deviation, or one that is not known (NaN)."""
+    if deviation > limits[1]:
+        return "error"
+    return "warning" if deviation > limits[0] else None
+
+
+def _mm(metres: float, *, sign: bool = False) -> str:
+    return f"{metres * 1000:+.1f} mm" if sign else f"{metres * 1000:.1f} mm"

@@ -1,0 +1,121 @@
+"""glTF files of this project read back: their joints' turns are BAPs already, nothing is retargeted.
+
+What the face shows is told by its morph targets and joints (`fba.formats.gltf._fap_tracks`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.animation import Animation, BodyTrack
+from fba.body import BapSolver, Skeleton, wrapped
+from fba.body.solve.conventions import convention_names
+from fba.errors import FormatError
+from fba.formats.gltf._fap_tracks import read_face
+from fba.formats.gltf._pose import Sampler, key_times, nearest_rotation
+from fba.formats.gltf.writer import CHUNK, MARK, MOST_FRAMES
+from fba.formats.text.frame_rates import parse_rate
+from fba.gltf import Animation as Clip
+from fba.gltf import Channel, Gltf
+from fba.gltf.values import Value, optional
+from fba.parameters import BAP_COUNT, baps
+
+Float64 = npt.NDArray[np.float64]
+
+VERSION = 1
+MOST_INDEX = 1 << 62
+LARGEST = 1e6
+
+
+def note_of(gltf: Gltf, clip: Clip) -> Value | None:
+    """This project's note at an animation: rate, first frame, body and face; None in files of others."""
+    entries = gltf.document.elements(1 << 18, "animations")
+    entry = entries[gltf.animations.index(clip)]
+    extras = entry.get("extras")
+    held = optional(extras, MARK) if extras is not None and isinstance(extras.data, dict) else None
+    ours = held is not None and isinstance(held.data, dict) and ("root" in held.data or "face" in held.data)
+    return held if ours else None
+
+
+def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
+    """The tracks of an animation with such a note. Raises ModelError where it lies; warns (FbaWarning) of
+    what is not there any more."""
+    if note.member("version").integer(0, 1 << 30) != VERSION:
+        raise note.error(f"is version {note.member('version').data}; version {VERSION} is read here")
+    text = note.member("rate")
+    try:
+        rate: Fraction = parse_rate(text.text(100))
+    except FormatError as error:
+        raise text.error(str(error)) from None
+    first = note.member("first").integer(-MOST_INDEX, MOST_INDEX)
+    nodes: dict[str, int] = {}
+    channels: Sequence[Channel] = clip.channels
+    if note.get("root") is not None:
+        nodes = _joints(gltf, note.member("root").index(len(gltf.nodes), "node"), Skeleton.default())
+        channels = [channel for channel in clip.channels if channel.node in set(nodes.values())]
+    times = _times(channels, note)
+    steps = np.rint(times * float(rate))
+    if not (steps[-1] < MOST_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):
+        raise text.error("the keys of the animation are closer than its frames")
+    body = _body(gltf, channels, note, nodes, times) if nodes else None
+    face = read_face(gltf, clip, held, times) if (held := note.get("face")) is not None else None
+    return Animation(rate, first + steps.astype(np.int64), face, body, clip.name)
+
+
+def _times(channels: Sequence[Channel], note: Value) -> Float64:
+    times = key_times(channels)
+    if len(times) > MOST_FRAMES:
+        raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that are read")
+    return times
+
+
+def _body(
+    gltf: Gltf, channels: Sequence[Channel], note: Value, nodes: dict[str, int], times: Float64
+) -> BodyTrack:
+    axes = note.member("axes").choice(*convention_names())
+    centre = np.array(note.member("centre").numbers(3, -LARGEST, LARGEST))
+
+    standard = Skeleton.default()
+    solver = BapSolver(standard, axes)
+    values = np.zeros((len(times), BAP_COUNT), dtype=np.int32)
+    previous = None
+    for start in range(0, len(times), CHUNK):
+        rows = slice(start, start + CHUNK)
+        values[rows] = solver.solve(
+            _matrices(Sampler(gltf, channels, times[rows]), nodes, standard, centre), list(nodes), previous
+        )
+        previous = values[rows][-1]
+    sent = np.zeros(BAP_COUNT, dtype=bool)
+    sent[[bap.number - 1 for bap in baps() if bap.joint in nodes]] = True
+    return BodyTrack(wrapped(values), np.broadcast_to(sent, values.shape))
+
+
+def _joints(gltf: Gltf, root: int, standard: Skeleton) -> dict[str, int]:
+    """Nodes at and below the root that are joints of the standard, by name."""
+    nodes = {standard.names[0]: root}
+    below = {root}
+    for number in gltf.order:
+        parent = gltf.nodes[number].parent
+        if parent in below:
+            below.add(number)
+            if gltf.nodes[number].name in standard:
+                nodes.setdefault(gltf.nodes[number].name, number)
+    return nodes
+
+
+def _matrices(sampler: Sampler, nodes: dict[str, int], standard: Skeleton, centre: Float64) -> Float64:
+    """(T, J, 4, 4) of the standard's joints: rotations, and the root's place."""
+    shift = sampler.translation(nodes[standard.names[0]])
+    result = np.zeros((len(shift), len(standard), 4, 4))
+    result[:, :, 3, 3] = 1.0
+    for joint, name in enumerate(standard.names):
+        parent = int(standard.parents[joint])
+        above = np.eye(3) if parent < 0 else result[:, parent, :3, :3]
+        turned = nearest_rotation(sampler.linear(nodes[name])) if name in nodes else np.eye(3)
+        result[:, joint, :3, :3] = above @ turned
+    result[:, 0, :3, 3] = shift - centre + standard.centres[0]
+    return result

@@ -1,0 +1,274 @@
+"""Read the frames of FAP and BAP files: pairs of lines, a mask and `<frame number> <values>`.
+
+Numbers are parsed by NumPy, many lines at once; where anything is wrong with a batch its lines are
+gone through one by one, to name line and token.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from fba.errors import FbaWarning, FormatError, Remedy
+from fba.formats.text._layout import Layout
+from fba.formats.text.frame_rates import parse_rate
+from fba.formats.text.lines import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
+from fba.formats.text.values import Bool, Int32, Int64, Row, ValueParser
+from fba.source import Path, open_source
+
+BATCH_LINES = 2048
+BATCH_BYTES = 1 << 20
+CACHED_MASKS = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """What a file holds. index: int64 (T,); mask: bool (T, columns); slots: int32 (T, slots)."""
+
+    header: Header
+    index: Int64
+    mask: Bool
+    slots: Int32
+
+
+def read_frames(
+    path: Path,
+    layout: Layout,
+    *,
+    fps: str | float | Fraction | None = None,
+    name: str | None = None,
+    salvage: bool = False,
+    angle_scale: Fraction | float = 1,
+) -> Frames:
+    """Everything in the file; options as `fba.formats.text.fap.read_fap`. Raises FormatError, warns with
+    FbaWarning."""
+    rate = None if fps is None else parse_rate(fps)
+    try:
+        scale = float(angle_scale)
+    except (TypeError, ValueError, OverflowError):
+        scale = 0.0
+    if not np.isfinite(scale) or not scale:
+        raise FormatError(f"angle_scale must be a number other than 0, not {str(angle_scale)[:40]}")
+    file, size = open_source(path)
+    with file:
+        lines = Lines(file, size, path)
+        reader = _Reader(lines, layout, scale)
+        header, first = _header(lines, layout, rate, name)
+        try:
+            reader.read(first)
+            reader.flush()
+        except FormatError as error:
+            reader.flush(salvage=True)
+            if not salvage or not reader.count:
+                raise
+            warnings.warn(
+                f"{error.finding}; salvaged the {reader.count} frames before the damage",
+                FbaWarning,
+                stacklevel=3,
+            )
+    return reader.frames(header)
+
+
+def _header(
+    lines: Lines, layout: Layout, rate: Fraction | None, name: str | None
+) -> tuple[Header, bytes | None]:
+    """The header, and the first mask line where there is no header."""
+    for line in lines:
+        body = content(line)
+        if not body:
+            continue
+        tokens = body.split()
+        if is_mask(tokens):
+            if rate is None:
+                raise lines.error(
+                    "the file begins with frames: it has no header, so its frame rate is unknown"
+                ).with_remedies(GIVE_RATE)
+            return Header("", name or "", rate, None), line
+        # a name may hold a "#": the comment is only cut off where the line makes no sense with it
+        try:
+            header = parse_header(line, lines, rate)
+        except FormatError:
+            if b"#" not in line:
+                raise
+            header = parse_header(body, lines, rate)
+        if header.version not in layout.versions:
+            warnings.warn(
+                f"{lines.path}:{lines.number}: {layout.kind} version {header.version} is unknown "
+                f"(known: {', '.join(layout.versions)}); read like version {layout.version}",
+                FbaWarning,
+                stacklevel=4,
+            )
+        return header if name is None else Header(header.version, name, header.rate, header.frames), None
+    raise lines.error("holds no data, only blank lines and comments")
+
+
+class _Reader:
+    def __init__(self, lines: Lines, layout: Layout, angle_scale: float) -> None:
+        self.lines = lines
+        self.layout = layout
+        self.values = ValueParser(layout, angle_scale)
+        self.count = 0
+        self._masks: dict[bytes, int] = {}
+        self._bits: list[Bool] = []  # distinct masks, each (columns,)
+        self._slots: list[Bool] = []  # what each brings to a frame line, (1 + slots,): the number first
+        self._tokens: list[int] = []  # how many numbers that is
+        self._extra: list[bool] = []  # whether the superfluous column of the mask is 1
+        self._pending: list[Row] = []
+        self._blocks: list[tuple[Int64, Int32, Int64, Int64]] = []  # numbers, slots, masks, lines
+
+    def read(self, first: bytes | None) -> None:
+        mask = None if first is None else self._mask(first)
+        pending_bytes = 0
+        masks, tokens = self._masks, self._tokens
+        for line in self.lines:
+            if mask is None:
+                mask = masks.get(line)
+                if mask is None and content(line):
+                    mask = self._mask(line)
+                continue
+            body = line.partition(b"#")[0] if b"#" in line else line
+            found = len(body.split())
+            if not found:
+                continue
+            if found != tokens[mask]:
+                body = self._unexpected(body, mask)
+            self._pending.append(Row(body, self.lines.number, mask, self._slots[mask]))
+            pending_bytes += len(body)
+            mask = None
+            if len(self._pending) >= BATCH_LINES or pending_bytes >= BATCH_BYTES:
+                self.flush()
+                pending_bytes = 0
+        if mask is not None:
+            raise self.lines.error("the last frame is cut: a mask without values").with_remedies(SALVAGE)
+
+    def flush(self, salvage: bool = False) -> None:
+        """Parse the pending lines; salvage: those before the first damaged one, without raising."""
+        rows, self._pending = self._pending, []
+        if not rows or self._add(rows):
+            return
+        for row in rows:
+            if self._add([row]):
+                continue
+            if salvage:
+                return
+            message, token = self.values.fault(row) or ("the values cannot be read", b"")
+            raise self.lines.error(message, token, row.number)
+
+    def frames(self, header: Header) -> Frames:
+        layout, path = self.layout, self.lines.path
+        if not self._blocks:
+            if header.frames:
+                raise FormatError(f"has a header that promises {header.frames} frames, but none", path=path)
+            empty = np.zeros((0, layout.columns), dtype=bool)
+            return Frames(header, np.zeros(0, np.int64), empty, np.zeros((0, layout.slots), dtype=np.int32))
+        index, slots, masks, numbers = (
+            np.concatenate([block[part] for block in self._blocks]) for part in range(4)
+        )
+        self._blocks.clear()
+        if self.values.rounded:
+            warnings.warn(
+                f"{path}: {self.values.rounded} values are no integers, the first on line "
+                f"{self.values.rounded_line}; rounded half away from zero",
+                FbaWarning,
+                stacklevel=4,
+            )
+        if header.frames is not None and header.frames != len(index):
+            warnings.warn(
+                f"{path}: the header says {header.frames} frames, the file holds {len(index)}; took those",
+                FbaWarning,
+                stacklevel=4,
+            )
+        index = _increasing(index, numbers, path)
+        return Frames(header, index, np.stack(self._bits)[masks], slots)
+
+    def _mask(self, line: bytes) -> int:
+        """The number of this mask, of whatever spelling; FormatError where the line is none."""
+        layout = self.layout
+        tokens = content(line).split()
+        wrong = next((token for token in tokens if token not in (b"0", b"1")), None)
+        widths = " or ".join(map(str, layout.widths))
+        if wrong is not None:
+            what = f"expected a mask line of {widths} bits 0 or 1"
+            if is_header(tokens):
+                what += "; this looks like a second header: split joined files into one each"
+            raise self.lines.error(what, token=wrong)
+        # one program writes a column too many, after the last
+        width = len(tokens) - 1 if len(tokens) - 1 in layout.widths else len(tokens)
+        if width not in layout.widths:
+            cut = len(tokens) < max(layout.widths) and self._at_end()
+            if cut:
+                what = f"the last frame is cut: {len(tokens)} of {widths} mask bits"
+                raise self.lines.error(what).with_remedies(SALVAGE)
+            raise self.lines.error(f"expected a mask of {widths} bits, found {len(tokens)}")
+        bits = np.zeros(layout.columns, dtype=bool)
+        bits[:width] = [token == b"1" for token in tokens[:width]]
+        slots = np.concatenate([[True], bits[layout.parameter]])
+        number = len(self._bits)
+        self._bits.append(bits)
+        self._slots.append(slots)
+        self._tokens.append(int(slots.sum()))
+        self._extra.append(len(tokens) > width and tokens[-1] == b"1")
+        if len(self._masks) < CACHED_MASKS:
+            self._masks[line] = number
+        return number
+
+    def _unexpected(self, body: bytes, mask: int) -> bytes:
+        """The line, mended where a superfluous mask column brought a value; else FormatError."""
+        tokens, wanted = body.split(), self._tokens[mask]
+        if self._extra[mask] and len(tokens) == wanted + 1:
+            return b" ".join(tokens[:-1])
+        found = f"{len(tokens) - 1} values"
+        number = self.lines.number
+        if len(tokens) < wanted and self._at_end():
+            raise self.lines.error(
+                f"the last frame is cut: {found} of {wanted - 1}", line=number, token=tokens[-1]
+            ).with_remedies(SALVAGE)
+        raise self.lines.error(
+            f"the mask above asks for {wanted - 1} values behind the frame number, found {found}",
+            line=number,
+            token=tokens[min(wanted, len(tokens) - 1)],
+        )
+
+    def _at_end(self) -> bool:
+        number = self.lines.number
+        try:
+            return self.lines.ends_here()
+        except FormatError:
+            return False
+        finally:
+            self.lines.number = number
+
+    def _add(self, rows: list[Row]) -> bool:
+        """Take these lines in; False, and nothing done, where anything about them is not as it should be."""
+        parsed = self.values.parse(rows)
+        if parsed is None:
+            return False
+        masks = np.array([row.mask for row in rows], dtype=np.int64)
+        numbers = np.array([row.number for row in rows], dtype=np.int64)
+        self._blocks.append((*parsed, masks, numbers))
+        self.count += len(rows)
+        return True
+
+
+SALVAGE = Remedy("salvage", "{} reads the frames before it", "True")
+
+
+def _increasing(index: Int64, lines: Int64, path: Path) -> Int64:
+    """Frame numbers as they are, or, where they stand still or start again (joined files, programs that
+    always write 0), with each such frame put one after the frame before it."""
+    steps = np.diff(index)
+    back = steps <= 0
+    if not back.any():
+        return index
+    at = int(np.argmax(back)) + 1
+    warnings.warn(
+        f"{path}:{int(lines[at])}: frame number {int(index[at])} comes after {int(index[at - 1])}; "
+        f"{int(back.sum())} frames whose number does not increase follow the frame before them",
+        FbaWarning,
+        stacklevel=5,
+    )
+    renumbered: Int64 = np.concatenate([index[:1], index[0] + np.cumsum(np.where(back, 1, steps))])
+    return renumbered

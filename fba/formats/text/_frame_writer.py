@@ -1,0 +1,65 @@
+"""Write FAP and BAP files: a header line, then a mask line and a value line per frame."""
+
+from __future__ import annotations
+
+import os
+from itertools import accumulate
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.atomic import atomic
+from fba.errors import FormatError
+from fba.formats.text._layout import Layout
+from fba.formats.text.frame_rates import format_rate, parse_rate
+from fba.formats.text.values import FRAME_NUMBER_MAX, Bool, Int32
+from fba.source import Path
+
+BATCH_FRAMES = 2048
+
+
+def write_frames(path: Path, layout: Layout, animation: Animation, slots: Int32, mask: Bool) -> None:
+    """Write what `read_frames` reads back unchanged. slots: int32 (T, slots); mask: bool (T, columns).
+
+    Raises FormatError where the file cannot be written or the text form cannot carry the times.
+    """
+    index = animation.index
+    if len(index) and max(-int(index[0]), int(index[-1])) > FRAME_NUMBER_MAX:
+        raise FormatError(
+            f"frame numbers {int(index[0])}..{int(index[-1])} do not fit this format "
+            f"(at most {FRAME_NUMBER_MAX}); shift or resample the animation",
+            path=path,
+        )
+    rate = format_rate(animation.rate)
+    try:
+        parse_rate(rate)
+    except FormatError as error:
+        raise FormatError("the frame rate is too long a fraction; resample", path=path, token=rate) from error
+    name = _header_name(animation.name) or _header_name(os.path.basename(os.fspath(path))) or "animation"
+    known: dict[bytes, bytes] = {}
+    with atomic(path) as file:
+        file.write(f"{layout.version} {name} {rate} {len(index)}\n".encode())
+        for start in range(0, len(index), BATCH_FRAMES):
+            part = slice(start, start + BATCH_FRAMES)
+            sent = np.concatenate(
+                [np.ones((len(index[part]), 1), dtype=bool), mask[part][:, layout.parameter]], axis=1
+            )
+            table = np.concatenate([index[part, None], slots[part]], axis=1)
+            texts = list(map(str, table[sent].tolist()))
+            ends = list(accumulate(sent.sum(axis=1).tolist(), initial=0))
+            lines: list[bytes] = []
+            for row, bits in enumerate(mask[part]):
+                key = bits.tobytes()
+                if key not in known:
+                    known.clear()  # masks change seldom: the last one is nearly always the next
+                    known[key] = " ".join(map(str, bits.astype(np.int8).tolist())).encode()
+                lines.append(known[key])
+                lines.append(" ".join(texts[ends[row] : ends[row + 1]]).encode())
+            lines.append(b"")
+            file.write(b"\n".join(lines))
+
+
+def _header_name(name: str) -> str:
+    """A name that fits a header line: no line breaks or control characters, single blanks."""
+    clean = "".join(c if c.isprintable() else " " for c in name)
+    return " ".join(clean.split()).encode("utf-8", "replace").decode()

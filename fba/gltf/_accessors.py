@@ -1,0 +1,158 @@
+"""Accessors of glTF 2.0: typed arrays in the bytes of buffers, plain or sparse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.gltf._glb import MAX_BYTES
+from fba.gltf.document import Document
+from fba.gltf.values import Value
+
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+"""Component types by number, as NumPy knows them."""
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+"""How many components an element has."""
+UNSIGNED = (5121, 5123, 5125)
+MAX_ELEMENTS = 1 << 22
+"""Most elements of one accessor: 4 million vertices or indices."""
+
+Array = npt.NDArray[Any]
+Float32 = npt.NDArray[np.float32]
+
+
+class Accessors:
+    """The accessors of a document, each unpacked once and kept; everything is checked before use."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._entries = document.entries("accessors")
+        self._floats: dict[int, Float32] = {}
+        self._integers: dict[int, Array] = {}
+
+    def floats(self, reference: Value, *types: str, count: int | None = None) -> Float32:
+        """float32 (N, width), finite, read-only; integers scaled as the document says.
+
+        reference: a JSON value, the accessor's index. types: allowed element types. count: the N that
+        must be there. Raises ModelError.
+        """
+        index, entry = self._entry(reference)
+        if index not in self._floats:
+            raw = self._read(entry)
+            scaled = _scaled(raw, _flag(entry, "normalized"))
+            if not np.isfinite(scaled).all():
+                row = int(np.argwhere(~np.isfinite(scaled))[0, 0])
+                raise entry.error(f"element {row} is {scaled[row].tolist()}, which is not finite")
+            scaled.flags.writeable = False
+            self._floats[index] = scaled
+        self._check(reference, entry, self._floats[index], types, count)
+        return self._floats[index]
+
+    def integers(self, reference: Value, *types: str, count: int | None = None) -> Array:
+        """The same for unsigned integers, unscaled, in their own dtype."""
+        index, entry = self._entry(reference)
+        if entry.member("componentType").data not in UNSIGNED or _flag(entry, "normalized"):
+            raise reference.error(
+                f"{entry.path} must hold unsigned integers (component type 5121, 5123, 5125)"
+            )
+        if index not in self._integers:
+            raw = self._read(entry)
+            raw = raw.astype(raw.dtype.newbyteorder("="), copy=False)
+            raw.flags.writeable = False
+            self._integers[index] = raw
+        self._check(reference, entry, self._integers[index], types, count)
+        return self._integers[index]
+
+    def _entry(self, reference: Value) -> tuple[int, Value]:
+        index = reference.index(len(self._entries), "accessor")
+        return index, self._entries[index]
+
+    def _check(
+        self, reference: Value, entry: Value, array: Array, types: tuple[str, ...], count: int | None
+    ) -> None:
+        if entry.data["type"] not in types:
+            raise reference.error(
+                f"{entry.path} holds {entry.data['type']} elements, but {' or '.join(types)} are needed"
+            )
+        if count is not None and len(array) != count:
+            raise reference.error(f"{entry.path} has {len(array)} elements, but {count} are needed")
+
+    def _read(self, entry: Value) -> Array:
+        code = entry.member("componentType").integer(0, 1 << 16)
+        if code not in COMPONENTS:
+            raise entry.error(f"componentType {code} is none of {', '.join(map(str, COMPONENTS))}")
+        kind = np.dtype(COMPONENTS[code])
+        word = entry.member("type").text(100)
+        if word not in WIDTHS:
+            raise entry.error(f"type {word!r} is none of {', '.join(WIDTHS)}")
+        width = WIDTHS[word]
+        given = entry.member("count")
+        if isinstance(given.data, int) and given.data > MAX_ELEMENTS:
+            raise given.error(f"more than the {MAX_ELEMENTS} elements that are read; simplify the model")
+        count = given.integer(1, MAX_ELEMENTS)
+        # the raw numbers, and once more as float32
+        self._document.budget.charge(count * width * (kind.itemsize + 4), entry)
+        if entry.get("bufferView") is None:
+            array: Array = np.zeros((count, width), kind)
+        else:
+            offset = _offset(entry)
+            array = self._window(entry.member("bufferView"), offset, count, width, kind, entry)
+        sparse = entry.get("sparse")
+        if sparse is not None:
+            self._substitute(array, sparse, width, kind)
+        return array
+
+    def _substitute(self, array: Array, sparse: Value, width: int, kind: np.dtype[Any]) -> None:
+        count = sparse.member("count").integer(1, len(array))
+        self._document.budget.charge(count * (4 + width * kind.itemsize), sparse)
+        places, values = sparse.member("indices"), sparse.member("values")
+        code = places.member("componentType").integer(0, 1 << 16)
+        if code not in UNSIGNED:
+            raise places.error(f"componentType {code} is no unsigned integer")
+        rows = self._window(
+            places.member("bufferView"), _offset(places), count, 1, np.dtype(COMPONENTS[code]), places
+        )[:, 0].astype(np.int64)
+        if int(rows.max()) >= len(array):
+            raise places.error(f"names element {rows.max()}, but there are {len(array)}")
+        if (np.diff(rows) <= 0).any():
+            raise places.error("the indices do not rise")
+        array[rows] = self._window(values.member("bufferView"), _offset(values), count, width, kind, values)
+
+    def _window(
+        self, reference: Value, offset: int, count: int, width: int, kind: np.dtype[Any], where: Value
+    ) -> Array:
+        """A copy of (count, width) numbers from a buffer view."""
+        data, view = self._document.view(reference)
+        element = width * kind.itemsize
+        given = view.get("byteStride")
+        stride = element if given is None else given.integer(4, 252)
+        if stride < element:
+            raise where.error(f"elements of {element} bytes do not fit the stride of {view.path}, {stride}")
+        end = offset + (count - 1) * stride + element
+        if end > len(data):
+            raise where.error(
+                f"{count} elements from byte {offset} on need {end} bytes, but {view.path} has {len(data)}"
+            )
+        window: Array = np.ndarray((count, width), kind, data, offset, (stride, kind.itemsize))
+        return window.copy()
+
+
+def _offset(entry: Value) -> int:
+    given = entry.get("byteOffset")
+    return 0 if given is None else given.integer(0, MAX_BYTES)
+
+
+def _flag(entry: Value, key: str) -> bool:
+    given = entry.get(key)
+    return False if given is None else given.boolean()
+
+
+def _scaled(raw: Array, normalized: bool) -> Float32:
+    if raw.dtype.kind == "f" or not normalized:
+        return raw.astype(np.float32, copy=False)
+    top = np.float32(np.iinfo(raw.dtype).max)
+    # the lowest signed number has no counterpart, and counts as -1 too
+    scaled: Float32 = np.maximum(raw.astype(np.float32) / top, np.float32(-1.0))
+    return scaled

@@ -1,0 +1,200 @@
+"""Meshes of a glTF file: triangles, attributes, morph targets."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+
+from fba.errors import FbaWarning
+from fba.gltf._accessors import Accessors
+from fba.gltf.document import MAX_ITEMS, Document
+from fba.gltf.scene import Float32, Int32, Mesh, Primitive
+from fba.gltf.values import Value
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+"""Modes of primitives that are surfaces."""
+MODES = 7
+MAX_TARGETS = 4096
+"""Most morph targets of a mesh."""
+MAX_SETS = 8
+"""Most sets of texture coordinates, or of joints, that are looked for."""
+
+
+def read_meshes(document: Document, accessors: Accessors, materials: int) -> tuple[Mesh, ...]:
+    """All meshes, in order; materials: how many there are."""
+    return tuple(
+        _mesh(document, accessors, entry, n, materials) for n, entry in enumerate(document.entries("meshes"))
+    )
+
+
+def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, materials: int) -> Mesh:
+    name = entry.get("name")
+    entries = entry.member("primitives").elements(MAX_ITEMS)
+    found = []
+    for each in entries:
+        document.budget.charge(1024, each)
+        mode = each.get("mode")
+        if mode is not None and mode.integer(0, MODES - 1) < TRIANGLES:
+            warnings.warn(
+                f"{each.file}: {each.path}: points or lines, not triangles; left out",
+                FbaWarning,
+                stacklevel=5,
+            )
+            continue
+        found.append(_Reader(document, accessors, each, materials).primitive())
+    counts = {len(primitive.morphs) for primitive in found}
+    if len(counts) > 1:
+        raise entry.error(f"its primitives have {sorted(counts)} morph targets; all must have as many")
+    count = counts.pop() if counts else 0
+    weights = entry.get("weights")
+    if weights is not None and found and len(weights.elements(MAX_TARGETS)) != count:
+        raise weights.error(f"{len(weights.data)} weights for {count} morph targets")
+    return Mesh(
+        name=f"mesh {number}" if name is None else name.text(),
+        primitives=tuple(found),
+        morph_names=_names(entry, entries, count),
+        weights=(0.0,) * count if weights is None or not found else weights.numbers(count),
+    )
+
+
+def _names(entry: Value, primitives: list[Value], count: int) -> tuple[str, ...]:
+    """Names of the morph targets: from the mesh's extras, as nearly all writers do, or a primitive's."""
+    for holder in (entry, *primitives[:1]):
+        extras = holder.get("extras")
+        names = extras.get("targetNames") if extras is not None and isinstance(extras.data, dict) else None
+        if names is None:
+            continue
+        given = [name.text() for name in names.elements(MAX_TARGETS)]
+        if len(given) == count:
+            return tuple(given)
+        if count:
+            warnings.warn(
+                f"{names.file}: {names.path}: {len(given)} names for {count} morph targets; left aside",
+                FbaWarning,
+                stacklevel=6,
+            )
+    return tuple(f"target {number}" for number in range(count))
+
+
+class _Reader:
+    """Reads one primitive."""
+
+    def __init__(self, document: Document, accessors: Accessors, entry: Value, materials: int) -> None:
+        self._document = document
+        self._accessors = accessors
+        self._entry = entry
+        self._materials = materials
+        self._attributes = entry.member("attributes")
+
+    def primitive(self) -> Primitive:
+        positions = self._accessors.floats(self._attributes.member("POSITION"), "VEC3")
+        count = len(positions)
+        normals = self._attributes.get("NORMAL")
+        joints, weights = self._skinning(count)
+        material = self._entry.get("material")
+        return Primitive(
+            positions=positions,
+            triangles=self._triangles(count),
+            normals=None if normals is None else self._accessors.floats(normals, "VEC3", count=count),
+            texcoords=tuple(
+                self._accessors.floats(value, "VEC2", count=count) for value in self._sets("TEXCOORD")
+            ),
+            colours=self._colours(count),
+            joints=joints,
+            weights=weights,
+            morphs=self._morphs(count),
+            material=None if material is None else material.index(self._materials, "material"),
+        )
+
+    def _sets(self, name: str) -> list[Value]:
+        found = []
+        for number in range(MAX_SETS):
+            value = self._attributes.get(f"{name}_{number}")
+            if value is None:
+                break
+            found.append(value)
+        return found
+
+    def _colours(self, count: int) -> Float32 | None:
+        value = self._attributes.get("COLOR_0")
+        if value is None:
+            return None
+        colours = self._accessors.floats(value, "VEC3", "VEC4", count=count)
+        if colours.shape[1] == 3:
+            self._document.budget.charge(count * 16, value)
+            colours = np.concatenate([colours, np.ones((count, 1), np.float32)], axis=1)
+            colours.flags.writeable = False
+        return colours
+
+    def _skinning(self, count: int) -> tuple[Int32 | None, Float32 | None]:
+        joints, weights = self._sets("JOINTS"), self._sets("WEIGHTS")
+        if len(joints) != len(weights):
+            raise self._attributes.error(f"{len(joints)} sets of JOINTS, but {len(weights)} of WEIGHTS")
+        if not joints:
+            return None, None
+        self._document.budget.charge(count * 32 * len(joints), self._attributes)
+        which = np.concatenate(
+            [self._accessors.integers(value, "VEC4", count=count) for value in joints], axis=1
+        )
+        if int(which.max()) > MAX_ITEMS:
+            raise joints[0].error(f"names joint {which.max()}, more than a file can have")
+        share = np.concatenate(
+            [self._accessors.floats(value, "VEC4", count=count) for value in weights], axis=1
+        )
+        if (share < 0).any():
+            raise weights[0].error("a weight is negative")
+        chosen = which.astype(np.int32)
+        chosen.flags.writeable = share.flags.writeable = False
+        return chosen, share
+
+    def _triangles(self, count: int) -> Int32:
+        mode, reference = self._entry.get("mode"), self._entry.get("indices")
+        if reference is None:
+            self._document.budget.charge(count * 8, self._entry)
+            corners = np.arange(count, dtype=np.int64)
+        else:
+            raw = self._accessors.integers(reference, "SCALAR")[:, 0]
+            self._document.budget.charge(len(raw) * 8, reference)
+            if int(raw.max()) >= count:
+                at = int(raw.argmax())
+                raise reference.error(f"element {at} names vertex {raw.max()}, but there are {count}")
+            corners = raw.astype(np.int64)
+        where = self._entry if reference is None else reference
+        shape = TRIANGLES if mode is None else mode.integer(0, MODES - 1)
+        if shape == TRIANGLES and len(corners) % 3:
+            raise where.error(f"{len(corners)} corners make no whole number of triangles")
+        if shape != TRIANGLES:
+            self._document.budget.charge(len(corners) * 24, where)
+        triangles = _ARRANGED[shape](corners).astype(np.int32)
+        triangles.flags.writeable = False
+        return triangles
+
+    def _morphs(self, count: int) -> tuple[Float32 | None, ...]:
+        found: list[Float32 | None] = []
+        for target in self._entry.elements(MAX_TARGETS, "targets"):
+            self._document.budget.charge(256, target)
+            value = target.get("POSITION")
+            found.append(None if value is None else self._accessors.floats(value, "VEC3", count=count))
+        return tuple(found)
+
+
+Corners = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+
+
+def _strip(corners: Corners) -> Corners:
+    triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    triangles[1::2] = triangles[1::2][:, [1, 0, 2]]  # every other one is listed the other way round
+    return triangles
+
+
+def _fan(corners: Corners) -> Corners:
+    return np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], len(corners[2:]))], axis=1)
+
+
+_ARRANGED: dict[int, Callable[[Corners], Corners]] = {
+    TRIANGLES: lambda corners: corners.reshape(-1, 3),
+    STRIP: _strip,
+    FAN: _fan,
+}

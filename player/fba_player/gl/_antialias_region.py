@@ -1,0 +1,133 @@
+"""Where a view may leave steps in a picture: what lies elsewhere need not be smoothed."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.compiled import is_compiled
+from fba_player.gl._silhouette import Outliner
+from fba_player.view.view import FaceMesh, View
+
+Float64 = npt.NDArray[np.float64]
+
+MARGIN = 0.03
+"""Added on every side, as a share of what is filled."""
+NEAR = 1e-3
+ROW = 64
+STILL = 0.3
+"""What goes with the head by less than this is looked at apart: shoulders are wide, and low."""
+
+
+Rectangle = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Where a picture has to be smoothed.
+
+    rectangles: left, bottom, width and height in pixels. bands: float32 (N, 2), corners of triangles, -1..1
+    across the picture; no two lie over each other.
+    """
+
+    rectangles: list[Rectangle]
+    bands: npt.NDArray[np.float32]
+
+
+def steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner) -> Steps:
+    """Along the outlines of faces, and anywhere in the rectangles that hold what else is drawn.
+
+    matrix: (4, 4), world to clip space. size: of the picture in pixels.
+    """
+    if not is_compiled():
+        return Steps(filled(view, matrix, size), np.zeros((0, 2), dtype=np.float32))
+    outliner.begin(size)
+    for face in view.faces:
+        outliner.add(face, matrix)
+    rest = filled(replace(view, faces=[]), matrix, size)
+    return Steps(rest, outliner.tiles())
+
+
+def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:
+    """Rectangles (left, bottom, width, height), in pixels, that together hold all that is drawn.
+
+    matrix: (4, 4), world to clip space. None of them lies within another.
+    """
+    boxes = [_corners(mesh.positions) @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3] for mesh in view.meshes]
+    boxes += [box for face in view.faces for box in _face_boxes(face)]
+    for round_ in (view.capsules, view.marks):
+        if len(round_):
+            reach = float(round_[:, [3, 7]].max())
+            ends = np.concatenate([round_[:, 0:3], round_[:, 4:7]])
+            boxes.append(_box(ends.min(axis=0) - reach, ends.max(axis=0) + reach))
+    found: list[Rectangle] = []
+    for rectangle in sorted({_rectangle(box, matrix, size) for box in boxes if len(box)}, key=_area):
+        found = [other for other in found if not _within(other, rectangle)]
+        if _area(rectangle):
+            found.append(rectangle)
+    return found
+
+
+def _face_boxes(face: FaceMesh) -> list[Float64]:
+    if not np.any(face.turn):
+        return [_corners(face.positions) @ face.matrix[:3, :3].T + face.matrix[:3, 3]]
+    still = face.shape.sway < STILL
+    found = []
+    for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
+        both = np.concatenate([box, _turned(box, face.turn, face.centre)])  # the neck bends between them
+        found.append(both @ face.matrix[:3, :3].T + face.matrix[:3, 3])
+    return found
+
+
+def _rectangle(places: Float64, matrix: Float64, size: tuple[int, int]) -> Rectangle:
+    clip = np.column_stack([places, np.ones(len(places))]) @ matrix.T
+    if not np.isfinite(clip).all() or (clip[:, 3] < NEAR).any():
+        return (0, 0, *size)
+    flat = clip[:, :2] / clip[:, 3:]
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    grown = MARGIN * (high - low) + 4 / np.array(size)
+    pixels = (np.stack([low - grown, high + grown]) * 0.5 + 0.5) * size
+    left, bottom = np.clip(np.floor(pixels[0]), 0, size).astype(int)
+    right, top = np.clip(np.ceil(pixels[1]), 0, size).astype(int)
+    return int(left), int(bottom), int(right - left), int(top - bottom)
+
+
+def _area(rectangle: Rectangle) -> int:
+    return rectangle[2] * rectangle[3]
+
+
+def _within(one: Rectangle, other: Rectangle) -> bool:
+    return (
+        one[0] >= other[0]
+        and one[1] >= other[1]
+        and one[0] + one[2] <= other[0] + other[2]
+        and one[1] + one[3] <= other[1] + other[3]
+    )
+
+
+def _corners(positions: npt.NDArray[np.float32]) -> Float64:
+    if not len(positions):
+        return np.zeros((0, 3))
+    # Long rows are looked through faster than short ones.
+    whole = len(positions) // ROW * ROW
+    rows = positions[:whole].reshape(-1, 3 * ROW) if whole else positions[:1].repeat(ROW, 0).reshape(1, -1)
+    low = np.concatenate([rows.min(axis=0).reshape(-1, 3), positions[whole:]])
+    high = np.concatenate([rows.max(axis=0).reshape(-1, 3), positions[whole:]])
+    return _box(low.min(axis=0), high.max(axis=0))
+
+
+def _box(low: npt.NDArray[np.floating], high: npt.NDArray[np.floating]) -> Float64:
+    return np.array(list(itertools.product(*zip(low, high, strict=True))), dtype=np.float64)
+
+
+def _turned(places: Float64, turn: Float64, centre: Float64) -> Float64:
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-9:
+        return places
+    axis, arm = turn / angle, places - centre
+    across = np.cross(axis, arm) * np.sin(angle) + np.outer(arm @ axis, axis) * (1 - np.cos(angle))
+    turned: Float64 = arm * np.cos(angle) + across + centre
+    return turned

@@ -1,0 +1,156 @@
+"""Switches -> what is drawn: takes things out of a view, paints it, and adds lines, dots, bones, a legend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.feature_points import names
+from fba_player.figure.face import FaceFigure
+from fba_player.scene._bones import Bones, face_pivots
+from fba_player.scene._fap_heatmap import Influence
+from fba_player.scene._ground import body_grid, face_grid, no_shadows
+from fba_player.scene._wireframe import Wireframe
+from fba_player.view.annotations import Colour, Dots, Extras, Grid
+from fba_player.view.switches import Switches
+from fba_player.view.view import FaceMesh, FaceShape, View
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+LEFT_OUT = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
+"""Kinds of parts that a switch takes out."""
+UNSHADED = (0.9, 0.85, 0.0, 0.25)
+"""The light that reaches everything where nothing casts a shadow."""
+BACKGROUNDS = {"studio": None, "grey": (0.5, 0.5, 0.5), "transparent": (0.5, 0.5, 0.5)}
+"""Colours behind everything; pictures that can be transparent make of the last what it says."""
+HAIRS = ("lash", "brow")
+"""Kinds of parts that are too fine for colours and normals."""
+INSIDE = (*HAIRS, "teeth", "tongue", "mouth", "eye")
+"""Kinds of parts that a body of glass does without."""
+DOT: Colour = (0.98, 0.62, 0.20, 1.0)
+DOT_RADIUS, DOT_SIZE = 3.2, 0.0022
+"""Pixels of a picture 720 high, and at most so many metres."""
+DOT_LIFT, NAME_LIFT = 0.004, 0.006
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """What a view was made from: FAPs (68,), face (4, 4) into the world, joints (J, 4, 4) or None."""
+
+    faps: Float32
+    face: Float64
+    joints: Float64 | None
+
+
+class Dressing:
+    """Applies switches to the views of one face, and of a body with these bones."""
+
+    def __init__(self, figure: FaceFigure, bones: Bones | None) -> None:
+        self._figure = figure
+        self._bones = bones
+        self._wires = Wireframe()
+        self._influence: Influence | None = None
+        self._full: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
+        self._pivots = face_pivots(figure.model, figure.scale)
+        model = figure.model
+        self._known: npt.NDArray[np.bool_] = np.asarray(np.isfinite(model.points).all(axis=1))
+        self._names = tuple(name for name, known in zip(names(), self._known, strict=True) if known)
+        self._scale = figure.scale
+
+    def dressed(self, view: View, switches: Switches, posture: Posture) -> View:
+        """The view as the switches have it."""
+        if not switches.changed:
+            return view
+        view = self._taken_out(view, switches)
+        extras = Extras()
+        number = switches["influence"]
+        if number is not None:
+            paint = self._painter(int(number))
+            faces = paint.painted([mesh for mesh in view.faces if mesh.shape.kind not in HAIRS])
+            view = replace(view, faces=faces, meshes=[*view.meshes, *paint.eyes(view.eyes)], eyes=[])
+            extras = replace(extras, legend=paint.legend)
+        lines = []
+        if switches["wireframe"] or switches["normals"]:
+            view = replace(view, faces=[self._in_full(mesh) for mesh in view.faces])
+        if switches["wireframe"]:
+            lines.append(self._wires.edges(view.faces, view.meshes, view.eyes, self._scale))
+        if switches["normals"]:
+            smooth = [mesh for mesh in view.faces if mesh.shape.kind not in HAIRS]
+            lines.append(self._wires.normals(smooth, self._scale))
+        if switches["skeleton"] != "off":
+            shells = (
+                tuple(mesh for mesh in view.faces if mesh.shape.kind not in INSIDE)
+                if switches["skeleton"] == "through"
+                else ()
+            )
+            extras = replace(extras, shells=shells)
+            view = replace(view, faces=[], eyes=[], meshes=[], capsules=self._skeleton(posture))
+        if switches["grid"]:
+            joints = posture.joints
+            grid = self._bust_grid() if joints is None else body_grid(joints)
+            extras = replace(extras, grid=grid)
+        dots = (self._dots(posture, over=len(view.marks) == 0),) if switches["points"] else ()
+        background = BACKGROUNDS[str(switches["background"])]
+        extras = replace(extras, lines=tuple(lines), dots=dots)
+        return replace(view, extras=extras, background=background)
+
+    def _taken_out(self, view: View, switches: Switches) -> View:
+        hidden = {kind for name, kinds in LEFT_OUT.items() if not switches[name] for kind in kinds}
+        if hidden:
+            view = replace(view, faces=[mesh for mesh in view.faces if mesh.shape.kind not in hidden])
+        if "eye" in hidden:
+            view = replace(view, eyes=[])
+        if not switches["shadows"]:
+            free = np.array(UNSHADED, dtype=np.float32)
+            lit = [np.broadcast_to(free, (len(mesh.places), len(free))) for mesh in view.faces]
+            faces = [replace(mesh, reaching=light) for mesh, light in zip(view.faces, lit, strict=True)]
+            view = replace(view, faces=faces, blobs=no_shadows())
+        return view
+
+    def _bust_grid(self) -> Grid:
+        lowest = float(self._figure.model.vertices[:, 1].min())
+        return face_grid(self._figure.subject, lowest, self._scale)
+
+    def _in_full(self, mesh: FaceMesh) -> FaceMesh:
+        """With all its triangles, however small it is: lines lie on them."""
+        if mesh.shape.coarser is None:
+            return mesh
+        if mesh.shape not in self._full:
+            self._full[mesh.shape] = replace(mesh.shape, coarser=None)
+        return replace(mesh, shape=self._full[mesh.shape])
+
+    def _painter(self, number: int) -> Influence:
+        if self._influence is None or self._influence.fap.number != number:
+            self._influence = Influence(self._figure, number)
+        return self._influence
+
+    def _skeleton(self, posture: Posture) -> Float32:
+        """Capsules of all joints, those of the head's own among them."""
+        turned = posture.face @ self._figure.pose(posture.faps).turn
+        own = self._pivots.capsules(turned)
+        if self._bones is None or posture.joints is None:
+            return own
+        return np.concatenate([self._bones.capsules(posture.joints), own])
+
+    def _dots(self, posture: Posture, *, over: bool) -> Dots:
+        """Feature points; over: whether the dots themselves are to be drawn, not their names alone."""
+        figure, model = self._figure, self._figure.model
+        places = figure.points(posture.faps, posture.face)[self._known]
+        pose = figure.pose(posture.faps)
+        bound = model.bound[self._known]
+        turned = (posture.face @ pose.turn)[:3, :3]
+        ways = np.where(bound[:, None] >= 0, pose.normals[bound] @ turned.T, turned[:, 2])
+        radius = DOT_RADIUS if over else 0.0
+        return Dots(
+            places.astype(np.float32),
+            DOT,
+            radius,
+            (DOT_LIFT if over else NAME_LIFT) * self._scale,
+            self._names,
+            ways.astype(np.float32),
+            DOT_SIZE * self._scale,
+        )

@@ -1,0 +1,149 @@
+"""The face as its feature points: a sphere at every point, thin lines through those that belong together.
+
+Behind them stands the face itself in one dull colour, so that what lies on its far side stays hidden.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.feature_points import row_of
+from fba_player.figure.face import FaceFigure
+from fba_player.mesh.primitives import tube_mesh
+from fba_player.scene._skin_lines import skin_lines
+from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+
+POINT = (*srgb("#f0a04b"), 0.3)
+POINT_RADIUS = 0.00125
+PUPIL_RADIUS = 0.0008
+GHOST = (*srgb("#8b929c"), 0.12)
+EYEBALL = (*srgb("#c9cdd2"), 0.35)
+LEFT_OUT = ("lash", "brow", "hair")
+INSET = 0.0003
+"""The rims of iris and pupil lie this far (m) above the eyeball."""
+RAISED = 0.003
+AROUND = 8
+COLOURS = {
+    "lip": srgb("#e0685f"),
+    "brow": srgb("#2f2a28"),
+    "lid": srgb("#1f3d5c"),
+    "fold": srgb("#54708c"),
+    "plain": srgb("#d3d8de"),
+    "iris": srgb("#2f6f8f"),
+    "pupil": srgb("#101418"),
+}
+RADII = {"lip": 0.0007, "brow": 0.0011, "lid": 0.0006, "fold": 0.0004, "plain": 0.0005, "iris": 0.0005,
+         "pupil": 0.0003}  # fmt: skip
+RING = 24
+"""Steps around an iris."""
+
+
+class PointView:
+    """What a face's feature points look like; everything takes FAPs (68,) and the matrix into the world."""
+
+    def __init__(self, figure: FaceFigure) -> None:
+        self._figure = figure
+        self._lines = skin_lines(figure.model)
+        self._tubes = _Tubes([(line.kind, len(line.corners)) for line in self._lines], RAISED)
+        self._rims: _Tubes | None = None
+        self._ghosts: dict[int, FaceShape] = {}
+        model = figure.model
+        self._known = np.isfinite(model.points).all(axis=1)
+        sizes = np.full(len(model.points), POINT_RADIUS)
+        sizes[[row_of()["3.5"], row_of()["3.6"]]] = PUPIL_RADIUS
+        self._sizes = sizes[self._known] * (model.fapu.ES * 1024 / 0.062)
+
+    def marks(self, faps: Float32, matrix: Float64) -> Float32:
+        """(N, 16) capsules: a sphere at every feature point that the face has."""
+        return spheres(self._figure.points(faps, matrix)[self._known], self._sizes, POINT)
+
+    def eyeballs(self, faps: Float32, matrix: Float64) -> Float32:
+        """(E, 16) capsules: plain eyeballs."""
+        eyes = self._figure.eyes(faps, matrix)
+        if not eyes:
+            return spheres(np.zeros((0, 3)), np.zeros(0), EYEBALL)
+        radii = [float(np.linalg.norm(eye.matrix[:3, 0])) for eye in eyes]
+        return spheres([eye.matrix[:3, 3] for eye in eyes], radii, EYEBALL)
+
+    def ghost(self, faps: Float32, matrix: Float64, *, on_body: bool = False) -> list[FaceMesh]:
+        """The face in one dull colour."""
+        found = []
+        for mesh in self._figure.meshes(faps, matrix, on_body=on_body, without=LEFT_OUT):
+            if id(mesh.shape) not in self._ghosts:
+                colours = np.tile(np.array(GHOST, dtype=np.float32), (len(mesh.positions), 1))
+                self._ghosts[id(mesh.shape)] = replace(
+                    mesh.shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0)
+                )
+            found.append(replace(mesh, shape=self._ghosts[id(mesh.shape)]))
+        return found
+
+    def meshes(self, faps: Float32, matrix: Float64) -> list[Mesh]:
+        """The lines, and the rims of irises and pupils."""
+        pose = self._figure.pose(faps)
+        found = []
+        if self._lines:
+            places = np.concatenate([line.places(pose.positions) for line in self._lines])
+            inside = places.mean(axis=0)
+            inside[2] = places[:, 2].min()
+            found.append(self._tubes.mesh(places, inside, matrix @ pose.turn))
+        rings, middle = self._rings(faps, matrix)
+        if len(rings):
+            if self._rims is None:
+                self._rims = _Tubes([(kind, RING + 1) for _ in rings[::2] for kind in ("iris", "pupil")])
+            found.append(self._rims.mesh(np.concatenate(rings), middle, np.eye(4)))
+        return found
+
+    def _rings(self, faps: Float32, matrix: Float64) -> tuple[list[Float64], Float64]:
+        """Rims of iris and pupil of every eye in the world, (RING + 1, 3) each, and a place behind them."""
+        turn = np.linspace(0, 2 * np.pi, RING + 1)
+        found, behind = [], np.zeros(3)
+        for eye in self._figure.eyes(faps, matrix):
+            radius = float(np.linalg.norm(eye.matrix[:3, 0]))
+            behind = eye.matrix[:3, 3] - eye.axes[:, 2]
+            for share in (eye.iris, eye.pupil):
+                ring = [np.cos(turn) * share, np.sin(turn) * share, np.full(len(turn), np.sqrt(1 - share**2))]
+                local = np.stack(ring, axis=1) * (1 + INSET / radius)
+                found.append(local @ eye.matrix[:3, :3].T + eye.matrix[:3, 3])
+        return found, behind
+
+
+class _Tubes:
+    """Tubes along lines of a kind and a number of places each; only the places change."""
+
+    def __init__(self, lines: list[tuple[str, int]], raised: float = 0.0) -> None:
+        self._lengths = [count for _, count in lines]
+        self._radii = np.concatenate([np.zeros(0), *(np.full(count, RADII[kind]) for kind, count in lines)])
+        colours = [np.tile([*COLOURS[kind], 0.0], (count * AROUND, 1)) for kind, count in lines]
+        starts = np.cumsum([0, *self._lengths[:-1]]) * AROUND
+        triangles = [tube_mesh(n, AROUND) + start for n, start in zip(self._lengths, starts, strict=False)]
+        self._shape = MeshShape(
+            np.concatenate([np.zeros((0, 3)), *triangles]).astype(np.int32),
+            np.concatenate([np.zeros((0, 4)), *colours]).astype(np.float32),
+            two_sided=True,
+            raised=raised,
+        )
+
+    def mesh(self, places: Float64, inside: Float64, matrix: Float64) -> Mesh:
+        """Tubes along places (N, 3), all lines one after the other; inside: a place deep in the head."""
+        along = np.concatenate([
+            np.gradient(line, axis=0) for line in np.split(places, np.cumsum(self._lengths)[:-1])
+        ])  # fmt: skip
+        # Lines lie on a head: what points out of it is never along one.
+        aside = _unit(np.cross(along, places - inside))
+        out = _unit(np.cross(aside, along))
+        turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+        normals = aside[:, None] * np.cos(turn)[:, None] + out[:, None] * np.sin(turn)[:, None]
+        positions = places[:, None] + normals * self._radii[:, None, None]
+        flat = [part.reshape(-1, 3).astype(np.float32) for part in (positions, normals)]
+        return Mesh(self._shape, flat[0], flat[1], matrix)
+
+
+def _unit(vectors: Float64) -> Float64:
+    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return unit

@@ -1,0 +1,122 @@
+"""Draws open panels where `Docks` puts them, or where the user has moved them."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from fba_player.session.session import Session
+from fba_player.ui._docks import EDGE, GAP, Dock, Docks, Wish, free_middle
+from fba_player.ui.panels.panel import Panel
+
+TOP = 56.0
+"""Where panels begin below the buttons."""
+
+
+_FLAGS = imgui.WindowFlags_
+FREE = int(_FLAGS.no_saved_settings | _FLAGS.no_collapse)
+DOCKED = int(FREE | _FLAGS.no_resize | _FLAGS.no_bring_to_front_on_focus)
+FOLDED = int(_FLAGS.no_scrollbar | _FLAGS.no_scroll_with_mouse)
+OVER = 0.985
+"""How opaque a panel is that covers others."""
+
+
+class Places:
+    """Where panels are: in columns, until the user drags one away by its title.
+
+    A click on the title of a folded one unfolds it; a double click on the title of one that was moved brings
+    it back. sides: shares of the display's width that columns cover at the left and the right.
+    """
+
+    def __init__(self) -> None:
+        self.sides = (0.0, 0.0)
+        self._docks = Docks()
+        self._needed: dict[str, float] = {}
+        self._moved: set[str] = set()
+        self._focused = ""
+
+    def draw(self, panels: list[Panel], session: Session, display: tuple[float, float], below: float) -> None:
+        """Draw open panels; `below`: points at the bottom that are taken."""
+        wide, high = display
+        room = high - TOP - below - GAP
+        self.sides = (0.0, 0.0)
+        if room < 60 or wide < 120:
+            return
+        docked = [one for one in panels if one.side != "middle" and one.name not in self._moved]
+        docks = self._docks.arrange([self._wish(one) for one in docked], wide, TOP, room)
+        self.sides = free_middle(docks.values(), wide)
+        for panel in panels:
+            if panel in docked:
+                if panel.name in docks:
+                    self._draw_docked(panel, session, docks[panel.name])
+            else:
+                self._draw_free(panel, session, display, room)
+
+    def forget(self, names: set[str]) -> None:
+        """These have been closed, and open where they belong again."""
+        self._moved -= names
+
+    def _wish(self, panel: Panel) -> Wish:
+        height = panel.height
+        if panel.fitted:
+            height = self._needed.get(panel.name, height)
+        return Wish(panel.name, panel.side, panel.width, height, panel.least)
+
+    def _draw_docked(self, panel: Panel, session: Session, dock: Dock) -> None:
+        imgui.set_next_window_pos((dock.left, dock.top))
+        imgui.set_next_window_size((dock.width, dock.height))
+        if not self._window(panel, session, DOCKED | (FOLDED if dock.folded else 0), folded=dock.folded):
+            session.open.discard(panel.name)
+
+    def _draw_free(self, panel: Panel, session: Session, display: tuple[float, float], room: float) -> None:
+        wide = min(panel.width, display[0] - 2 * EDGE)
+        if panel.name not in self._moved:
+            high = min(panel.height, room)
+            place = ((display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2)
+            imgui.set_next_window_pos(place, imgui.Cond_.always)
+            imgui.set_next_window_size((wide, high), imgui.Cond_.always)
+            imgui.set_next_window_bg_alpha(OVER)
+        imgui.set_next_window_size_constraints((min(200, wide), 60), (display[0], max(room, 60)))
+        if not self._window(panel, session, FREE, folded=False):
+            session.open.discard(panel.name)
+
+    def _window(self, panel: Panel, session: Session, flags: int, *, folded: bool) -> bool:
+        """Draw one; False where it is to be closed."""
+        imgui.push_style_var(imgui.StyleVar_.window_min_size, (32, 1))
+        expanded, kept = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
+        imgui.pop_style_var()
+        if expanded and not folded:
+            panel.draw(session)
+            if panel.fitted:
+                style = imgui.get_style()
+                self._needed[panel.name] = (
+                    imgui.get_cursor_pos_y() - style.item_spacing.y + style.window_padding.y
+                )
+        self._hold(panel, folded=folded)
+        imgui.end()
+        return bool(kept)
+
+    def _hold(self, panel: Panel, *, folded: bool) -> None:
+        """What the mouse does with the title, and which panel is in use."""
+        name = panel.name
+        focused = imgui.is_window_focused(imgui.FocusedFlags_.root_and_child_windows)
+        if focused and self._focused != name:  # clicked, or opened
+            self._focused = name
+            self._docks.use(name)
+        if not self._on_title():
+            return
+        if name in self._moved:
+            if imgui.is_mouse_double_clicked(0):
+                self._moved.discard(name)
+        elif imgui.is_mouse_dragging(0):
+            self._moved.add(name)
+            if folded:
+                imgui.set_window_size((panel.width, self._wish(panel).height))
+
+    @staticmethod
+    def _on_title() -> bool:
+        """Whether the mouse has hold of the title of the window that is being drawn."""
+        x, y = imgui.get_window_pos()
+        start_x, start_y = imgui.get_mouse_pos() - imgui.get_mouse_drag_delta(0)
+        on_title = y <= start_y <= y + imgui.get_frame_height()
+        focused = imgui.is_window_focused(imgui.FocusedFlags_.root_window)
+        return bool(focused and on_title and x <= start_x <= x + imgui.get_window_width())

@@ -1,0 +1,191 @@
+"""The course of single FAPs and BAPs over all frames of a performance, for curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.face.resolve import Resolver
+from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+
+BLOCK = 512
+"""Frames of a face worked out at once: about two milliseconds."""
+UNTOLD = 0.5
+"""What a FAP that is only filled in counts beside those that are sent."""
+TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
+"""What counts as moving as much as a FAP at full: degrees, millimetres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One parameter over time.
+
+    kind: "fap" or "bap". times: seconds (T,); values (T,) as they are shown, in its unit; sent (T,), where
+    a frame says so itself.
+    """
+
+    kind: str
+    number: int
+    times: Float64
+    values: Float64
+    sent: Bool
+
+
+class Columns:
+    """Courses of a timeline's parameters; what is looked at is worked out when it is needed.
+
+    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds by which
+    it is shown later than its own times say.
+    """
+
+    def __init__(self, timeline: Any, model: Any = None, later: float = 0.0) -> None:
+        self._timeline = timeline
+        self._later = later
+        self._resolver = Resolver(model)
+        self._shown: npt.NDArray[np.float32] = np.zeros((0, FAP_COUNT), np.float32)
+        self._done = 0
+        self._bodies = 0
+        self._times: Float64 = np.zeros(0)
+        self._kept: dict[tuple[str, int], Course] = {}
+
+    @property
+    def has_face(self) -> bool:
+        """Whether it has FAPs."""
+        return self._timeline.animation.face is not None
+
+    @property
+    def has_body(self) -> bool:
+        """Whether it has BAPs."""
+        return self._timeline.animation.body is not None
+
+    @property
+    def known(self) -> float:
+        """The share of the frames whose FAPs have been worked out."""
+        return self._done / max(self._timeline.frames, 1) if self.has_face else 1.0
+
+    def advance(self, blocks: int = 1) -> bool:
+        """Work out the next frames; whether there are more. Called for each picture, it holds none up."""
+        timeline = self._timeline
+        frames, animation = timeline.frames, timeline.animation
+        if frames == len(self._times) and self.known >= 1.0:
+            return False
+        if frames != len(self._times):
+            index = np.asarray(animation.index[:frames])
+            self._times = index / float(timeline.rate) + self._later
+            self._kept = {key: course for key, course in self._kept.items() if key[0] == "fap"}
+        if animation.face is None:
+            return False
+        if len(self._shown) < frames:
+            grown = np.zeros((max(frames, len(self._shown) * 5 // 4), FAP_COUNT), np.float32)
+            grown[: self._done] = self._shown[: self._done]
+            self._shown = grown
+        for _ in range(blocks):
+            stop = min(self._done + BLOCK, frames)
+            if stop > self._done:
+                self._shown[self._done : stop] = self._resolver.push(animation.face[self._done : stop])
+                self._done = stop
+        self._kept = {key: course for key, course in self._kept.items() if key[0] == "bap"}
+        return bool(self._done < frames)
+
+    def course(self, kind: str, number: int) -> Course:
+        """A parameter's course, as far as it is known; the same object until more is."""
+        key = (kind, number)
+        if key not in self._kept:
+            self._kept[key] = self._fap(number) if kind == "fap" else self._bap(number)
+        return self._kept[key]
+
+    def movers(self, count: int) -> list[tuple[str, int]]:
+        """(kind, number) of those that move most, each measured by what is a lot for it; the most first.
+
+        Of FAPs that are each other's mates, one.
+        """
+        found: list[tuple[float, str, int]] = []
+        animation, frames = self._timeline.animation, len(self._times)
+        if animation.face is not None and self._done:
+            shown = self._shown[: self._done]
+            span = shown.max(axis=0) - shown.min(axis=0)
+            told = np.where(animation.face.mask[: self._done].any(axis=0), 1.0, UNTOLD)
+            found += [
+                (float(span[number - 1] * told[number - 1]) / fap_reach(number), "fap", number)
+                for number in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1)
+            ]
+        if animation.body is not None and frames:
+            values, mask = animation.body.values[:frames], animation.body.mask[:frames]
+            low = np.min(values, axis=0, where=mask, initial=2**31 - 1)
+            high = np.max(values, axis=0, where=mask, initial=-(2**31))
+            for number in range(1, BAP_COUNT + 1):
+                span_here = max(float(high[number - 1]) - float(low[number - 1]), 0.0)
+                found.append((span_here / bap_reach(number), "bap", number))
+        found.sort(key=lambda one: (-one[0], one[1:]))
+        chosen: list[tuple[str, int]] = []
+        for most, kind, number in found:
+            if most > 0 and not _alike(kind, number, chosen):
+                chosen.append((kind, number))
+        return chosen[:count]
+
+    def _fap(self, number: int) -> Course:
+        face, done = self._timeline.animation.face, self._done
+        if face is None:
+            return _nothing("fap", number)
+        values = self._shown[:done, number - 1].astype(np.float64)
+        return Course("fap", number, self._times[:done], values, np.asarray(face.mask[:done, number - 1]))
+
+    def _bap(self, number: int) -> Course:
+        body, frames = self._timeline.animation.body, len(self._times)
+        if body is None:
+            return _nothing("bap", number)
+        sent = np.asarray(body.mask[:frames, number - 1])
+        values = np.asarray(body.values[:frames, number - 1]).astype(np.float64)
+        if not sent.all():  # each frame shows what was sent last
+            last = np.maximum.accumulate(np.where(sent, np.arange(frames), -1))
+            values = np.where(last >= 0, values[np.maximum(last, 0)], 0.0)
+        return Course("bap", number, self._times, values, sent)
+
+
+def parameter(kind: str, number: int) -> Fap | Bap:
+    """The table's row of a "fap" or "bap"."""
+    return faps()[number - 1] if kind == "fap" else baps()[number - 1]
+
+
+def amount(kind: str, number: int, value: float) -> tuple[str, str]:
+    """(number, unit) of a value as people read it: angles in degrees, others as they are coded."""
+    row = parameter(kind, number)
+    if row.unit in ("AU", "1e-5 rad"):
+        return f"{np.degrees(value * 1e-5):.1f}", "deg"
+    return f"{value:.0f}", "" if row.unit == "user defined" else row.unit
+
+
+def fap_reach(number: int) -> float:
+    """What is a lot for a FAP, in its unit: what the gallery shows of it."""
+    from fba_player.ui.panels._puppet_rows import reach
+
+    return reach(number)
+
+
+def bap_reach(number: int) -> float:
+    """What is a lot for a BAP, in its unit."""
+    shift = baps()[number - 1].unit == "mm"
+    root = number >= bap_numbers()["HumanoidRoot_tr_vertical"]
+    if shift:
+        return TYPICAL_SHIFT
+    return float(np.radians(TYPICAL_ANGLE * (2 if root else 1)) * 1e5)
+
+
+def _alike(kind: str, number: int, chosen: list[tuple[str, int]]) -> bool:
+    """Whether it is the mate of a FAP that has been chosen, on the other side or on the other lip contour."""
+    if kind != "fap":
+        return False
+    fap = faps()[number - 1]
+    mates = {fap.left_right_mate, fap.lip_mate} - {None}
+    mates |= {faps()[mate - 1].left_right_mate for mate in mates if mate is not None}
+    return any(("fap", mate) in chosen for mate in mates)
+
+
+def _nothing(kind: str, number: int) -> Course:
+    return Course(kind, number, np.zeros(0), np.zeros(0), np.zeros(0, bool))

@@ -1,0 +1,136 @@
+"""F5: curves of chosen FAPs and BAPs over time."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from imgui_bundle import imgui
+
+from fba_player.session.session import Session
+from fba_player.ui import theme
+from fba_player.ui.panels._curve_data import Columns, amount, parameter
+from fba_player.ui.panels._curve_plot import COLOURS, Lane, Lanes
+from fba_player.ui.panels._parameter_chooser import Chooser
+from fba_player.ui.panels._time_zoom import Stretch
+from fba_player.ui.panels.panel import Panel, chosen_name, tooltip
+
+BEGINS_WITH = 3
+"""Curves that are there at first: those that move most."""
+MOVERS = 8
+
+
+class CurvesPanel(Panel):
+    """One curve below the other, each with its least and largest value and the one now."""
+
+    name, title, label = "curves", "Curves", "Curves"
+    side = "left"
+    width, height, least = 430.0, 282.0, 176.0
+
+    def __init__(self) -> None:
+        self._columns: Columns | None = None
+        self._of: Any = None
+        self._begun = False
+        self.which = 0
+        """Of several performances, the one whose curves are shown."""
+        self._lanes: list[Lane] = []
+        self.stretch = Stretch()
+        self.lanes = Lanes()
+        self.chooser = Chooser()
+
+    def available(self, session: Session) -> bool:
+        """Where there are parameters."""
+        return _timeline(session) is not None
+
+    def draw(self, session: Session) -> None:
+        """Draw it."""
+        names = getattr(session.scene, "names", ())
+        if len(names) > 1:
+            self.which = chosen_name("##which", names, min(self.which, len(names) - 1))
+        columns = self._known(session)
+        transport = session.transport
+        self.stretch.bound(
+            transport.start, float(session.scene.timeline.time_of(session.scene.timeline.frames - 1))
+        )
+        self._tools(session, columns)
+        chosen = [("fap", n) for n in session.selection.faps] + [("bap", n) for n in session.selection.baps]
+        if not chosen:
+            imgui.dummy((0, 6))
+            imgui.text_colored(theme.FAINT, "Choose FAPs or BAPs, or show those that move most.")
+            return
+        courses = [columns.course(kind, number) for kind, number in chosen]
+        if [lane.course for lane in self._lanes] != courses:
+            self._lanes = [_lane(course, place) for place, course in enumerate(courses)]
+        self.lanes.draw(session, self._lanes, self.stretch, _now(session, chosen, self.which))
+
+    def closed(self, session: Session) -> None:
+        """What has been worked out is kept."""
+        session.rolling.discard(self.name)
+
+    def _known(self, session: Session) -> Columns:
+        timeline = _timeline(session, self.which)
+        if self._columns is None or self._of is not timeline:
+            later = getattr(session.scene.timeline, "later", (0,))[self.which]
+            scene = getattr(session.scene, "scenes", (session.scene,))[self.which]
+            self._columns = Columns(timeline, getattr(scene, "model", None), float(later))
+            self._of, self._begun = timeline, False
+        if self._columns.advance():
+            session.rolling.add(self.name)
+        else:
+            session.rolling.discard(self.name)
+        if not self._begun and self._columns.known >= 1.0:
+            self._begun = True
+            if not (session.selection.faps or session.selection.baps):
+                _choose(session, self._columns.movers(BEGINS_WITH))
+        return self._columns
+
+    def _tools(self, session: Session, columns: Columns) -> None:
+        self.chooser.draw(session, face=columns.has_face, body=columns.has_body)
+        imgui.same_line()
+        if imgui.button("Most moving"):
+            _choose(session, columns.movers(MOVERS))
+        tooltip(f"the {MOVERS} that move most")
+        imgui.same_line()
+        if imgui.button("None"):
+            _choose(session, [])
+        if columns.known < 1.0:
+            imgui.same_line()
+            imgui.text_colored(theme.FAINT, f"{columns.known:.0%}")
+        elif not self.stretch.whole:
+            imgui.same_line()
+            if imgui.button("All of it"):
+                self.stretch.reset()
+            tooltip("the whole time again; the wheel zooms, a right drag moves")
+
+
+def _timeline(session: Session, which: int = 0) -> Any:
+    """Of what is shown, or of one of several."""
+    scenes = getattr(session.scene, "scenes", None)
+    timeline = scenes[which].timeline if scenes else session.scene.timeline
+    return timeline if hasattr(timeline, "animation") else None
+
+
+def _choose(session: Session, chosen: list[tuple[str, int]]) -> None:
+    session.selection.faps = [number for kind, number in chosen if kind == "fap"]
+    session.selection.baps = [number for kind, number in chosen if kind == "bap"]
+
+
+def _lane(course: Any, place: int) -> Lane:
+    row = parameter(course.kind, course.number)
+    write = partial(amount, course.kind, course.number)
+    return Lane(course, f"{row.number} {row.name}", write, COLOURS[place % len(COLOURS)])
+
+
+def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tuple[str, int], float]:
+    """Values of this moment: with what hooks make of them."""
+    kinds = {kind for kind, _ in chosen}
+    if session.before_frame:
+        faps, baps = session.values
+    else:
+        whole: Any = session.scene.timeline
+        timeline, time = _timeline(session, which), session.transport.time
+        if timeline is not whole:
+            time = whole.own_time(which, time)
+        faps = timeline.faps(time) if "fap" in kinds else session.values[0]
+        baps = timeline.baps(time) if "bap" in kinds else session.values[1]
+    return {(kind, n): float((faps if kind == "fap" else baps)[n - 1]) for kind, n in chosen}

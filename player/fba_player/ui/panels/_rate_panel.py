@@ -1,0 +1,181 @@
+"""F6: the bit rate over time, the bits of each plane, and what I and P planes take together."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+from imgui_bundle import imgui
+
+from fba.animation import Animation
+from fba.codec import StreamInfo
+from fba_player.playback.timecode import clock_text
+from fba_player.session.session import Session
+from fba_player.ui import theme
+from fba_player.ui.panels._bit_rates import Rates, columns, encoded, rates
+from fba_player.ui.panels._curve_data import Course
+from fba_player.ui.panels._curve_plot import CURVE, WORDS, Lane, Lanes
+from fba_player.ui.panels._time_zoom import Stretch
+from fba_player.ui.panels.panel import Panel, tooltip
+from fba_player.ui.ruler import Ruler
+
+BARS = 34.0
+"""Points of height of the largest plane."""
+LITTLE = 0.02
+"""What is around the planes is told from this share on."""
+ALL_COLUMNS = 340.0
+"""Points of width for the whole table; one column less is in a narrower one."""
+STEP = 3.0
+"""Points that a bar takes with the gap beside it, at least."""
+
+
+class RatePanel(Panel):
+    """kbit/s in the last second, a bar for each plane, and a table; of no stream, what it would take."""
+
+    name, title, label = "rate", "Bit rate", "Bit rate"
+    side = "left"
+    width, height, least = 430.0, 238.0, 230.0
+
+    def __init__(self) -> None:
+        self._rates: tuple[StreamInfo, Rates | None, list[Lane]] | None = None
+        self._bars: tuple[tuple[object, ...], list[tuple[float, float, float, bool]]] = ((), [])
+        self._would: tuple[Any, list[StreamInfo | None]] | None = None
+        self.stretch = Stretch()
+        self.lanes = Lanes()
+        self.bars = (0.0, 0.0, 0.0, 0.0)
+        """Where the bars of the planes are: left, top, right, bottom in points; for tests."""
+
+    def available(self, session: Session) -> bool:
+        """Where one performance is shown."""
+        return not hasattr(session.scene, "scenes")
+
+    def draw(self, session: Session) -> None:
+        """Draw it."""
+        info, own = self._stream(session)
+        if info is None:
+            imgui.text_colored(theme.FAINT, own)
+            return
+        if self._rates is None or self._rates[0] is not info:
+            found = rates(info)
+            self._rates = (info, found, _lanes(found, own) if found is not None else [])
+        _, found, lanes = self._rates
+        if found is None:
+            imgui.text_colored(theme.FAINT, "There are no planes.")
+            return
+        transport = session.transport
+        self.stretch.bound(transport.start, max(float(found.times[-1]), transport.start))
+        high = BARS + 6 + imgui.get_text_line_height_with_spacing() * 2.5
+        imgui.begin_child("rate", (0, max(imgui.get_content_region_avail().y - high, WORDS + CURVE + 24)))
+        row = _row(found, transport.time) - (len(found.times) - len(found.rate))
+        now = {("rate", 0): float(found.rate[row])} if row >= 0 else {}
+        self.lanes.draw(session, lanes, self.stretch, now)
+        imgui.end_child()
+        self._planes(session, found)
+        _table(found)
+
+    def closed(self, session: Session) -> None:
+        """What has been worked out is kept."""
+        session.rolling.discard(self.name)
+
+    def _stream(self, session: Session) -> tuple[StreamInfo | None, str]:
+        """What is measured, and a word about it where it is not the file itself."""
+        info = session.source.info
+        if info.plane_bits is not None:
+            return info, ""
+        if session.source.looking:
+            return None, "Reading..."
+        animation = getattr(session.scene, "animation", None)
+        if not isinstance(animation, Animation):
+            return None, "There are no planes."
+        if self._would is None or self._would[0] is not animation:
+            result: list[StreamInfo | None] = []
+            self._would = (animation, result)
+            threading.Thread(
+                target=lambda: result.append(encoded(animation)), name="fba rate", daemon=True
+            ).start()
+        if not self._would[1]:
+            session.rolling.add(self.name)
+            return None, "Encoding, to see what it would take..."
+        session.rolling.discard(self.name)
+        would = self._would[1][0]
+        return would, "if encoded" if would else "No stream."
+
+    def _planes(self, session: Session, found: Rates) -> None:
+        """The bars; a click seeks."""
+        left, top = imgui.get_cursor_screen_pos()
+        wide = max(imgui.get_content_region_avail().x, 8.0)
+        imgui.invisible_button("planes", (wide, BARS))
+        ruler = Ruler(self.stretch.low, self.stretch.high, left, left + wide)
+        self.bars = (left, top, left + wide, top + BARS)
+        mouse = imgui.get_io().mouse_pos.x
+        if imgui.is_item_active():
+            session.touched()
+            session.transport.seek(ruler.time(mouse))
+        elif imgui.is_item_hovered():
+            row = _row(found, ruler.time(mouse))
+            kind = "I" if found.intra[row] else "P"
+            imgui.set_tooltip(f"{clock_text(found.times[row])}   {kind} plane, {found.bits[row]:.0f} bits")
+        to = imgui.get_window_draw_list()
+        to.add_rect_filled(
+            (left, top), (left + wide, top + BARS), theme.packed((0, 0, 0, 0.22)), rounding=3.0
+        )
+        plain, key = theme.packed(theme.ACCENT, 0.75), theme.packed(theme.WARM)
+        for x, right, tall, intra in self._made(found, wide):
+            to.add_rect_filled(
+                (left + x, top + BARS - tall), (left + right, top + BARS), key if intra else plain
+            )
+        at = ruler.x(session.transport.time)
+        if self.stretch.low <= session.transport.time <= self.stretch.high:
+            to.add_line((at, top), (at, top + BARS), theme.packed(theme.TEXT, 0.8))
+
+    def _made(self, found: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
+        """(left, right, height, I plane) of the bars; kept until something changes."""
+        stretch = self.stretch
+        made_for = (found, stretch.low, stretch.high, wide)
+        if self._bars[0] == made_for:
+            return self._bars[1]
+        inside = int(((found.times >= stretch.low) & (found.times <= stretch.high)).sum())
+        count = max(min(int(wide / STEP), inside), 1)
+        tall, intra = columns(found.times, found.bits, found.intra, stretch.low, stretch.high, count)
+        heights = np.where(tall > 0, 2 + (BARS - 6) * np.sqrt(tall / max(float(found.bits.max()), 1.0)), 0.0)
+        each = wide / count
+        bars = [
+            (place * each, (place + 1) * each - (1 if each >= STEP else 0), float(height), bool(key))
+            for place, (height, key) in enumerate(zip(heights, intra, strict=True))
+            if height
+        ]
+        self._bars = (made_for, bars)
+        return bars
+
+
+def _lanes(found: Rates, word: str) -> list[Lane]:
+    count = len(found.rate)
+    course = Course("rate", 0, found.times[-count:], found.rate, np.ones(count, bool))
+    title = f"{word or 'in one second'}; {found.mean:.2f} on average"
+    return [Lane(course, title, lambda value: (f"{value:.2f}", "kbit/s"), theme.ACCENT)]
+
+
+def _row(found: Rates, time: float) -> int:
+    """The plane shown at a time."""
+    return int(np.clip(np.searchsorted(found.times, time + 1e-6, side="right") - 1, 0, len(found.times) - 1))
+
+
+def _table(found: Rates) -> None:
+    narrow = imgui.get_content_region_avail().x < ALL_COLUMNS
+    if not imgui.begin_table("totals", 4 if narrow else 5, imgui.TableFlags_.sizing_fixed_fit):
+        return
+    for total in found.totals:
+        if total.planes is None and total.share < LITTLE:
+            continue
+        imgui.table_next_row()
+        count = "" if total.planes is None else f"{total.planes} plane{'s' * (total.planes != 1)}"
+        mean = f"{total.bits / total.planes:.0f} bits each" if total.planes else ""
+        cells = [total.name, count, mean, f"{total.bits / 8:.0f} bytes", f"{total.share:.1%}"]
+        if narrow:
+            del cells[3]
+        for place, text in enumerate(cells):
+            imgui.table_next_column()
+            imgui.text_colored(theme.FAINT if place else theme.TEXT, text)
+    imgui.end_table()
+    tooltip("the height of a bar goes with the square root of its bits")

@@ -1,0 +1,307 @@
+"""The player's window: glfw for window and input, moderngl for the picture, imgui for the panels."""
+
+from __future__ import annotations
+
+import os
+import time as wall
+import warnings
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from fba.errors import DisplayError, FbaWarning
+from fba_player.gl.context import import_moderngl
+from fba_player.gl.framebuffer import Target
+from fba_player.gl.renderer import Renderer
+from fba_player.gl.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
+from fba_player.playback.transport import Transport
+from fba_player.session.captures import Keeper
+from fba_player.session.controls import Controls
+from fba_player.session.session import Session
+from fba_player.session.source import Source
+from fba_player.session.stills import pixels_of, still
+from fba_player.view.camera import Camera
+from fba_player.window._fullscreen import FullScreen
+from fba_player.window._glfw_input import GlfwInput
+from fba_player.window._plain_overlay import Overlay
+from fba_player.window.display import HOW_WITHOUT, started_glfw
+
+if TYPE_CHECKING:
+    from fba_player.view.protocols import Showable
+
+PathLike = str | os.PathLike[str]
+
+LOST = (
+    "OpenGL stopped working ({reason}): the graphics driver was reset, or has no memory left. Start the "
+    "player again; a smaller window, or LIBGL_ALWAYS_SOFTWARE=1 (drawing without the graphics card), may help"
+)
+IDLE = 0.05
+"""Seconds between looks at the input while nothing moves."""
+FASTEST = 1 / 250
+"""Least seconds a picture takes, where the display does not set the pace."""
+WARNED = 12.0
+"""Seconds for which it shows what was wrong with what was read."""
+IDLE_MOUSE = 3.0
+"""Seconds after which the mouse hides itself on a full screen, while playing."""
+SETTLES = 4
+"""Pictures drawn after an input, until panels have settled."""
+
+
+class Window:
+    """A window that shows a scene; see `player.play`. A context manager; one at a time, in the main thread.
+
+    panels: False for the plain timeline without panels, which there also is where imgui is missing. folder:
+    where pictures and films go, by default the current one.
+    """
+
+    def __init__(
+        self,
+        scene: Showable,
+        *,
+        title: str | None = None,
+        size: tuple[int, int] = (1280, 720),
+        camera: Camera | str | None = None,
+        loop: bool = True,
+        source: Source | None = None,
+        panels: bool = True,
+        folder: PathLike | None = None,
+    ) -> None:
+        if size[0] < 1 or size[1] < 1:
+            raise ValueError(f"a window must have at least 1x1 pixels, not {size[0]}x{size[1]}")
+        timeline: Any = scene.timeline
+        self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=camera, size=size)
+        self.keeper = Keeper(self.session, folder)
+        self.pictures = 0
+        self._title = title or scene.title or "fba"
+        self._shown_title = ""
+        self._target: Target | None = None
+        self._renderer: Renderer | None = None
+        self._overlay: Overlay | None = None
+        self._gui: Any = None
+        self._gl: Any = None
+        self._window: Any = None
+        self._problems: list[str] = []
+        self._due, self._restless = SETTLES, False
+        self._timeline = timeline
+        self._arrived: int = timeline.arrived
+        self._doubted = False
+        self._last = wall.perf_counter()
+        self._glfw = started_glfw(self._problems)
+        try:
+            self._open(size)
+            self._furnish(panels)
+        except Exception:
+            self.close()
+            raise
+        self.session.source.look()
+
+    @property
+    def transport(self) -> Transport:
+        """Where the performance is."""
+        return self.session.transport
+
+    def run(self) -> None:
+        """Show the scene until the window is closed."""
+        while self.update():
+            pass
+
+    def _doubt(self) -> None:
+        """Say once that a stream that is arriving looks wrong with its BAP steps."""
+        doubt = getattr(getattr(self._timeline, "animation", None), "doubt", "")
+        if doubt and not self._doubted:
+            self._doubted = True
+            self.session.say(doubt, "warning", WARNED)
+
+    def update(self) -> bool:
+        """Handle the input and draw one picture, or wait where nothing moves. False once closed."""
+        glfw, session = self._glfw, self.session
+        begun = wall.perf_counter()
+        self._doubt()
+        arrived = self._timeline.arrived  # more of a stream makes the line longer, while paused too
+        restless = session.restless
+        if restless or self._restless or session.source.looking or arrived != self._arrived:
+            self._due, self._arrived = max(self._due, 1), arrived
+        self._restless = restless  # one more picture when all has come to rest
+        if self._due:
+            glfw.poll_events()
+        else:
+            glfw.wait_events_timeout(IDLE)
+        if glfw.window_should_close(self._window) and not session.closing:
+            session.leave()
+            glfw.set_window_should_close(self._window, session.closing)
+            self._heard()
+        if session.closing:
+            return False
+        if not self._due:
+            return True
+        size = self._framebuffer()
+        if size[0] < 1 or size[1] < 1:  # minimised
+            glfw.wait_events_timeout(IDLE)
+            return True
+        self._due -= 1
+        self._picture(size)
+        glfw.swap_buffers(self._window)
+        self.pictures += 1
+        left = FASTEST - (wall.perf_counter() - begun)
+        if left > 0:
+            wall.sleep(left)
+        return True
+
+    def close(self) -> None:
+        """Finish a film that is being recorded, close the window, give all back; safe to call twice."""
+        try:
+            self.keeper.close()
+        finally:
+            for part in (self._gui, self._overlay, self._renderer, self._target):
+                if part is not None:
+                    part.close()
+            self._gui = self._overlay = self._renderer = self._target = None
+            if self._gl is not None:
+                self._gl.release()
+                self._gl = None
+            if self._window is not None:
+                self._glfw.destroy_window(self._window)
+                self._window = None
+            self._glfw.terminate()
+
+    def __enter__(self) -> Window:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _open(self, size: tuple[int, int]) -> None:
+        glfw = self._glfw
+        moderngl = import_moderngl()
+        for hint, value in (
+            (glfw.CONTEXT_VERSION_MAJOR, 3),
+            (glfw.CONTEXT_VERSION_MINOR, 3),
+            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+            (glfw.OPENGL_FORWARD_COMPAT, True),
+            (glfw.SCALE_TO_MONITOR, True),
+        ):
+            glfw.window_hint(hint, value)
+        self._window = glfw.create_window(*size, self._title, None, None)
+        if not self._window:
+            missing = missing_libraries()
+            if missing:
+                raise DisplayError(f"the window needs OpenGL, but {missing_text(missing)}")
+            raise DisplayError(
+                f"no window with OpenGL 3.3 can be opened: {self._reason('the display refused')}. "
+                "Install a driver (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri). "
+                + HOW_WITHOUT
+            )
+        glfw.make_context_current(self._window)
+        glfw.swap_interval(1)
+        try:
+            self._gl = moderngl.create_context(require=330)
+        except Exception as error:
+            raise DisplayError(
+                f"OpenGL 3.3 cannot be used in the window: {error}. {how_to_install(OPENGL)}, or update the "
+                "graphics driver"
+            ) from error
+        self._renderer = Renderer(self._gl)
+
+    def _furnish(self, panels: bool) -> None:
+        """The panels, or the plain timeline in their place; and who hears the input."""
+        session = self.session
+        session.size, session.scale = self._framebuffer(), self._scale()
+        if panels:
+            try:
+                from fba_player.ui.gui import Gui
+
+                self._gui = Gui(self._gl, session)
+            except (ImportError, RuntimeError) as error:
+                remedy = cure(error, "imgui-bundle")
+                warnings.warn(
+                    f"the window has no panels, as imgui cannot be used: {error}. {remedy}",
+                    FbaWarning,
+                    stacklevel=4,
+                )
+        if self._gui is None:
+            self.controls = Controls(session, plain=True)
+            self._overlay = Overlay(self._gl)
+        else:
+            self.controls = self._gui.controls
+        self._screen = FullScreen(self._glfw, self._window)
+        self.input = GlfwInput(self._glfw, self._window, session, self.controls, self._gui, self._heard)
+
+    def _heard(self) -> None:
+        self._due = SETTLES
+
+    def _reason(self, otherwise: str) -> str:
+        return self._problems[-1] if self._problems else otherwise
+
+    def _framebuffer(self) -> tuple[int, int]:
+        width, height = self._glfw.get_framebuffer_size(self._window)
+        return int(width), int(height)
+
+    def _scale(self) -> float:
+        """Pixels a point: 1 on plain displays, 2 on dense ones."""
+        return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
+
+    def _picture(self, size: tuple[int, int]) -> None:
+        """Draw; what OpenGL then complains of that cannot be mended ends the player with a word."""
+        try:
+            self._draw(size)
+            problem = self._gl.error
+        except import_moderngl().Error as error:
+            raise DisplayError(LOST.format(reason=" ".join(str(error).split()))) from error
+        if problem in ("GL_OUT_OF_MEMORY", "GL_UNKNOWN_ERROR"):  # a lost context is not known by name
+            raise DisplayError(LOST.format(reason=problem))
+
+    def _draw(self, size: tuple[int, int]) -> None:
+        session = self.session
+        session.size, session.scale, session.whole_screen = size, self._scale(), self._screen.whole
+        session.viewpoint.aspect = size[0] / size[1]
+        if self._target is None or self._target.size != size:
+            if self._target is not None:
+                self._target.close()
+            self._target = Target(self._gl, size, samples=0)
+        assert self._renderer is not None
+        time = self.transport.time
+        self.keeper.moment()
+        self._target.begin()
+        within = self._renderer.draw(session.view(time), session.camera(time), size)
+        self._target.finish(self._gl.screen, within)
+        self.keeper.picture(lambda: pixels_of(self._gl.screen, size))
+        self._fulfil()
+        self._gl.screen.use()
+        self._gl.viewport = (0, 0, *size)
+        now = wall.perf_counter()
+        if self._gui is not None:
+            self._gui.draw(now - self._last)
+        elif self._overlay is not None and not session.bare:
+            self._overlay.draw(self.controls)
+        self._last = now
+        self.input.point(hidden=self.transport.playing and self._screen.whole and session.idle > IDLE_MOUSE)
+        self._show_title()
+
+    def _fulfil(self) -> None:
+        """What the user asked for, which needs the picture or the window."""
+        session = self.session
+        while session.wishes:
+            wish = session.wishes.popleft()
+            if wish in ("screenshot", "transparent"):
+                self._screenshot(transparent=wish == "transparent")
+            elif wish == "record":
+                self.keeper.toggle_recording()
+            elif wish == "fullscreen":
+                self._screen.toggle()
+            self._heard()
+
+    def _screenshot(self, *, transparent: bool) -> None:
+        assert self._renderer is not None
+        try:
+            pixels = still(self._gl, self._renderer, self.session, transparent=transparent)
+        except DisplayError as error:
+            self.session.say(f"No picture could be drawn: {error}", "error", 8.0)
+            return
+        self.keeper.screenshot(pixels, transparent=transparent)
+
+    def _show_title(self) -> None:
+        text = f"{self._title} - frame {self.transport.frame + 1} / {self.session.scene.timeline.frames}"
+        if text != self._shown_title:
+            self._glfw.set_window_title(self._window, text)
+            self._shown_title = text
