@@ -1,1 +1,4 @@
-"""."""
+"""FAP and BAP text files.
+
+May use: parameters and the data model.
+"""

@@ -1,1 +1,4 @@
-"""."""
+"""Pictures and films without a window: PNG, MP4, GIF, contact sheets, notebooks, pyrender.
+
+May use: gl, scene, sound.
+"""

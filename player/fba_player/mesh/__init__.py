@@ -1,1 +1,4 @@
-"""."""
+"""Meshes made ready for drawing: simplified, primitive, textured.
+
+May use: `fba.mesh`. Knows no OpenGL.
+"""

@@ -1,1 +1,4 @@
-"""."""
+"""How FAPs move each region of a face: jaw, lips, lids, eyes, tongue, ears, brows, cheeks, nose.
+
+May use: the surface, the face model.
+"""

@@ -1,1 +1,4 @@
-"""."""
+"""Morph shapes of other programs turned into tables for FAPs.
+
+May use: authoring and the face model.
+"""

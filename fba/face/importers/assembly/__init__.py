@@ -1,1 +1,4 @@
-"""."""
+"""Pieces of an imported mesh put together to a face model: kinds of parts, units, landmarks, materials.
+
+May use: meshes, authoring, the face model.
+"""

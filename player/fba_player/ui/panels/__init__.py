@@ -1,1 +1,4 @@
-"""."""
+"""The panels, one module each, and the curves and lists that they are made of.
+
+May use: session, scene, playback.
+"""

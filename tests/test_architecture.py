@@ -1,0 +1,237 @@
+"""The house: imports point down, no circles, private modules stay in their room, no room is too full.
+
+A floor is a room (a package) or a single module of one. A module belongs to the floor with the longest name
+that it begins with, and imports only from its own floor and from those below. All imports count: lazy ones,
+those for type checkers, and modules named in a string.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = {
+    "fba": ROOT / "fba",
+    "fba_player": ROOT / "player/fba_player",
+    "fba_conformance": ROOT / "conformance/fba_conformance",
+}
+MOST_FILES = 20
+"""Modules in a folder, its `__init__` not counted."""
+
+_FLOORS = """
+fba
+fba.parameters
+fba.mesh
+fba.gltf
+fba.codec._plane
+fba.codec
+fba.face
+fba.face.interpolation
+fba.face.deform
+fba.face.gltf
+fba.face.builtin
+fba.face.authoring.surface
+fba.face.authoring.regions
+fba.face.authoring
+fba.face.authoring.shapes
+fba.face.checks
+fba.face.importers.assembly
+fba.face.importers.points
+fba.face.importers.makehuman
+fba.face.importers
+fba.face.calibration
+fba.body.skeleton
+fba.body.solve
+fba.body.skin
+fba.body
+fba.body.builtin
+fba.body.gait
+fba.body.importers
+fba.capture.motion
+fba.capture.limbs
+fba.capture
+fba.formats
+fba.formats.text
+fba.formats.epf
+fba.formats.bvh
+fba.formats.gltf
+fba_conformance
+fba_player.mesh
+fba_player.view
+fba_player.figure
+fba_player.playback
+fba_player.scene
+fba_player.gl
+fba_player.sound
+fba_player.export
+fba_player.session
+fba_player.ui.panels
+fba_player.ui
+fba_player.window
+fba_player
+fba.player
+fba.cli
+fba.cli.commands
+fba.__main__
+"""
+FLOORS = _FLOORS.split()
+"""From the ground up."""
+
+FACADES = {
+    ("fba", "*"): "the public names of the library, imported where they are first used",
+    ("fba.face", "*"): "public names of the face",
+    ("fba.body", "*"): "public names of the body",
+    (
+        "fba.formats.registry",
+        "fba.formats.*",
+    ): "the table of formats: readers and writers by name",
+    ("fba.cli.main", "fba.cli.commands.*"): "the subcommands by name",
+    ("fba.face.model", "fba.face.gltf.storage"): "`FaceModel.load` and `save`",
+    ("fba.face.model", "fba.face.builtin"): "`FaceModel.default`",
+    ("fba.body.model", "fba.body.storage"): "`BodyModel.load` and `save`",
+    ("fba.body.model", "fba.body.builtin"): "`BodyModel.default`",
+}
+"""Imports that may point up, and why."""
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Every module by its dotted name; a package by its own."""
+    result = {}
+    for package, folder in PACKAGES.items():
+        for path in folder.rglob("*.py"):
+            parts = [package, *path.relative_to(folder).with_suffix("").parts]
+            result[".".join(parts).removesuffix(".__init__")] = path
+    return result
+
+
+def is_package(module: str) -> bool:
+    return modules()[module].name == "__init__.py"
+
+
+def room(module: str) -> str:
+    return module if is_package(module) else module.rpartition(".")[0]
+
+
+@cache
+def imports() -> dict[str, set[str]]:
+    """What each module imports of ours."""
+    return {module: set(imported(module)) - {module} for module in modules()}
+
+
+def imported(module: str) -> Iterator[str]:
+    for node in ast.walk(ast.parse(modules()[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module}: a relative import"
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                yield from (one for one in (name if name in modules() else node.module,) if one in modules())
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in modules())
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            name = node.value.partition(":")[0]
+            yield from (one for one in (name, f"fba.formats.{name}") if "." in name and one in modules())
+
+
+def floor(module: str) -> int:
+    names = [name for name in FLOORS if module == name or module.startswith(name + ".")]
+    return FLOORS.index(max(names, key=len))
+
+
+def is_facade(importer: str, target: str) -> bool:
+    for one, other in FACADES:
+        if importer == one and (
+            other == "*" or target == other or (other.endswith("*") and target.startswith(other[:-1]))
+        ):
+            return True
+    return False
+
+
+def test_the_floors_are_rooms_or_modules() -> None:
+    assert [name for name in FLOORS if name not in modules()] == []
+    assert len(set(FLOORS)) == len(FLOORS)
+    assert {room(module) for module in modules() if not is_package(module)} <= set(FLOORS)
+
+
+def test_imports_point_down() -> None:
+    up = [
+        f"{module} imports {target}"
+        for module, targets in sorted(imports().items())
+        for target in sorted(targets)
+        if floor(target) > floor(module) and not is_facade(module, target)
+    ]
+    assert up == []
+
+
+def test_every_facade_is_one() -> None:
+    for importer, target in FACADES:
+        assert any(
+            is_facade(importer, one) and floor(one) > floor(importer) for one in imports()[importer]
+        ), f"{importer} does not import {target} upwards: take it off the list"
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    graph = {
+        module: {target for target in targets if not is_facade(module, target) and not is_package(target)}
+        for module, targets in imports().items()
+        if not is_package(module)
+    }
+    assert circles(graph) == []
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Groups of modules that reach each other."""
+    reached = {module: reachable(graph, module) for module in graph}
+    groups = {
+        tuple(sorted(one for one in reached[module] if module in reached.get(one, ())))
+        for module in graph
+        if module in reached[module]
+    }
+    return [list(group) for group in sorted(groups)]
+
+
+def reachable(graph: dict[str, set[str]], module: str) -> set[str]:
+    found: set[str] = set()
+    open_ends = [module]
+    while open_ends:
+        for target in graph.get(open_ends.pop(), ()):
+            if target not in found:
+                found.add(target)
+                open_ends.append(target)
+    return found
+
+
+def test_private_modules_are_imported_by_their_room_only() -> None:
+    wrong = [
+        f"{module} imports {target}"
+        for module, targets in imports().items()
+        for target in targets
+        if target.rpartition(".")[2].startswith("_")
+        and not is_package(target)
+        and not (room(module) == room(target) or module == "fba.formats.registry")
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_room_is_too_full(package: str) -> None:
+    rooms: dict[str, int] = defaultdict(int)
+    for module in modules():
+        if module.split(".")[0] == package and not is_package(module):
+            rooms[room(module)] += 1
+    assert {name: count for name, count in rooms.items() if count > MOST_FILES} == {}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_room_says_what_it_holds(package: str) -> None:
+    for module in modules():
+        if module.split(".")[0] == package and is_package(module):
+            text = ast.get_docstring(ast.parse(modules()[module].read_text(encoding="utf-8"))) or ""
+            assert len(re.findall(r"\w+", text)) >= 5, f"{module} says too little of itself"
