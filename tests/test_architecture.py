@@ -146,12 +146,8 @@ def floor(module: str) -> int:
 
 
 def is_facade(importer: str, target: str) -> bool:
-    for one, other in FACADES:
-        if importer == one and (
-            other == "*" or target == other or (other.endswith("*") and target.startswith(other[:-1]))
-        ):
-            return True
-    return False
+    names = [other for one, other in FACADES if one == importer]
+    return any(target == name or (name[-1] == "*" and target.startswith(name[:-1])) for name in names)
 
 
 def test_the_floors_are_rooms_or_modules() -> None:
