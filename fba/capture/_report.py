@@ -66,7 +66,7 @@ class RetargetReport:
     family: str
     frames: int
     bones: tuple[BoneError, ...]
-    soles: FeetError | None
+    feet: FeetError | None
     unused: tuple[str, ...]
     missing: tuple[str, ...]
 

@@ -21,7 +21,7 @@ if "no-numba" in sys.argv:
 import hashlib, json
 import fba
 from fba import compiled
-from conformance import fuzz, motion
+from fba_conformance import _motion as motion, fuzz
 from fractions import Fraction
 
 result = {"compiled": compiled.is_compiled(), "numba": sys.modules.get("numba") is not None}
