@@ -342,7 +342,8 @@ def test_names_that_nothing_can_be_written_to(run: Run, clip: Path, tmp_path: Pa
 
 
 THREE = """
-import sys, fba, player
+import sys, fba
+from fba import player
 for output in sys.argv[2:]:
     player.render(fba.read(sys.argv[1]), output, size=(96, 72))
 """

@@ -76,7 +76,8 @@ def test_the_player_can_be_imported_and_its_figures_move(tmp_path: Path) -> None
     code = (
         BARE.replace("from fba.cli.main import main\nmain()", "")
         + """
-import fba, player
+import fba
+from fba import player
 from importlib.resources import files
 scene = player.Scene(fba.read(files("fba") / "samples" / "hello.fap"))
 print(len(scene.at(1.0).faces), player.play.__name__, player.render.__name__)

@@ -1,12 +1,16 @@
-"""The plain timeline and help, where there is no imgui: drawn by Pillow and shown as textures."""
+"""A plain timeline and help page, drawn with Pillow and shown as textures, for windows without imgui.
+
+imgui-bundle has no wheels for Macs with Intel processors, nor for Python 3.15; moderngl has both or builds
+there, so that the window opens without panels (see the markers in pyproject.toml).
+"""
 
 from __future__ import annotations
 
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fba_player.gl.programs import load_program
 from fba_player.session.controls import BAR_HEIGHT, Controls
 from fba_player.session.keys import keys
 
@@ -26,11 +30,7 @@ class Overlay:
 
     def __init__(self, context: Any) -> None:
         self._gl = context
-        folder = files(__package__) / "shaders"
-        self._program = context.program(
-            vertex_shader=(folder / "overlay.vert").read_text(encoding="utf-8"),
-            fragment_shader=(folder / "overlay.frag").read_text(encoding="utf-8"),
-        )
+        self._program = load_program(context, "overlay")
         self._square = context.buffer(reserve=4 * 4 * 4, dynamic=True)
         self._array = context.vertex_array(self._program, [(self._square, "2f 2f", "in_place", "in_texture")])
         self._textures: dict[str, tuple[object, Any]] = {}

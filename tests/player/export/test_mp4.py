@@ -14,6 +14,7 @@ from PIL import Image
 from fba.errors import FormatError, UnsupportedError
 from fba_player.export.recorder import Recorder
 from fba_player.sound.soundtrack import Soundtrack, beside
+from sound_clicks import click_time, sound, write_click
 
 av = pytest.importorskip("av")
 
@@ -24,19 +25,6 @@ def plain(colour: tuple[int, int, int], size: tuple[int, int] = (32, 16)) -> np.
     pixels = np.full((size[1], size[0], 4), 255, dtype=np.uint8)
     pixels[..., :3] = colour
     return pixels
-
-
-def write_click(path: Path, at: float, *, seconds: float = 1.0, rate: int = 48000, channels: int = 1) -> Path:
-    """Silence with a click of 2 ms."""
-    samples = np.zeros((round(seconds * rate), channels), dtype="<i2")
-    first = round(at * rate)
-    samples[first : first + rate // 500] = 30000
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(channels)
-        file.setsampwidth(2)
-        file.setframerate(rate)
-        file.writeframes(samples.tobytes())
-    return path
 
 
 def pictures(path: Path) -> list[tuple[float, np.ndarray]]:
@@ -51,21 +39,6 @@ def rgb(frame: Any) -> np.ndarray:
         colours = {"src_colorspace": "ITU709", "dst_colorspace": "ITU601", "src_color_range": "MPEG"}
         frame = frame.reformat(format="rgb24", **colours)
     return frame.to_ndarray(format="rgb24")
-
-
-def sound(path: Path) -> tuple[float, np.ndarray, int]:
-    """Time of the first sample, samples (N,) of one channel, rate."""
-    with av.open(str(path)) as film:
-        frames = list(film.decode(audio=0))
-    samples = np.concatenate([frame.to_ndarray()[0] for frame in frames])
-    return float(frames[0].time), samples, frames[0].sample_rate
-
-
-def click_time(path: Path) -> float:
-    """When the sound is first half as loud as at its loudest."""
-    start, samples, rate = sound(path)
-    loud = np.abs(samples)
-    return start + float(np.argmax(loud > loud.max() / 2)) / rate
 
 
 # --- pictures -----------------------------------------------------------------------------------------

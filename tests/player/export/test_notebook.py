@@ -6,20 +6,22 @@ import base64
 import io
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
-from test_mp4 import click_time, write_click
 
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.player import Preview
 from fba_player.export import notebook, offscreen
 from player_tracks import face_track
+from sound_clicks import click_time, write_click
 
 av = pytest.importorskip("av")
 
@@ -52,9 +54,30 @@ class Page(HTMLParser):
         return base64.b64decode(source.partition(",")[2], validate=True)
 
 
+class Shell:
+    """As much of IPython's InteractiveShell as showing a value takes."""
+
+    def __init__(self) -> None:
+        self.display_formatter = self
+        self.formatters = {"text/html": self}
+        self._functions: dict[tuple[str, str], Callable[[Any], str]] = {}
+
+    def for_type_by_name(self, module: str, name: str, function: Callable[[Any], str]) -> None:
+        self._functions[module, name] = function
+
+    def html(self, value: object) -> str:
+        """What a cell shows that ends in this value."""
+        kind = type(value)
+        return self._functions[kind.__module__, kind.__qualname__](value)
+
+
 def shown(subject: Animation | Preview) -> Page:
-    text = subject._repr_html_()
-    assert text is not None
+    if isinstance(subject, Preview):
+        text = subject._repr_html_()
+    else:
+        shell = Shell()
+        notebook.show_animations(shell)
+        text = shell.html(subject)
     page = Page(text)
     assert page.open == []
     return page
@@ -131,9 +154,34 @@ def test_where_nothing_is(talking: Animation) -> None:
 
 
 def test_importing_fba_does_not_import_the_player() -> None:
-    code = "import sys, fba; fba.Animation; print({'player', 'av', 'PIL', 'moderngl'} & set(sys.modules))"
+    ours = "{'fba.player', 'fba_player', 'av', 'PIL', 'moderngl'}"
+    code = f"import sys, fba; fba.Animation; print({ours} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+@pytest.mark.parametrize("where", ["notebook", "script"])
+def test_importing_the_player_in_a_notebook_makes_it_show_animations(tmp_path: Path, where: str) -> None:
+    (tmp_path / "IPython.py").write_text(
+        """
+class Shell:
+    def for_type_by_name(self, module, name, function):
+        print(module, name)
+
+shell = Shell()
+shell.display_formatter, shell.formatters = shell, {"text/html": shell}
+
+def get_ipython():
+    import sys
+    return shell if sys.argv[1] == "notebook" else None
+"""
+    )
+    code = "import IPython, sys, fba.player; print('numpy' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code, where], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[:-1] == ["fba.animation Animation"] * (where == "notebook")
+    assert done.stdout.splitlines()[-1] == str(where == "notebook")
 
 
 def test_a_preview_has_the_sound_that_is_given(opengl: None, talking: Animation, tmp_path: Path) -> None:

@@ -188,6 +188,6 @@ def test_importing_the_player_loads_no_opengl() -> None:
     import subprocess
 
     heavy = ("moderngl", "glfw", "av", "PIL", "scipy", "numpy")
-    code = f"import sys, player; print([m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, fba.player; print([m for m in {heavy} if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"

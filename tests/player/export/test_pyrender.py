@@ -22,7 +22,7 @@ from fba_player.export.pyrender_bridge import _numpy_1, swayed
 BOTH = """
 import json, sys
 import numpy as np
-import player
+from fba import player
 from player_tracks import body_track, face_track
 from fba.animation import Animation
 

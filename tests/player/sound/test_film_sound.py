@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_films import click_time, sound, write_click
 
 from fba.animation import Animation
 from fba_player.playback.transport import Transport
@@ -18,6 +17,7 @@ from fba_player.session.session import Session
 from fba_player.sound.recorded_sound import FilmSound
 from player_tracks import face_track
 from set_clock import Clock
+from sound_clicks import click_time, sound, write_click
 
 av = pytest.importorskip("av")
 

@@ -1,0 +1,38 @@
+"""Sound files with one click, and where the click is in a film."""
+
+from __future__ import annotations
+
+import wave
+from pathlib import Path
+
+import numpy as np
+
+
+def write_click(path: Path, at: float, *, seconds: float = 1.0, rate: int = 48000, channels: int = 1) -> Path:
+    """Silence with a click of 2 ms."""
+    samples = np.zeros((round(seconds * rate), channels), dtype="<i2")
+    first = round(at * rate)
+    samples[first : first + rate // 500] = 30000
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(channels)
+        file.setsampwidth(2)
+        file.setframerate(rate)
+        file.writeframes(samples.tobytes())
+    return path
+
+
+def sound(path: Path) -> tuple[float, np.ndarray, int]:
+    """Time of the first sample, samples (N,) of one channel, rate."""
+    import av
+
+    with av.open(str(path)) as film:
+        frames = list(film.decode(audio=0))
+    samples = np.concatenate([frame.to_ndarray()[0] for frame in frames])
+    return float(frames[0].time), samples, frames[0].sample_rate
+
+
+def click_time(path: Path) -> float:
+    """When the sound is first half as loud as at its loudest."""
+    start, samples, rate = sound(path)
+    loud = np.abs(samples)
+    return start + float(np.argmax(loud > loud.max() / 2)) / rate
