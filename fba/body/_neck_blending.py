@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.model import INFLUENCES, BodyPart
-from fba.body.skin.skin_weights import strongest
+from fba.body.model import BodyPart
+from fba.body.skin.skin_weights import INFLUENCES, strongest
 from fba.cache import kept, key_of
 
 Float32 = npt.NDArray[np.float32]

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body._neck_blending import carried_by_neck
-from fba.body.model import INFLUENCES, BodyModel, checked_weights
+from fba.body.model import BodyModel
+from fba.body.skin.skin_weights import INFLUENCES, checked_weights
 from fba.body.skin.skinning import Skinner
 from fba.errors import ModelError
 from fba.mesh.meshes import float_rows

@@ -12,13 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.body.skeleton import Skeleton
+from fba.body.skin.skin_weights import checked_weights
 from fba.errors import ModelError
 from fba.mesh.meshes import Material, Meshes, joined, mesh_arrays
 
 if TYPE_CHECKING:
     from fba.body.skin.skinning import Skinner
 
-__all__ = ["BODY_PART_KINDS", "INFLUENCES", "BodyModel", "BodyPart", "Material"]
+__all__ = ["BODY_PART_KINDS", "BodyModel", "BodyPart", "Material"]
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -27,10 +28,6 @@ Int32 = npt.NDArray[np.int32]
 BODY_PART_KINDS = ("skin", "neck", "head", "cloth", "shoe", "hair", "other")
 """What a part is. "neck": neck and shoulders under the clothes, shown only where the face that stands on the
 body brings none of its own. "head": the head of a body that has one, left out where a face is put on it."""
-INFLUENCES = 4
-"""Joints that carry a vertex, at most."""
-WEIGHT_TOLERANCE = 1e-3
-"""Weights of a vertex may miss a sum of 1 by this; they are then scaled to it."""
 RIGID_TOLERANCE = 1e-6
 
 
@@ -198,33 +195,6 @@ class BodyModel(Meshes[BodyPart]):
     def weights(self) -> Float32:
         """float32 (V, 4): how far they carry it; read-only."""
         return joined([part.weights for part in self.parts])
-
-
-def checked_weights(
-    where: str, joints: npt.ArrayLike, weights: npt.ArrayLike, count: int
-) -> tuple[Int32, Float32]:
-    """Read-only copies of joints and weights, (count, 4), their sums made 1. ModelError as `BodyPart`."""
-    which = np.array(joints)
-    if which.shape != (count, INFLUENCES) or which.dtype.kind not in "iu":
-        raise ModelError(f"{where}: joints must be whole numbers, ({count}, {INFLUENCES}), not {which.shape}")
-    share = np.array(weights, dtype=np.float32)
-    if share.shape != which.shape:
-        raise ModelError(f"{where}: weights must have shape {which.shape}, not {share.shape}")
-    if which.size and int(which.min()) < 0:
-        raise ModelError(f"{where}: a joint has a negative number")
-    total = share.sum(axis=1, dtype=np.float64)
-    # written so that NaN fails too
-    wrong = ~((share >= 0).all(axis=1) & (np.abs(total - 1) <= WEIGHT_TOLERANCE))
-    if wrong.any():
-        row = int(np.flatnonzero(wrong)[0])
-        raise ModelError(
-            f"{where}: the weights of vertex {row}, {share[row].tolist()}, are not 0 or more with a sum of 1"
-        )
-    share = (share / total[:, None]).astype(np.float32)
-    which = which.astype(np.int32)
-    which[share == 0] = 0  # what does not carry may not matter
-    which.flags.writeable = share.flags.writeable = False
-    return which, share
 
 
 def is_rigid(matrix: Float64) -> bool:

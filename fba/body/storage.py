@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.model import BODY_PART_KINDS, INFLUENCES, BodyModel, BodyPart, Float32, Int32
+from fba.body.model import BODY_PART_KINDS, BodyModel, BodyPart, Float32, Int32
 from fba.body.skeleton import MAX_JOINTS, Skeleton
+from fba.body.skin.skin_weights import INFLUENCES
 from fba.errors import ModelError
 from fba.gltf.document import Document
 from fba.gltf.nodes import rotation_matrix

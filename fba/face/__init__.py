@@ -10,7 +10,8 @@ from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names as feature_point_names
 from fba.face.feature_points import neutral_points
-from fba.face.interpolation.table import Function, InterpolationTable, Link, Term
+from fba.face.interpolation.table import InterpolationTable
+from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.model import FaceModel, Material, Part
 from fba.face.points import Eyeballs, FeaturePointFace
 from fba.face.resolve import Resolver, resolve

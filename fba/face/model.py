@@ -124,13 +124,13 @@ class FaceModel(Meshes[Part]):
         Raises FormatError where the file cannot be opened, ModelError, which names the place in it,
         where it is damaged, contradicts itself or brings no such extension.
         """
-        from fba.face.storage import load
+        from fba.face.gltf.storage import load
 
         return load(path)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the face as glTF 2.0 (.glb): whole or not at all."""
-        from fba.face.storage import save
+        from fba.face.gltf.storage import save
 
         save(self, path)
 

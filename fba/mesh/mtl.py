@@ -6,7 +6,7 @@ import os
 import warnings
 
 from fba.errors import FbaWarning, ModelError
-from fba.face.model import Material
+from fba.mesh.meshes import Material
 from fba.mesh.text_files import beside, number, whole, words
 
 MAX_PICTURE = 1 << 27

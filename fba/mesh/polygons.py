@@ -1,4 +1,4 @@
-"""Polygons as mesh files hold them, and parts of a face made from them."""
+"""Polygons as mesh files hold them, and the triangles they are cut into."""
 
 from __future__ import annotations
 
@@ -6,10 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-
-from fba.errors import ModelError
-from fba.face.model import Material, Part
-from fba.face.normals import vertex_normals
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
@@ -69,57 +65,3 @@ def triangulate(polygons: Polygons, faces: Bool) -> Triangles:
     first = polygons.starts[polygon]
     at = np.stack([first, first + place + 1, first + place + 2], axis=1)
     return Triangles(polygons.corners[at], polygons.corner_texcoords[at], polygon.astype(np.int32))
-
-
-@dataclass(frozen=True, eq=False)
-class Source:
-    """A part, and where its vertices come from: int32 (V,), vertex of the file by vertex of the part."""
-
-    part: Part
-    origin: Int32
-
-
-def make_part(
-    polygons: Polygons,
-    faces: Bool,
-    name: str,
-    kind: str,
-    *,
-    scale: float = 1.0,
-    material: Material | None = None,
-) -> Source:
-    """One part of some polygons; vertices with several texture coordinates are split.
-
-    Splitting keeps position and normal, so that seams do not show. scale: metres per unit of the file.
-    Raises ModelError where no triangle is left.
-    """
-    cut = triangulate(polygons, faces)
-    if not len(cut.corners):
-        raise ModelError(f"part {name!r} has no triangles")
-    corners = cut.corners.reshape(-1).astype(np.int64)
-    coords = cut.texcoords.reshape(-1).astype(np.int64)
-    textured = polygons.texcoords is not None and bool((coords >= 0).any())
-    key = (corners << 32) | (coords + 1 if textured else 0)
-    unique, triangles = np.unique(key, return_inverse=True)
-    origin = (unique >> 32).astype(np.int32)
-    vertices = polygons.vertices[origin] * scale
-    # normals of the unsplit mesh
-    _, first = np.unique(origin, return_inverse=True)
-    whole = np.unique(origin)
-    place = np.searchsorted(whole, cut.corners).astype(np.int32)
-    normals = vertex_normals((polygons.vertices[whole] * scale).astype(np.float32), place)[first]
-    texcoords = None
-    if textured and polygons.texcoords is not None:
-        coord = (unique & 0xFFFFFFFF) - 1
-        texcoords = np.where(coord[:, None] >= 0, polygons.texcoords[np.maximum(coord, 0)], 0.0)
-    part = Part(
-        name,
-        kind,
-        vertices.astype(np.float32),
-        triangles.reshape(-1, 3).astype(np.int32),
-        normals.astype(np.float32),
-        None if texcoords is None else texcoords.astype(np.float32),
-        None if polygons.colours is None else polygons.colours[origin],
-        material or Material(),
-    )
-    return Source(part, origin)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.face.compact import compact
 from fba.face.deform.deformer import Deformer
-from fba.face.storage import load, save
+from fba.face.gltf.storage import load, save
 from fba.face.tables import FaceDefMesh, FaceDefTables
 from stored_models import face
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from fba.face.expressions import Definitions
 from fba.face.feature_points import names, neutral_points, row_of
-from fba.face.interpolation.table import Function, InterpolationTable, Link, Term
+from fba.face.interpolation.table import InterpolationTable
+from fba.face.interpolation.terms import Function, Link, Term
 from fba.face.model import PART_KINDS, FaceModel, Material, Part
 from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from fba.errors import ModelError
+from fba.face.importers.assembly.polygon_parts import make_part
 from fba.mesh import obj, text_files
 from fba.mesh.obj import read_obj
-from fba.mesh.polygons import make_part, triangulate
+from fba.mesh.polygons import triangulate
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

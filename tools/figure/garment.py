@@ -55,7 +55,7 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     whole_skin = surface.vertices[np.unique(surface.quads[trunk])]
     torso = _finer(surface.kept(trunk & (middle[:, 1] < neckline(middle) + 0.004)))
     triangles = torso.quads[:, :3]
-    from fba.face.normals import vertex_normals
+    from fba.mesh.meshes import vertex_normals
 
     outward = vertex_normals(torso.vertices, triangles).astype(np.float64)
     for _ in range(6):  # cloth does not follow every hollow

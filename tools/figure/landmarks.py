@@ -11,7 +11,7 @@ import sculpt
 from subdivide import Refined
 
 from fba.face.feature_points import MIRRORED, names, row_of
-from fba.face.normals import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent

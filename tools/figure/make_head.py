@@ -27,7 +27,7 @@ from subdivide import Refined, refine
 from fba.face.authoring import author
 from fba.face.compact import compact
 from fba.face.model import FaceModel, Material, Part
-from fba.face.normals import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent

@@ -1,4 +1,4 @@
-"""Weights of many joints brought down to the few that a vertex has room for."""
+"""Joints and weights of vertices: checked, and of many joints the few that a vertex has room for."""
 
 from __future__ import annotations
 
@@ -7,14 +7,45 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.model import INFLUENCES
+from fba.errors import ModelError
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
 
+INFLUENCES = 4
+"""Joints that carry a vertex, at most."""
+WEIGHT_TOLERANCE = 1e-3
+"""Weights of a vertex may miss a sum of 1 by this; they are then scaled to it."""
 LEAST = 0.012
 """Taken from every weight: what is less does not count, and takes no place."""
+
+
+def checked_weights(
+    where: str, joints: npt.ArrayLike, weights: npt.ArrayLike, count: int
+) -> tuple[Int32, Float32]:
+    """Read-only copies of joints and weights, (count, 4), their sums made 1. ModelError as `BodyPart`."""
+    which = np.array(joints)
+    if which.shape != (count, INFLUENCES) or which.dtype.kind not in "iu":
+        raise ModelError(f"{where}: joints must be whole numbers, ({count}, {INFLUENCES}), not {which.shape}")
+    share = np.array(weights, dtype=np.float32)
+    if share.shape != which.shape:
+        raise ModelError(f"{where}: weights must have shape {which.shape}, not {share.shape}")
+    if which.size and int(which.min()) < 0:
+        raise ModelError(f"{where}: a joint has a negative number")
+    total = share.sum(axis=1, dtype=np.float64)
+    # written so that NaN fails too
+    wrong = ~((share >= 0).all(axis=1) & (np.abs(total - 1) <= WEIGHT_TOLERANCE))
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        raise ModelError(
+            f"{where}: the weights of vertex {row}, {share[row].tolist()}, are not 0 or more with a sum of 1"
+        )
+    share = (share / total[:, None]).astype(np.float32)
+    which = which.astype(np.int32)
+    which[share == 0] = 0  # what does not carry may not matter
+    which.flags.writeable = share.flags.writeable = False
+    return which, share
 
 
 def strongest(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int32, Float32]:

@@ -16,7 +16,7 @@ def default() -> FaceModel:
     from dataclasses import replace
 
     from fba.face.expressions import Definitions
-    from fba.face.storage import load
+    from fba.face.gltf.storage import load
 
     with as_file(files(__package__) / "head.glb") as path:
         # What a viseme looks like may be tuned without making the head anew.

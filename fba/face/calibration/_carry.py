@@ -171,7 +171,7 @@ def stretches(part: Part, after: npt.NDArray[np.floating]) -> Float64:
     Least squares over the edges around it; along the normal it is turned with the surface and grows as
     much as the surface does.
     """
-    from fba.face.normals import vertex_normals
+    from fba.mesh.meshes import vertex_normals
 
     before = part.vertices.astype(np.float64)
     now = np.asarray(after, dtype=np.float64)

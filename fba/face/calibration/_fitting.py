@@ -140,7 +140,7 @@ def _checked(points: npt.ArrayLike) -> Float64:
 
 
 def _on_their_sides(points: Float64) -> Float64:
-    from fba.face.importers.points.fdp import sides
+    from fba.face.importers.points.fdp_data import sides
 
     right, swaps, wrong = sides(points)
     changed = [f"{a} and {b} have changed places" for a, b in swaps]

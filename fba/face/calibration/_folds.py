@@ -34,7 +34,7 @@ def turned_over(
     Whether a triangle is turned is seen against the mean of its neighbours' normals, before and after: a
     turn of the whole surface is none of the triangle.
     """
-    from fba.face.normals import vertex_normals
+    from fba.mesh.meshes import vertex_normals
 
     agreeing, areas = [], []
     for vertices in (np.asarray(before, dtype=np.float64), after):

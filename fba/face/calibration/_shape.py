@@ -14,7 +14,7 @@ from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lids_on
 from fba.face.calibration._field import Field, bumps
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
 from fba.face.feature_points import names, row_of
-from fba.face.normals import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part

@@ -46,7 +46,7 @@ def import_model(
         _no_more("MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=None if up == "y" else up)
         return import_makehuman(path, name=name or "MakeHuman")
     if chosen == "fdp":
-        from fba.face.importers.points.fdp_model import import_fdp
+        from fba.face.importers._fdp import import_fdp
 
         _no_more("an FDP file", points=points)
         return import_fdp(path, unit=unit, up=up, kinds=kinds, name=named)

@@ -14,13 +14,14 @@ from fba.errors import FbaWarning, ModelError, Remedy
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import finished
 from fba.face.importers.assembly.pieces import Piece
-from fba.face.importers.points.fdp import sides
+from fba.face.importers.assembly.polygon_parts import make_part
+from fba.face.importers.points.fdp_data import sides
 from fba.face.importers.points.points_file import GivenPoints, given_points
 from fba.face.model import FaceModel, Material
 from fba.mesh.mtl import read_mtl
 from fba.mesh.obj import read_obj
 from fba.mesh.ply import read_ply
-from fba.mesh.polygons import Polygons, make_part
+from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import lines
 from fba.mesh.wfm import read_wfm
 

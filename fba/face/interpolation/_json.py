@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fba.errors import ModelError
-from fba.face.interpolation.table import Function, Link, Term
+from fba.face.interpolation.terms import Function, Link, Term
 
 
 def data_of(links: Sequence[Link]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from fba.errors import ModelError
-from fba.face.interpolation.table import (
+from fba.face.interpolation.terms import (
     EXPONENT_MAX,
     HIGH_LEVEL_NUMBERS,
     TERMS_MAX,

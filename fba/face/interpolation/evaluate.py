@@ -8,7 +8,8 @@ from functools import partial, reduce
 import numpy as np
 import numpy.typing as npt
 
-from fba.face.interpolation.table import HIGH_LEVEL_NUMBERS, Function, InterpolationTable, Term
+from fba.face.interpolation.table import InterpolationTable
+from fba.face.interpolation.terms import HIGH_LEVEL_NUMBERS, Function, Term
 from fba.parameters import INTENSITY_MAX, fap_numbers, faps
 
 Bool = npt.NDArray[np.bool_]

@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
 from fba.errors import ModelError
+from fba.face.interpolation import _json, _node
+from fba.face.interpolation.terms import EXPONENT_MAX, TERMS_MAX, Function, Link, Term, number_of
 from fba.parameters import (
     EXPRESSION_FIELDS,
     EXPRESSION_SELECT_MAX,
@@ -28,56 +30,6 @@ from fba.parameters import (
     fap_numbers,
     faps,
 )
-
-EXPONENT_MAX = 15
-"""Largest exponent that the node can carry."""
-TERMS_MAX = 10
-"""Most terms of a numerator or denominator that the node can carry."""
-HIGH_LEVEL_NUMBERS = {"viseme": VISEME_FIELDS[:3], "expression": EXPRESSION_FIELDS[:4]}
-"""The numbers that FAP 1 and FAP 2 bring to a source set."""
-
-
-@dataclass(frozen=True)
-class Term:
-    """coefficient x product of powers, where the impulse holds, else 0.
-
-    coefficient: finite. powers: exponent 0..15 of each number of the source set, by name; absent is 0.
-    when: (select, value), such as ("expression_select1", 1), or None for always; numerators only.
-    """
-
-    coefficient: float = 1.0
-    powers: Mapping[str, int] = field(default_factory=dict)
-    when: tuple[str, int] | None = None
-
-
-@dataclass(frozen=True)
-class Function:
-    """A destination FAP as numerator / denominator.
-
-    Both are sums of at most 10 terms; an empty numerator is 0, an empty denominator 1.
-    """
-
-    numerator: Sequence[Term] = ()
-    denominator: Sequence[Term] = ()
-
-
-@dataclass(frozen=True)
-class Link:
-    """From one set of FAPs to another.
-
-    source: names of its FAPs, such as ("lower_t_midlip", "raise_b_midlip"). "viseme" stands for the
-    numbers viseme_select1, viseme_select2 and viseme_blend, "expression" for expression_select1,
-    expression_intensity1, expression_select2 and expression_intensity2 (both 0..63 as sent).
-    functions: the destination set, each of its FAPs with its function.
-    """
-
-    source: Sequence[str]
-    functions: Mapping[str, Function]
-
-    @cached_property
-    def numbers(self) -> tuple[str, ...]:
-        """Names of the numbers that the functions may use, in order."""
-        return tuple(n for name in self.source for n in HIGH_LEVEL_NUMBERS.get(name, (name,)))
 
 
 @dataclass(frozen=True)
@@ -107,28 +59,20 @@ class InterpolationTable:
     @classmethod
     def from_node(cls, node: Mapping[str, Sequence[float]]) -> InterpolationTable:
         """The table that the fields of a BIFS node FIT describe; see `fba.face.interpolation._node`."""
-        from fba.face.interpolation._node import links_of
-
-        return cls(links_of(node))
+        return cls(_node.links_of(node))
 
     def to_node(self) -> dict[str, list[int] | list[float]]:
         """The fields of a BIFS node FIT: `from_node` of them is this table again."""
-        from fba.face.interpolation._node import node_of
-
-        return node_of(self.links)
+        return _node.node_of(self.links)
 
     @classmethod
     def from_dict(cls, data: object) -> InterpolationTable:
         """The table that `to_dict` gave; ModelError naming the place where it is something else."""
-        from fba.face.interpolation._json import links_of
-
-        return cls(links_of(data))
+        return cls(_json.links_of(data))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as lists, dicts, strings and numbers, for JSON."""
-        from fba.face.interpolation._json import data_of
-
-        return data_of(self.links)
+        return _json.data_of(self.links)
 
     @cached_property
     def order(self) -> tuple[int, ...]:
@@ -249,16 +193,6 @@ def _checked_term(term: Term, numbers: tuple[str, ...], where: str, impulses: bo
             raise ModelError(f"{where}: the impulse asks for {select} = {value!r}, which must be 0..{limit}")
     powers = {name: int(term.powers[name]) for name in numbers if term.powers.get(name)}
     return Term(coefficient, powers, None if term.when is None else (term.when[0], int(term.when[1])))
-
-
-def number_of(value: object) -> float:
-    """A float, NaN for what is none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return math.nan
-    try:
-        return float(value)
-    except OverflowError:
-        return math.nan
 
 
 def _whole(value: object) -> bool:

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import neutral_points, row_of
+from fba.face.gltf.storage import load, save
 from fba.face.model import FaceModel, Material
-from fba.face.storage import load, save
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.gltf import Gltf, Surface, read_gltf, surfaces
 from fba.parameters import fap_numbers, faps

@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.face.gltf.reading import read_model
-from fba.face.gltf.writing import build
+from fba.face.gltf._reading import read_model
+from fba.face.gltf.storage import build, load
 from fba.face.model import FaceModel
-from fba.face.storage import load
 from fba.gltf._glb import join, split
 from fba.gltf.document import parse_document
 from json_places import REMOVED, put

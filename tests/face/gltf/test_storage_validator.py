@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fba.face.gltf.storage import save
 from fba.face.model import FaceModel, Material
-from fba.face.storage import save
 from stored_models import face
 
 SCRIPT = """

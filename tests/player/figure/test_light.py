@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from fba.compiled import is_compiled
-from fba.face.normals import vertex_normals
+from fba.mesh.meshes import vertex_normals
 from fba_player.figure.occlusion import Visibility, bake, harmonics
 from fba_player.mesh.primitives import sphere_mesh
 

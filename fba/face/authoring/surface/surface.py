@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.face.model import Part
-from fba.face.normals import vertex_normals
+from fba.mesh.meshes import vertex_normals
 
 Float64 = npt.NDArray[np.float64]
 Int = npt.NDArray[np.intp]

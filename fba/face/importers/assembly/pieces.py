@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fba.errors import ModelError
 from fba.face.importers.assembly._kinds import DROPPED, checked_kinds, kind_of
-from fba.face.importers.assembly.components import shell_labels
+from fba.face.importers.assembly.polygon_parts import shell_labels
 from fba.face.model import Part
 
 Float32 = npt.NDArray[np.float32]

@@ -21,10 +21,11 @@ import numpy.typing as npt
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.default_materials import LOOKS
+from fba.face.importers.assembly.polygon_parts import Source, make_part, shells
 from fba.face.importers.makehuman._mhclo import fitted
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.obj import read_obj
-from fba.mesh.polygons import Polygons, Source, make_part
+from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import beside, whole
 
 Float32 = npt.NDArray[np.float32]
@@ -205,8 +206,6 @@ def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
 
 def _eyeball(eyes: Polygons, side: float) -> Bool:
     """The faces of one eyeball; the transparent cornea before it, a shell of its own, is left out."""
-    from fba.face.importers.assembly.components import shells
-
     best = None
     for faces in shells(eyes):
         vertices = eyes.vertices[eyes.used(faces)]

@@ -14,6 +14,8 @@ import numpy.typing as npt
 
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
+from fba.face.importers.points.fdp import load_fdp
+from fba.face.importers.points.xface import xface_points
 from fba.mesh.text_files import lines, number, whole, whole_number
 
 Float64 = npt.NDArray[np.float64]
@@ -134,9 +136,6 @@ def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
 
 
 def _from_fdp(path: str) -> GivenPoints:
-    from fba.face.importers.points.fdp import load_fdp
-    from fba.face.importers.points.xface import xface_points
-
     fdp = load_fdp(path)
     if fdp.format == "xface":
         return GivenPoints(xface_points(fdp))

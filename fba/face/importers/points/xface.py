@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp import Fdp, Influence, XfaceMesh, on_their_sides
+from fba.face.importers.points.fdp_data import Fdp, Influence, XfaceMesh, on_their_sides
 from fba.mesh.text_files import beside, number, whole, whole_number
+from fba.mesh.vrml import read_vrml
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 Float64 = npt.NDArray[np.float64]
@@ -107,8 +108,6 @@ def xface_submeshes(fdp: Fdp) -> dict[str, tuple[Path, int]]:
 
 def xface_points(fdp: Fdp) -> Float64:
     """Positions (84, 3) of the points of an Xface file, from its mesh files, in their unit."""
-    from fba.mesh.vrml import read_vrml
-
     submeshes = xface_submeshes(fdp)
     files = {path: read_vrml(path) for path in {path for path, _ in submeshes.values()}}
     points = np.full((len(names()), 3), np.nan)

@@ -12,12 +12,13 @@ from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import finished
 from fba.face.importers.assembly.pieces import Piece
+from fba.face.importers.assembly.polygon_parts import make_part
 from fba.face.importers.mesh import READERS, import_mesh
-from fba.face.importers.points.fdp import Fdp, load_fdp
+from fba.face.importers.points.fdp import load_fdp
+from fba.face.importers.points.fdp_data import Fdp
 from fba.face.importers.points.points_file import GivenPoints
 from fba.face.importers.points.xface import NEUTRAL, xface_points
 from fba.face.model import FaceModel
-from fba.mesh.polygons import make_part
 from fba.mesh.vrml import read_vrml
 
 BINDS = {

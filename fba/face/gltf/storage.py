@@ -1,21 +1,47 @@
-"""A face model written as glTF: meshes and morph targets for all viewers, the extension for this project."""
+"""Face models in files: glTF 2.0 with the extension FBA_face, described in docs/face-models.md."""
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from fba.errors import ModelError
 from fba.face.gltf._extension import NAME, extension
+from fba.face.gltf._reading import read_model
 from fba.face.gltf.morphs import displacements
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
+from fba.gltf.document import open_document
 from fba.gltf.part_materials import Looks
 from fba.gltf.writer import Builder
 from fba.parameters import faps
+from fba.source import Path
 
 Float32 = npt.NDArray[np.float32]
+
+
+def load(path: Path) -> FaceModel:
+    """Read a face model from a .glb (or .gltf) file, as `save` writes it.
+
+    Raises FormatError where the file cannot be opened, ModelError, which names the place in it, where it
+    is damaged, contradicts itself, or brings no extension FBA_face. Nothing of a bad file is used.
+    """
+    return read_model(open_document(path))
+
+
+def save(model: FaceModel, path: Path) -> None:
+    """Write a face model as .glb, whole or not at all; loading it gives an equal model again.
+
+    Any glTF viewer shows its neutral face, with a morph target for every FAP that has tables. Raises
+    ModelError where glTF cannot hold the model (a part without triangles, a texture that is neither PNG
+    nor JPEG), FormatError where the file cannot be written.
+    """
+    if os.fspath(path).lower().endswith(".gltf"):
+        raise ModelError(f"{os.fspath(path)}: face models are written in one file; name it .glb")
+    build(model).save(path)
 
 
 def build(model: FaceModel) -> Builder:

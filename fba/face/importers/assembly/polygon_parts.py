@@ -1,0 +1,98 @@
+"""Parts of a face from the polygons of a mesh file, and the connected components of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.errors import ModelError
+from fba.face.model import Material, Part
+from fba.mesh.meshes import vertex_normals
+from fba.mesh.polygons import Polygons, triangulate
+
+Bool = npt.NDArray[np.bool_]
+Int = npt.NDArray[np.intp]
+Int32 = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A part, and where its vertices come from: int32 (V,), vertex of the file by vertex of the part."""
+
+    part: Part
+    origin: Int32
+
+
+def make_part(
+    polygons: Polygons,
+    faces: Bool,
+    name: str,
+    kind: str,
+    *,
+    scale: float = 1.0,
+    material: Material | None = None,
+) -> Source:
+    """One part of some polygons; vertices with several texture coordinates are split.
+
+    Splitting keeps position and normal, so that seams do not show. scale: metres per unit of the file.
+    Raises ModelError where no triangle is left.
+    """
+    cut = triangulate(polygons, faces)
+    if not len(cut.corners):
+        raise ModelError(f"part {name!r} has no triangles")
+    corners = cut.corners.reshape(-1).astype(np.int64)
+    coords = cut.texcoords.reshape(-1).astype(np.int64)
+    textured = polygons.texcoords is not None and bool((coords >= 0).any())
+    key = (corners << 32) | (coords + 1 if textured else 0)
+    unique, triangles = np.unique(key, return_inverse=True)
+    origin = (unique >> 32).astype(np.int32)
+    vertices = polygons.vertices[origin] * scale
+    # normals of the unsplit mesh
+    _, first = np.unique(origin, return_inverse=True)
+    whole = np.unique(origin)
+    place = np.searchsorted(whole, cut.corners).astype(np.int32)
+    normals = vertex_normals((polygons.vertices[whole] * scale).astype(np.float32), place)[first]
+    texcoords = None
+    if textured and polygons.texcoords is not None:
+        coord = (unique & 0xFFFFFFFF) - 1
+        texcoords = np.where(coord[:, None] >= 0, polygons.texcoords[np.maximum(coord, 0)], 0.0)
+    part = Part(
+        name,
+        kind,
+        vertices.astype(np.float32),
+        triangles.reshape(-1, 3).astype(np.int32),
+        normals.astype(np.float32),
+        None if texcoords is None else texcoords.astype(np.float32),
+        None if polygons.colours is None else polygons.colours[origin],
+        material or Material(),
+    )
+    return Source(part, origin)
+
+
+def shells(polygons: Polygons) -> list[Bool]:
+    """Masks bool (F,) of the polygons of each connected shell, by lowest vertex number."""
+    sizes = np.diff(polygons.starts)
+    first = np.repeat(polygons.corners[polygons.starts[:-1]], sizes)
+    label = _connected(first, polygons.corners, len(polygons.vertices))
+    of_face = label[polygons.corners[polygons.starts[:-1]]]
+    return [of_face == shell for shell in np.unique(of_face)]
+
+
+def shell_labels(triangles: npt.NDArray[np.int32], count: int, vertices: npt.NDArray[np.float32]) -> Int:
+    """(count,) shell of each vertex, vertices at the same place taken as one (seams of textures)."""
+    _, same = np.unique(vertices, axis=0, return_inverse=True)
+    place = same.reshape(-1)
+    a, b, c = place[triangles].T if len(triangles) else (place[:0],) * 3
+    label = _connected(np.concatenate([a, b]), np.concatenate([b, c]), int(place.max()) + 1)
+    return np.asarray(label[place], dtype=np.intp)
+
+
+def _connected(a: npt.NDArray[np.integer], b: npt.NDArray[np.integer], count: int) -> Int:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links = (np.ones(len(a), dtype=np.int8), (a, b))
+    labels: Int = connected_components(coo_array(links, shape=(count, count)), directed=False)[1]
+    return labels
