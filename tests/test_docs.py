@@ -66,7 +66,7 @@ ILLUSTRATIONS = {
     ("docs/play.md", "apt-get install libegl1 libgl1"): SYSTEM,
     (
         "docs/play.md",
-        "import fba, player, pyrender",
+        "import fba, pyrender",
     ): "pyrender is not installed; tests/player has tests of it",
 }
 """Blocks that do not run: page and first line, and why not."""

@@ -1,4 +1,4 @@
-"""Pictures look as they did when somebody last looked at them: tests/player/references.
+"""Pictures look as they did when somebody last looked at them: tests/player/gl/references.
 
 Where a change of looks is wanted, draw them anew (tests/helpers/make_references.py) and look at each.
 """
