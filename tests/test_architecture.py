@@ -73,6 +73,8 @@ fba_player.gl
 fba_player.sound
 fba_player.export
 fba_player.session
+fba_player.ui.theme
+fba_player.ui.ruler
 fba_player.ui.panels
 fba_player.ui
 fba_player.window

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.atomic_path import PathLike, cannot, written
-from fba_player.export.mp4 import import_av
+from fba_player.sound.pyav import import_av
 
 UInt8 = npt.NDArray[np.uint8]
 

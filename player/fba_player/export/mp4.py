@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from fba.atomic_path import PathLike, cannot, written
 from fba.errors import DisplayError
-from fba_player.sound.audio_file import av_version
+from fba_player.sound.pyav import av_version, import_av
 from fba_player.sound.soundtrack import FilmedSound, Soundtrack
 
 UInt8 = npt.NDArray[np.uint8]
@@ -27,18 +27,6 @@ THREADS = 4
 """The same everywhere: the number of threads decides about bits."""
 BT709, SRGB_CURVE, STUDIO_RANGE = 1, 13, 1
 """Numbers of ISO/IEC 23091-2: the colours of HD video, sRGB's curve; and 16..235 for black to white."""
-
-
-def import_av() -> Any:
-    """PyAV. Raises DisplayError where it is missing."""
-    try:
-        import av
-    except ImportError as error:
-        raise DisplayError(
-            f"films need the Python package av (PyAV), which cannot be imported: {error}. "
-            "Install it with: pip install av"
-        ) from error
-    return av
 
 
 class Mp4:

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.atomic_path import PathLike
-from fba.errors import DisplayError, FbaWarning, FormatError
+from fba.errors import FbaWarning, FormatError
+from fba_player.sound.pyav import av_version, import_av
 
 Int16 = npt.NDArray[np.int16]
 
@@ -25,11 +26,6 @@ GAP = 0.02
 """Seconds by which a file's own times may leave its count of samples before they are believed."""
 MOST_AT_ONCE = 1 << 24
 """Samples; one piece of a file that decodes to more is damaged."""
-
-
-def av_version(av: Any) -> int:
-    """The major version of PyAV, of which several from 12 on are supported."""
-    return int(av.__version__.split(".")[0])
 
 
 def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
@@ -68,14 +64,7 @@ class SoundFile:
     _stream: Any = None
 
     def __init__(self, path: PathLike, rates: Collection[int] = ()) -> None:
-        try:
-            import av
-        except ImportError as error:
-            raise DisplayError(
-                f"sound needs the Python package av (PyAV), which cannot be imported: {error}. "
-                "Install it with: pip install av"
-            ) from error
-        self._av = av
+        av = self._av = import_av("sound needs")
         self.path = Path(path)
         self._damaged = False
         self._rates = rates

@@ -15,6 +15,7 @@ from fba.atomic_path import PathLike
 from fba_player.playback.transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound.audio_file import CHANNELS, SoundFile
+from fba_player.sound.pyav import import_av
 from fba_player.sound.soundtrack import AAC_RATES, BLOCK
 
 Int16 = npt.NDArray[np.int16]
@@ -42,10 +43,8 @@ class FilmSound:
         offset: Callable[[], float] = lambda: 0.0,
         muted: Callable[[], bool] = lambda: False,
     ) -> None:
-        import av
-
         self.path = Path(path)
-        self._av = av
+        self._av = import_av()
         self._file = SoundFile(path, rates=AAC_RATES)
         self.rate = self._file.rate
         self.channels, self.layout = CHANNELS, "stereo"

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from fba.atomic_path import PathLike
 from fba.errors import FormatError
 from fba_player.sound.audio_file import open_sound
+from fba_player.sound.pyav import import_av
 
 Float32 = npt.NDArray[np.float32]
 
@@ -55,8 +56,6 @@ class Soundtrack:
     """
 
     def __init__(self, path: PathLike, start: Fraction) -> None:
-        from fba_player.export.mp4 import import_av
-
         self._av = import_av()
         self._path = Path(path)
         self._container, stream = open_sound(self._av, self._path)

@@ -1,0 +1,24 @@
+"""PyAV, which encodes films and decodes sound: imported here only, in any of its versions from 12 on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fba.errors import DisplayError
+
+
+def import_av(purpose: str = "films need") -> Any:
+    """The module `av`. purpose: how the message begins. Raises DisplayError where it cannot be imported."""
+    try:
+        import av
+    except ImportError as error:
+        raise DisplayError(
+            f"{purpose} the Python package av (PyAV), which cannot be imported: {error}. "
+            "Install it with: pip install av"
+        ) from error
+    return av
+
+
+def av_version(av: Any) -> int:
+    """The major version of PyAV."""
+    return int(av.__version__.split(".")[0])
