@@ -1,9 +1,9 @@
-"""The machine code of one function on disk: numba's own cache, but with files that are checked.
+"""Disk cache of compiled functions: numba's own cache, but with files that are checked.
 
-Numba reads an index and a file of machine code for each signature, and believes both: a file that was cut
-breaks the program, and a flipped bit may crash it. Here a file holds all that belongs to one signature, and
-begins with a digest of its content and of everything that the content depends on. Whatever does not match is
-compiled again and replaced; where nothing can be written, nothing is.
+Numba trusts its index and its files of machine code: a truncated file breaks the program, and a flipped bit
+may crash it. Here one file holds everything for one signature, and begins with a digest of its content and of
+everything that the content depends on. A file that does not match is compiled again and replaced; where no
+file can be written, none is.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import contextlib
 import hashlib
 import os
 import pickle
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
 from types import FunctionType
@@ -24,7 +24,6 @@ from numba.core.serialize import dumps
 
 from fba import __version__
 from fba.atomic import atomic
-from fba.compilation import announce
 from fba.errors import FormatError
 
 DIGEST = 32
@@ -32,13 +31,14 @@ DIGEST = 32
 
 
 class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
-    """Finds and keeps the machine code of a function, in the folders where numba does.
+    """Loads and saves the machine code of a function, in the folders that numba uses.
 
-    It says so when there is none and the function has to be compiled.
+    before_compiling: called where there is no such code, so that the function has to be compiled.
     """
 
-    def __init__(self, function: FunctionType) -> None:
+    def __init__(self, function: FunctionType, before_compiling: Callable[[], None]) -> None:
         self._function = function
+        self._before_compiling = before_compiling
 
     @cached_property
     def _numba(self) -> Any:
@@ -54,12 +54,12 @@ class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
         """The compiled function, or None."""
         found = None
         if self._numba is not None:
-            # A file with the right digest was made by the same versions of everything, and loads. Should it
+            # A file with the right digest was made by the same versions of everything, and loads. If it does
             # not, for whatever reason, the function is compiled.
             with contextlib.suppress(Exception):
                 found = self._numba.load_overload(signature, target)
         if found is None:
-            announce()
+            self._before_compiling()
         return found
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
@@ -74,7 +74,7 @@ class CodeFiles:
         self._folder, self._name, self._function = Path(folder), name, function
 
     def load(self, key: Any) -> Any:
-        """What was saved for a key, or None where that is missing or damaged."""
+        """The data saved for a key, or None where it is missing or damaged."""
         try:
             content = self._path(key).read_bytes()
         except OSError:
@@ -85,7 +85,7 @@ class CodeFiles:
         return data if kept == key else None
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep data for a key, where there is room and permission for it."""
+        """Saves data for a key, where there is room and permission for it."""
         content = dumps((key, data))
         with contextlib.suppress(OSError, FormatError), atomic(self._path(key)) as file:
             file.write(self._digest(content) + content)
@@ -101,7 +101,7 @@ class CodeFiles:
 
     @cached_property
     def _stamp(self) -> bytes:
-        """Changes with everything that the machine code depends on, apart from the key."""
+        """Digest of everything that the machine code depends on, apart from the key."""
         digest = hashlib.blake2b(f"{numba.__version__} {__version__}".encode(), digest_size=DIGEST)
         for function in _reached(self._function):
             digest.update(_source(function.__code__.co_filename))
@@ -113,7 +113,7 @@ class CodeFiles:
 
 
 def _reached(function: FunctionType) -> Iterator[FunctionType]:
-    """A function and all compiled functions that it calls, by whatever way."""
+    """A function and all compiled functions that it calls, directly or not."""
     found = [function]
     for one in found:
         yield one
@@ -125,7 +125,7 @@ def _reached(function: FunctionType) -> Iterator[FunctionType]:
 
 @cache
 def _source(path: str) -> bytes:
-    """A digest of a source file; of none where it cannot be read (a zip archive: its version tells)."""
+    """Digest of a source file, or its path where it cannot be read, as in a zip archive."""
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").digest()

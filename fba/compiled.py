@@ -1,13 +1,14 @@
-"""The one door to numba: `compiled` turns a plain function over NumPy arrays into machine code.
+"""The only module that imports numba: `compiled` turns a plain function over NumPy arrays into machine code.
 
 Where numba is missing, or `NUMBA_DISABLE_JIT=1` is set, the same source runs as Python: slower, with
-the same results. Functions behind this door therefore keep to integers and floats that behave alike
-in both worlds: they cast NumPy scalars with `int()` before doing arithmetic on them.
+the same results. Compiled functions therefore cast NumPy scalars with `int()` before they do arithmetic
+on them: NumPy's integers overflow differently in Python.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from types import FunctionType
 from typing import Any, TypeVar, cast
@@ -18,6 +19,8 @@ except ImportError:  # the codec runs anywhere Python and NumPy run
     config = njit = None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+_listeners: list[Callable[[], None]] = []
 
 
 def compiled(function: Function) -> Function:
@@ -38,14 +41,14 @@ def _compiled(function: Function, **options: bool) -> Function:
     if not config.DISABLE_JIT:
         from fba._numba_cache import MachineCode
 
-        dispatcher._cache = MachineCode(cast(FunctionType, function))
+        dispatcher._cache = MachineCode(cast(FunctionType, function), announce_compilation)
         dispatcher.get_call_template = partial(_call_by_type, dispatcher)
     result: Function = dispatcher
     return result
 
 
 def _call_by_type(dispatcher: Any, arguments: Any, named: Any) -> Any:
-    """How another compiled function calls this one: by the types of the arguments alone.
+    """The template by which another compiled function calls this one, chosen by the arguments' types alone.
 
     Numba would compile it once more for each constant that is passed to it.
     """
@@ -60,3 +63,22 @@ def _call_by_type(dispatcher: Any, arguments: Any, named: Any) -> Any:
 def is_compiled() -> bool:
     """Whether the hot loops run as machine code in this process."""
     return njit is not None and not config.DISABLE_JIT
+
+
+@contextmanager
+def compilation_listener(listener: Callable[[], None] | None) -> Iterator[None]:
+    """Calls the listener, where there is one, before each function that is compiled while the block runs."""
+    if listener is None:
+        yield
+        return
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
+
+
+def announce_compilation() -> None:
+    """Calls every listener: a function is about to be compiled, which takes seconds the first time."""
+    for listener in tuple(_listeners):
+        listener()

@@ -26,10 +26,11 @@ MOST_FILES = 20
 """Modules in a folder, its `__init__` not counted."""
 
 _FLOORS = """
-fba
 fba.parameters
+fba
 fba.mesh
 fba.gltf
+fba.codec.settings
 fba.codec._plane
 fba.codec
 fba.face.interpolation

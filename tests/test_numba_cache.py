@@ -14,8 +14,7 @@ from typing import Any
 
 import pytest
 
-from fba.compilation import heard
-from fba.compiled import is_compiled
+from fba.compiled import compilation_listener, is_compiled
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="nothing is compiled here")
 
@@ -82,7 +81,7 @@ def told(module: ModuleType) -> tuple[float, int]:
     import numpy as np
 
     heard_of: list[int] = []
-    with heard(lambda: heard_of.append(1)):
+    with compilation_listener(lambda: heard_of.append(1)):
         found = float(module.total(np.ones(3), 1.0))
     return found, len(heard_of)
 
@@ -176,7 +175,7 @@ def test_a_file_in_place_of_the_folder_is_no_error(
 
 def test_no_listener_hears_after_its_block(program: Callable[..., ModuleType]) -> None:
     heard_of: list[int] = []
-    with heard(lambda: heard_of.append(1)):
+    with compilation_listener(lambda: heard_of.append(1)):
         pass
     told(program())
     assert heard_of == []

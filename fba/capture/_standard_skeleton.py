@@ -1,7 +1,7 @@
 """The standard's own skeleton, captured in its default posture: every joint's rotation is the BAPs' as it is.
 
 Files that this project writes are of this kind, and so is motion of any H-Anim figure. There is nothing to
-retarget: `Retarget` would spread what the spine does over other vertebrae, and turn clavicles and forearms as
+retarget: `retarget` would spread what the spine does over other vertebrae, and turn clavicles and forearms as
 other skeletons need it.
 """
 

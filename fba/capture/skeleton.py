@@ -15,7 +15,7 @@ from fba.capture import _spine as spines
 from fba.capture import _standard_skeleton as standard_skeleton
 from fba.capture import matching
 from fba.capture.motion import SkeletonMotion
-from fba.capture.retarget import Retarget
+from fba.capture.retarget import find_targets, metres_per_unit, solve_baps
 from fba.errors import FbaWarning, ModelError
 from fba.parameters import BAP_COUNT, baps
 
@@ -108,9 +108,10 @@ def from_skeleton(
         and standard_skeleton.is_direct(motion, solver.skeleton)
     ):
         return _track(motion, standard_skeleton.values(motion, solver, scale, origin), set(motion.names))
-    retarget = Retarget(motion, mapped, solver, scale, groups, spine in ("spread", "joints"))
-    turned = {*retarget.wanted, solver.skeleton.names[0]}
-    return _track(motion, retarget.values(origin, ground, plant), turned)
+    targets = find_targets(motion, mapped, solver, groups, with_anchors=spine in ("spread", "joints"))
+    metres = metres_per_unit(targets, scale)
+    turned = {*targets.rotations, solver.skeleton.names[0]}
+    return _track(motion, solve_baps(targets, metres, origin, ground, plant), turned)
 
 
 def _track(motion: SkeletonMotion, values: npt.NDArray[np.int32], turned: set[str]) -> Animation:

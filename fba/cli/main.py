@@ -19,7 +19,7 @@ from fba.cli._sigint import Interruptions
 from fba.cli._startup import hasten
 from fba.cli.exit_quietly import INTERRUPTED, TEXT
 from fba.cli.options import Group, described, examples
-from fba.compilation import heard
+from fba.compiled import compilation_listener
 from fba.errors import FbaError, FbaWarning, did_you_mean
 
 _COMMANDS = {
@@ -120,7 +120,7 @@ def main(arguments: list[str] | None = None) -> None:
     interruptions = Interruptions()
     notice = Notice(next((one for one in arguments if one in _COMMANDS), "")) if own else None
     try:
-        with interruptions, heard(notice):
+        with interruptions, compilation_listener(notice):
             result = group.main(arguments, prog_name=program, standalone_mode=False)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)

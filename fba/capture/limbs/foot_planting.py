@@ -2,123 +2,126 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
 from fba import rotations
 from fba.capture.limbs import _leg_ik as leg_ik
 from fba.capture.limbs import bone_ik, ground, soles
-
-if TYPE_CHECKING:
-    from fba.capture.retarget import Retarget
+from fba.capture.limbs.targets import Targets
 
 Float = npt.NDArray[np.float64]
 
 STEPS = 4
-"""Of finding the ankle and the roll that point a foot exactly."""
+"""Steps of the search for the ankle and the roll that point a foot exactly."""
 ROUNDS = 2
-"""How often legs move for what their feet still lack."""
+"""How often the legs move to close the gap that their feet have left."""
 STIFFEST = 1.1
-"""Say of a straight leg in how high the body is, which a bent one has less of, being able to give way."""
+"""Weight of a straight leg in the height of the body; a bent leg, which can give way, has less."""
 
 
-class Footing:
-    """Works on the wanted rotations of a body that is being retargeted.
+def turn_foot(targets: Targets, side: str) -> None:
+    """Shares the target of a foot out over its ankle and subtalar joint.
 
-    rotations: side -> (T, 3, 3), of the whole foot, as the source's stands.
+    The ankle has no roll; the subtalar joint, a little lower, has.
     """
+    ankle, subtalar, toe = f"{side}_ankle", f"{side}_subtalar", f"{side}_metatarsal"
+    if side not in targets.feet:
+        return
+    foot = targets.feet[side]
+    if targets.aims.get(ankle) != toe:
+        _split_foot(targets, ankle, subtalar, foot)
+        return
+    centres = {j: targets.skeleton.centres[targets.skeleton.number(j)] for j in (ankle, subtalar, toe)}
+    heel, sole = centres[subtalar] - centres[ankle], centres[toe] - centres[subtalar]
+    direction = foot @ targets.bone(ankle, toe)
+    for _ in range(STEPS):  # the bone between the two joints turns with the ankle only
+        _split_foot(targets, ankle, subtalar, foot)
+        foot = rotations.between_all(targets.rotations[ankle] @ heel + foot @ sole, direction) @ foot
+    _split_foot(targets, ankle, subtalar, foot)
 
-    def __init__(self, body: Retarget) -> None:
-        self.body = body
-        self.rotations: dict[str, Float] = {}
 
-    def turn(self, side: str) -> None:
-        """The ankle lacks the roll of the foot: the subtalar joint, a little lower, takes it."""
-        ankle, subtalar, toe = f"{side}_ankle", f"{side}_subtalar", f"{side}_metatarsal"
-        if ankle not in self.body.wanted or subtalar not in self.body.skeleton:
-            return
-        foot = self.rotations.setdefault(side, self.body.wanted[ankle])
-        if self.body.aims.get(ankle) != toe:
-            self._split(ankle, subtalar, foot)
-            return
-        places = {j: self.body.skeleton.centres[self.body.skeleton.number(j)] for j in (ankle, subtalar, toe)}
-        heel, sole = places[subtalar] - places[ankle], places[toe] - places[subtalar]
-        direction = foot @ self.body.bone(ankle, toe)
-        for _ in range(STEPS):  # what lies between the two joints turns with the ankle only
-            self._split(ankle, subtalar, foot)
-            foot = rotations.between_all(self.body.wanted[ankle] @ heel + foot @ sole, direction) @ foot
-        self._split(ankle, subtalar, foot)
+def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float) -> None:
+    """Sets both joints so that together they turn the foot: flexion, twist and roll reach any rotation."""
+    above = targets.parent_rotation(ankle)
+    own = targets.axes(ankle)[0]
+    axes = np.concatenate([own, targets.axes(subtalar)[0]])
+    targets.rotations[subtalar] = foot
+    handedness = np.linalg.det(axes) if len(axes) == 3 else 0.0
+    if abs(handedness) < 0.5:
+        return
+    last = rotations.inside(above, foot @ axes[2]) @ axes.T  # the last axis, as the foot turns it
+    outer = np.arctan2(-handedness * last[:, 1], last[:, 2])
+    inner = np.arctan2(handedness * last[:, 0], np.hypot(last[:, 1], last[:, 2]))
+    targets.rotations[ankle] = above @ bone_ik.product(own, np.stack([outer, inner], axis=1))
 
-    def _split(self, ankle: str, subtalar: str, foot: Float) -> None:
-        """Both joints together take the foot's rotation: flexion, twisting and roll make any of them."""
-        above = self.body.before(ankle)
-        own = self.body.turns(ankle)[0]
-        axes = np.concatenate([own, self.body.turns(subtalar)[0]])
-        self.body.wanted[subtalar] = foot
-        handed = np.linalg.det(axes) if len(axes) == 3 else 0.0
-        if abs(handed) < 0.5:
-            return
-        last = rotations.inside(above, foot @ axes[2]) @ axes.T  # the last axis, as the foot turns it
-        outer = np.arctan2(-handed * last[:, 1], last[:, 2])
-        inner = np.arctan2(handed * last[:, 0], np.hypot(last[:, 1], last[:, 2]))
-        self.body.wanted[ankle] = above @ bone_ik.product(own, np.stack([outer, inner], axis=1))
 
-    def stand(self, root: Float, floor: str, plant: bool) -> None:
-        """Raises root (T, 3) until feet stand as the source's do; plant: legs move for what is lacking."""
-        body = self.body
-        toes = "l_metatarsal" in body.mapped
-        rate = float(body.motion.rate)
-        source = soles.source_soles(
-            body.motion, body.mapped, body.upright, body.turned, body.places, body.scale
+def plant_feet(targets: Targets, root: Float, scale: float, floor: str, plant: bool) -> Float:
+    """Positions of the root (T, 3), metres, at which the feet stand as the source's do.
+
+    root: positions to start from. scale: metres for one unit of the source. floor: "floor" where the ground
+    is at height 0, else it is at the source's. plant: legs, too, move, which changes the targets.
+    """
+    root = root.copy()
+    toes = "l_metatarsal" in targets.mapped
+    rate = float(targets.motion.rate)
+    source = soles.source_soles(
+        targets.motion,
+        targets.mapped,
+        targets.upright,
+        targets.source_rotations,
+        targets.source_positions,
+        scale,
+    )
+    body = soles.body_soles(targets.skeleton, targets.rotations, root, toes)
+    if source is None or body is None:
+        return root
+    middles = source.points.mean(axis=1)
+    level = ground.found(source.lowest, middles).under(middles)
+    above = source.lowest - level
+    under = np.zeros_like(level) if floor == "floor" else level
+    stiff = np.ones_like(above)
+    if plant and all(targets.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):
+        pliant = np.array([leg_ik.pliancy(_leg(targets, side, root)) for side in "lr"])
+        stiff = STIFFEST - pliant
+        raised = soles.lift(above, body.lowest - under, stiff, rate)
+        whole, along = soles.slips(source.points, body.points, level, rate)
+        root[:, [0, 2]] += whole
+        ups = soles.heights(above, body.lowest - under + raised, rate)
+        for side, pitch in zip("lr", soles.pitches(body.points, ups), strict=True):
+            targets.feet[side] = pitch @ targets.feet[side]
+            turn_foot(targets, side)
+        for _ in range(ROUNDS):
+            body = soles.body_soles(targets.skeleton, targets.rotations, root, toes) or body
+            ups = soles.heights(above, body.lowest - under + raised, rate)
+            for side, up, course in zip("lr", ups, along, strict=True):
+                _move_foot(targets, side, root, np.stack([course[:, 0], up, course[:, 1]], axis=1))
+            along = np.zeros_like(along)
+        body = soles.body_soles(targets.skeleton, targets.rotations, root, toes) or body
+    root[:, 1] += soles.lift(above, body.lowest - under, stiff, rate)
+    return root
+
+
+def _move_foot(targets: Targets, side: str, root: Float, move: Float) -> None:
+    """Bends a leg so that its foot moves by move (T, 3), metres."""
+    thigh, shank = leg_ik.reach(_leg(targets, side, root), move)
+    targets.rotations[f"{side}_hip"] = thigh @ targets.rotations[f"{side}_hip"]
+    targets.rotations[f"{side}_knee"] = shank @ targets.rotations[f"{side}_knee"]
+    turn_foot(targets, side)
+
+
+def _leg(targets: Targets, side: str, root: Float) -> leg_ik.Leg:
+    """World positions of a leg's joints, and the axis of its knee."""
+    knee = f"{side}_knee"
+    frames = {
+        name: (position, frame)
+        for name, position, frame in soles.followed(
+            targets.skeleton, targets.rotations, root, f"{side}_ankle"
         )
-        standing = soles.body_soles(body.skeleton, body.wanted, root, toes)
-        if source is None or standing is None:
-            return
-        middles = source.points.mean(axis=1)
-        level = ground.found(source.lowest, middles).under(middles)
-        above = source.lowest - level
-        under = np.zeros_like(level) if floor == "floor" else level
-        stiff = np.ones_like(above)
-        if plant and all(self.body.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):
-            pliant = np.array([leg_ik.pliancy(self._leg(side, root)) for side in "lr"])
-            stiff = STIFFEST - pliant
-            raised = soles.lift(above, standing.lowest - under, stiff, rate)
-            whole, along = soles.slips(source.points, standing.points, level, rate)
-            root[:, [0, 2]] += whole
-            ups = soles.heights(above, standing.lowest - under + raised, rate)
-            for side, pitch in zip("lr", soles.pitches(standing.points, ups), strict=True):
-                self.rotations[side] = pitch @ self.rotations[side]
-                self.turn(side)
-            for _ in range(ROUNDS):
-                standing = soles.body_soles(body.skeleton, body.wanted, root, toes) or standing
-                ups = soles.heights(above, standing.lowest - under + raised, rate)
-                for side, up, course in zip("lr", ups, along, strict=True):
-                    self._move(side, root, np.stack([course[:, 0], up, course[:, 1]], axis=1))
-                along = np.zeros_like(along)
-            standing = soles.body_soles(body.skeleton, body.wanted, root, toes) or standing
-        root[:, 1] += soles.lift(above, standing.lowest - under, stiff, rate)
-
-    def _move(self, side: str, root: Float, move: Float) -> None:
-        """A leg takes its foot elsewhere, by move (T, 3), metres."""
-        thigh, shank = leg_ik.reach(self._leg(side, root), move)
-        self.body.wanted[f"{side}_hip"] = thigh @ self.body.wanted[f"{side}_hip"]
-        self.body.wanted[f"{side}_knee"] = shank @ self.body.wanted[f"{side}_knee"]
-        self.turn(side)
-
-    def _leg(self, side: str, root: Float) -> leg_ik.Leg:
-        """Where the joints of a leg are."""
-        knee = f"{side}_knee"
-        found = {
-            name: (place, frame)
-            for name, place, frame in soles.followed(
-                self.body.skeleton, self.body.wanted, root, f"{side}_ankle"
-            )
-        }
-        axes, *_ = self.body.turns(knee)
-        bone = self.body.bone(knee, f"{side}_ankle")
-        outermost = abs(axes[0] @ bone) < abs(axes[-1] @ bone)
-        axis = found[f"{side}_hip"][1] @ axes[0] if outermost else found[knee][1] @ axes[-1]
-        hip, middle, ankle = (found[f"{side}_{joint}"][0] for joint in ("hip", "knee", "ankle"))
-        return leg_ik.Leg(hip, middle, ankle, axis)
+    }
+    axes, *_ = targets.axes(knee)
+    bone = targets.bone(knee, f"{side}_ankle")
+    outermost = abs(axes[0] @ bone) < abs(axes[-1] @ bone)
+    axis = frames[f"{side}_hip"][1] @ axes[0] if outermost else frames[knee][1] @ axes[-1]
+    hip, middle, ankle = (frames[f"{side}_{joint}"][0] for joint in ("hip", "knee", "ankle"))
+    return leg_ik.Leg(hip, middle, ankle, axis)

@@ -1,0 +1,78 @@
+"""`Targets`: the world rotations that the body's joints are to take, as retargeting works them out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.body import BapSolver, Skeleton
+from fba.body.solve.solver_loops import joint_angles
+from fba.capture.motion import SkeletonMotion
+
+Float = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Target rotations of the body's joints, and the captured motion that they follow.
+
+    motion: the source, T frames. mapped: joint of the body -> number of the source's joint.
+    aims: joint -> the joint at the other end of its bone, where the source has both.
+    upright: (3, 3), turns the source's axes to the body's. source_rotations: (T, J, 4), world quaternions of
+    the source's joints in its own axes. source_positions: (T, J, 3), their positions in the body's axes and
+    the source's unit.
+    rotations: joint -> (T, 3, 3), target in world axes; the limbs' functions replace its entries one by one.
+    feet: side "l" or "r" -> (T, 3, 3), target of the whole foot, which ankle and subtalar joint share.
+    """
+
+    solver: BapSolver
+    motion: SkeletonMotion
+    mapped: dict[str, int]
+    aims: dict[str, str]
+    upright: Float
+    source_rotations: Float
+    source_positions: Float
+    rotations: dict[str, Float]
+    feet: dict[str, Float]
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The body's skeleton."""
+        return self.solver.skeleton
+
+    def bone(self, joint: str, aim: str) -> Float:
+        """Unit vector (3,) from one joint of the resting body to another."""
+        centres, number = self.skeleton.centres, self.skeleton.number
+        vector = centres[number(aim)] - centres[number(joint)]
+        unit: Float = vector / np.linalg.norm(vector)
+        return unit
+
+    def direction(self, joint: str) -> Float:
+        """Unit vectors (T, 3) in which the bone that begins at a joint is to point."""
+        return self.rotations[joint] @ self.bone(joint, self.aims[joint])
+
+    def axes(self, joint: str) -> tuple[Float, npt.NDArray[np.int64], Float]:
+        """Signed axes (K, 3) of a joint, outermost first, and their numbers (3,) and signs (3,)."""
+        rules = self.solver.convention
+        row = rules.joints.index(joint)
+        count = len(rules.freedoms(joint))
+        axes = np.eye(3)[rules.axis[row]] * rules.sign[row][:, None]
+        return axes[:count], rules.axis[row], rules.sign[row]
+
+    def parent_rotation(self, joint: str) -> Float:
+        """Target (T, 3, 3) of the closest joint above that has one."""
+        number = self.skeleton.number(joint)
+        while (number := int(self.skeleton.parents[number])) >= 0:
+            if self.skeleton.names[number] in self.rotations:
+                return self.rotations[self.skeleton.names[number]]
+        return np.broadcast_to(np.eye(3), (len(self.motion), 3, 3))
+
+    def closest_angles(self, joint: str, local: Float) -> Float:
+        """Angles (T, K) about a joint's axes that come closest to the rotations local (T, 3, 3)."""
+        axes, numbers, signs = self.axes(joint)
+        angles = np.zeros((3, len(local)))
+        frames_last = np.ascontiguousarray(np.moveaxis(local, 0, -1))
+        joint_angles(frames_last, len(axes), numbers[None], signs[None], angles)
+        return angles[: len(axes)].T
