@@ -36,8 +36,13 @@ class Polygons:
     def __len__(self) -> int:
         return len(self.starts) - 1
 
+    def in_groups(self, *names: str) -> Bool:
+        """Mask bool (F,) of the polygons in groups or objects of these names, whatever their material."""
+        wanted = [index for index, (group, _) in enumerate(self.groups) if group in names]
+        return np.isin(self.group, wanted)
+
     def used(self, faces: Bool) -> Int32:
-        """Vertices of some polygons, rising."""
+        """Vertices of some polygons, in ascending order."""
         return np.unique(self.corners[np.repeat(faces, np.diff(self.starts))]).astype(np.int32)
 
 

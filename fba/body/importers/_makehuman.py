@@ -18,15 +18,17 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.importers._obj_mesh import ObjMesh, read_obj_mesh, read_text
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest
 from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
-from fba.errors import ModelError
+from fba.errors import FormatError, ModelError
 from fba.gltf.document import MAX_ITEMS, parse_json
 from fba.gltf.values import Value
 from fba.mesh.meshes import vertex_normals
+from fba.mesh.obj import read_obj
+from fba.mesh.polygons import Polygons, triangulate
+from fba.mesh.text_files import whole
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
@@ -58,6 +60,7 @@ WHOLE = 0.999
 SKIN = Material("skin", (0.71, 0.47, 0.36), 0.55)
 EYE = Material("eye", (0.75, 0.72, 0.70), 0.2)
 MAX_WEIGHTS = 1 << 20
+RIG_FILE, WEIGHTS_FILE = "default.mhskel", "default_weights.mhw"
 
 
 def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> BodyModel:
@@ -67,20 +70,22 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
     a part of kind "head", left out where a face is put on the body. Raises FormatError where a file is
     missing, ModelError, which names the place in it, where it is damaged or another mesh or rig.
     """
-    folder = Path(path) if Path(path).is_dir() else Path(path).parent
-    mesh = read_obj_mesh(folder / "base.obj" if Path(path).is_dir() else path)
-    if len(mesh.vertices) != VERTICES or "body" not in mesh.groups or not len(mesh.of("body")):
+    base = Path(path) / "base.obj" if Path(path).is_dir() else Path(path)
+    folder = base.parent
+    mesh = read_obj(_existing(base))
+    body = _triangles(mesh, "body")
+    if len(mesh.vertices) != VERTICES or not len(body):
         raise ModelError(
             f"{folder}: this is not MakeHuman's base mesh hm08: {len(mesh.vertices)} vertices instead of "
             f"{VERTICES}"
         )
-    low = mesh.vertices[mesh.of("body")].reshape(-1, 3)[:, 1].min()
+    low = mesh.vertices[body].reshape(-1, 3)[:, 1].min()
     vertices = (mesh.vertices - (0.0, low, 0.0)) * METRES
-    rig = _json(folder / "default.mhskel")
+    rig = _json(folder / RIG_FILE)
     bones, at = _rig(rig, vertices)
     places = _places(at, rig)
     bind = bind_matrices(places)
-    weights = _weights(_json(folder / "default_weights.mhw"), bones, vertices, places)
+    weights = _weights(_json(folder / WEIGHTS_FILE), bones, vertices, places)
     pupils = np.array([at(rig, f"eye.{side}____head") for side in "LR"])
     pupils[:, 2] += _eye_radius(mesh, vertices)
     return BodyModel(
@@ -115,8 +120,19 @@ class _At:
 
 
 def _json(path: Path) -> Value:
-    text = read_text(path)
-    return Value(parse_json(memoryview(text.encode()), path.name), path.name)
+    return Value(parse_json(memoryview(whole(_existing(path))), path.name), path.name)
+
+
+def _existing(path: Path) -> Path:
+    """The same path; FormatError where there is no file."""
+    if not path.is_file():
+        raise FormatError("cannot be read: there is no such file", path=path)
+    return path
+
+
+def _triangles(mesh: Polygons, *groups: str) -> Int64:
+    """(F, 3) the triangles of some groups."""
+    return triangulate(mesh, mesh.in_groups(*groups)).corners.astype(np.int64)
 
 
 def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _At]:
@@ -210,8 +226,8 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, pl
     return whole
 
 
-def _eye_radius(mesh: ObjMesh, vertices: Float64) -> float:
-    eye = vertices[np.unique(mesh.of("helper-l-eye"))]
+def _eye_radius(mesh: Polygons, vertices: Float64) -> float:
+    eye = vertices[np.unique(_triangles(mesh, "helper-l-eye"))]
     return float(np.ptp(eye[:, 2])) / 2 if len(eye) else 0.0
 
 
@@ -236,18 +252,18 @@ def _above(triangles: Int64, vertices: Float64) -> npt.NDArray[np.bool_]:
     return above
 
 
-def _parts(mesh: ObjMesh, vertices: Float64, weights: Float64) -> tuple[BodyPart, ...]:
+def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPart, ...]:
     """Body, neck and head, and the eyes of that."""
     default = Skeleton.default()
     skull = weights[:, default.number("skullbase")]
-    body = mesh.of("body")
+    body = _triangles(mesh, "body")
     above = _above(body, vertices)
     head = above & (skull[body] > WHOLE).all(axis=1)
     throat = above & ~head
     spine = [name[0] == "v" or name == "sacroiliac" for name in default.names]
     joints, strong = strongest(weights, spine)
     normals = vertex_normals(vertices, body)
-    eyes = mesh.of("helper-l-eye", "helper-r-eye")
+    eyes = _triangles(mesh, "helper-l-eye", "helper-r-eye")
     chosen = (
         ("skin", "skin", body[~head & ~throat], normals, SKIN),
         ("neck", "neck", body[throat], normals, SKIN),

@@ -148,7 +148,8 @@ def test_another_mesh(tmp_path: Path) -> None:
         ("v 0 0\n", ":1: "),
         ("v 0 0 nan\n", ":1: "),
         ("v 0 0 0\nf 1 2 3\n", ":2: "),
-        ("", "no mesh"),
+        ("# nothing\n", "0 vertices"),
+        ("", "is empty"),
     ):
         (tmp_path / "base.obj").write_text(text)
         with pytest.raises(ModelError, match=place):

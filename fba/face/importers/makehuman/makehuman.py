@@ -89,7 +89,9 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
     """The head, with what is needed to apply targets of the base mesh to it; as `makehuman_parts`."""
     file = base_file(path)
     base = read_obj(file)
-    missing = [name for name in ("body", *(g for h in HELPERS for g in h[2])) if not _group(base, name).any()]
+    missing = [
+        name for name in ("body", *(g for h in HELPERS for g in h[2])) if not base.in_groups(name).any()
+    ]
     if len(base.vertices) != VERTICES or missing:
         raise ModelError(
             f"{file}: this is not MakeHuman's base mesh hm08: {len(base.vertices)} vertices instead of "
@@ -98,7 +100,7 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
     sources = [_skin(base)]
     sources += _eyes(file, base)
     for name, kind, groups in HELPERS:
-        faces = np.any([_group(base, group) for group in groups], axis=0)
+        faces = base.in_groups(*groups)
         sources.append(make_part(base, faces, name, kind, scale=METRES, material=LOOKS[kind]))
     points, bound = _feature_points(base, sources)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
@@ -128,11 +130,6 @@ def _rows(name: str, key: str) -> dict[str, tuple[int, ...]]:
         return {row[key]: tuple(map(int, row["vertices"].split())) for row in csv.DictReader(file)}
 
 
-def _group(base: Polygons, name: str) -> Bool:
-    wanted = [index for index, (group, _) in enumerate(base.groups) if group == name]
-    return np.isin(base.group, wanted)
-
-
 def _head(base: Polygons) -> tuple[Bool, Bool]:
     """Faces of the body that are the head, and among them those of the inside of the mouth.
 
@@ -142,7 +139,7 @@ def _head(base: Polygons) -> tuple[Bool, Bool]:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    body = np.flatnonzero(_group(base, "body"))
+    body = np.flatnonzero(base.in_groups("body"))
     starts, sizes = base.starts[body], np.diff(base.starts)[body]
     face = np.repeat(np.arange(len(body)), sizes)
     place = np.arange(len(face)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
@@ -187,7 +184,8 @@ def _eyes(file: Path, base: Polygons) -> list[Source]:
     if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
         return [
-            make_part(base, _group(base, g), n, "eye", scale=METRES, material=LOOKS["eye"]) for n, g in sides
+            make_part(base, base.in_groups(g), n, "eye", scale=METRES, material=LOOKS["eye"])
+            for n, g in sides
         ]
     return eye_pieces(clothes, base.vertices)
 
