@@ -33,7 +33,12 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
     for fap in wanted:
         if not FIRST_LOW_LEVEL_FAP <= fap <= FAP_COUNT:
             raise OptionError(f"FAP {fap} cannot be checked: there are {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}")
-    poser = Poser(model)
+    return check_posed(Poser(model), wanted)
+
+
+def check_posed(poser: Poser, wanted: Iterable[int]) -> list[Finding]:
+    """The same for FAPs of 3..68, of a model under measurement: for who asks more than once."""
+    wanted = list(wanted)
     found: list[Finding] = []
     for fap in wanted:
         found += _one(poser, fap)
