@@ -1,11 +1,11 @@
-"""`fba` and `python` on the PATH of a test, that start at once: each run is a fork of a process that has imported
-everything already.
+"""`fba` and `python` on the PATH of a test, that start at once: each run is a fork of a process that has
+imported everything already.
 
-A run has its own process, folder, environment, standard streams and exit code, as if it were started anew; of a
-start, only the imports are spared, and for `fba` the loading of machine code. `python` starts without any module
-of this project, so that what a script forgets to import is missing. A run whose environment could change what
-was imported (`NUMBA_...`, `PYTHON...`, `FBA_...`), or a Python with other options than -c and -m, is started as
-usual.
+A run has its own process, folder, environment, standard streams and exit code, as if it were started anew; of
+a start, only the imports are spared, and for `fba` the loading of machine code. `python` starts without any
+module of this project, so that what a script forgets to import is missing. A run whose environment could
+change what was imported (`NUMBA_...`, `PYTHON...`, `FBA_...`), or a Python with other options than -c and -m,
+is started as usual.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
 FOREIGN = (
     "numpy", "numba", "scipy.interpolate", "scipy.optimize", "scipy.sparse.csgraph", "scipy.sparse.linalg",
-    "scipy.spatial.transform", "bitstring", "click", "rich.console", "rich.table", "rich.progress", "moderngl",
-    "av", "PIL.Image", "PIL.PngImagePlugin",
+    "scipy.spatial.transform", "bitstring", "click", "rich.console", "rich.table", "rich.progress",
+    "moderngl", "av", "PIL.Image", "PIL.PngImagePlugin",
 )  # fmt: skip
 """Modules of others that both programs find imported, those of them that are installed."""
 
@@ -66,7 +66,9 @@ def ready_programs() -> Iterator[Path]:
     try:
         assert server.stdout is not None
         assert server.stdout.readline() == b"ready\n", "the ready programs did not start"
-        settings = {key: value for key, value in os.environ.items() if key.startswith(("NUMBA", "PYTHON", "FBA"))}
+        settings = {
+            key: value for key, value in os.environ.items() if key.startswith(("NUMBA", "PYTHON", "FBA"))
+        }
         for name in ("fba", "python"):
             shim = folder / "bin" / name
             shim.write_text(SHIM.format(
@@ -141,8 +143,8 @@ def work(
     for number, stream in enumerate(streams):
         os.dup2(stream, number)
         os.close(stream)
-    sys.stdin, sys.stdout = open(0, closefd=False), open(1, "w", closefd=False)
-    sys.stderr = open(2, "w", buffering=1, errors="backslashreplace", closefd=False)
+    sys.stdin, sys.stdout = open(0, closefd=False), open(1, "w", closefd=False)  # noqa: SIM115
+    sys.stderr = open(2, "w", buffering=1, errors="backslashreplace", closefd=False)  # noqa: SIM115
     sys.__stdin__, sys.__stdout__, sys.__stderr__ = sys.stdin, sys.stdout, sys.stderr
     os.chdir(folder)
     os.environ.clear()
@@ -159,7 +161,7 @@ def work(
     except SystemExit as stop:
         code = stop.code
         if not isinstance(code, int | None):
-            print(code, file=sys.stderr)
+            sys.stderr.write(f"{code}\n")
             code = 1
     except BaseException:
         sys.excepthook(*sys.exc_info())

@@ -338,7 +338,7 @@ def test_no_allocation_when_arrays_are_given() -> None:
             rounds.append((peak - before, after - before))
     finally:
         tracemalloc.stop()
-    # What the code allocates or keeps, it does in every round; while free lists still turn over, some show more.
+    # What the code allocates or keeps, it does in every round; free lists that turn over show in some.
     most, kept = map(min, zip(*rounds, strict=True))
     assert most < 4096  # a few objects of Python; one array of vertices would be 14,700 bytes
     assert kept < 1024

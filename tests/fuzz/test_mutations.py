@@ -1,7 +1,7 @@
 """Damaged streams, each made from its number: an error of ours, or a valid result. Part of them runs with
 bounds checks in the compiled loops, which find what would otherwise read or write beside an array.
 
-`./dev fuzz` tries 20,000, with `FBA_FUZZ=long`; the other tests are not to wait for more than the first 2,500.
+`./dev fuzz` tries 20,000 (`FBA_FUZZ=long`); among the other tests, the first 2,500 run.
 """
 
 from __future__ import annotations

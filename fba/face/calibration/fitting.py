@@ -238,7 +238,9 @@ def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) ->
         return carried
     new = Poser(_authored(model, fitted), like=bent)
     best = Poser(_best_of(new, bent), like=new)
-    return min((new.model, _errors(new)), (best.model, _errors(best)), (carried, broken), key=itemgetter(1))[0]
+    return min((new.model, _errors(new)), (best.model, _errors(best)), (carried, broken), key=itemgetter(1))[
+        0
+    ]
 
 
 def _best_of(first: Poser, second: Poser) -> FaceModel:
