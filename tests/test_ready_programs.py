@@ -32,7 +32,7 @@ def sh(programs: Path, command: str, folder: Path) -> tuple[int, str, str]:
     [
         "fba info IN/hello.fap; echo $?; fba info missing.fap; echo $?; fba --nonsense",
         "fba encode IN/hello.fap -o one.fba && fba decode one.fba --fap - | fba info - | head -n 2; ls",
-        "python -c 'import os, sys; print(os.environ[\"WORD\"], sys.argv[1], os.getcwd()); sys.exit(\"no\")' a",
+        "python -c 'import os, sys; print(os.environ[\"WORD\"], sys.argv, os.getcwd()); sys.exit(\"n\")'",
         "python -c 'print(1 // 0)' 2>&1 | tail -n 1",
         'python -c \'import sys; print("fba" in sys.modules, "tests" in "".join(sys.path)); import fba\'',
         "python; python -m fba --version; echo 'import sys; print(sys.argv)' >one.py; python one.py x",
