@@ -19,7 +19,6 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -31,6 +30,7 @@ import pytest
 
 import graphics
 from fba.cli.main import _COMMANDS, group
+from ready_programs import BIN, ready_programs
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -178,13 +178,25 @@ def test_every_reason_for_not_running_belongs_to_a_block() -> None:
     assert not set(ILLUSTRATIONS) - there
 
 
+@pytest.fixture(scope="module")
+def programs() -> Iterator[Path]:
+    """A folder with `fba` and `python` that start at once."""
+    with ready_programs() as folder:
+        yield folder
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=id_of)
-def test_page_runs_from_its_first_block_to_its_last(page: Path, tmp_path: Path) -> None:
+def test_page_runs_from_its_first_block_to_its_last(
+    page: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """The README's blocks with the installed programs; those of the others with the same, started sooner."""
+    programs = BIN if page.name == "README.md" else request.getfixturevalue("programs")
     folder, place = tmp_path / "reader", tmp_path / "place"
     folder.mkdir()
     for sample in SAMPLES.iterdir():
         shutil.copy(sample, folder)
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    paths = [str(programs), str(BIN), os.environ["PATH"]]
+    environment = {**os.environ, "PATH": os.pathsep.join(paths)}
     printed: set[str] = set()
     undrawn = False
     for block in blocks(page):
@@ -194,7 +206,7 @@ def test_page_runs_from_its_first_block_to_its_last(page: Path, tmp_path: Path) 
         if block.language not in RUN:
             continue
         if block.language == "python":
-            command = [sys.executable, "-c", block.code]
+            command = [str(programs / "python"), "-c", block.code]
         else:  # where it leads with `cd`, the next block begins
             command = ["sh", "-e", "-c", f"{block.code}\npwd >{shlex.quote(str(place))}"]
         run = subprocess.run(

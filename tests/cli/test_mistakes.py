@@ -205,6 +205,20 @@ def test_one_bad_file_of_several_is_named_and_the_others_go_on(
     assert err.count("two.fba") == 1
 
 
+def test_a_row_of_stats_for_a_program_is_one_line_however_long_the_name(
+    run: Run, tmp_path: Path, streams: list[Path]
+) -> None:
+    folder = tmp_path / ("long " * 40)
+    folder.mkdir()
+    (folder / "deep.fba").write_bytes(streams[0].read_bytes())
+    code, out, _ = run("stats", folder / "deep.fba", streams[2])
+    assert code == 0
+    rows = out.splitlines()
+    assert len(rows) == 3
+    assert rows[1].startswith(f"{folder / 'deep.fba'} ")
+    assert rows[2].startswith(f"{streams[2]} ")
+
+
 @pytest.mark.parametrize("command", ["stats", "bench", "decode", "info --trace"])
 def test_what_is_no_stream_is_said_to_be_what_it_is(
     run: Run, tmp_path: Path, streams: list[Path], command: str

@@ -1,5 +1,8 @@
-"""20,000 damaged streams, each made from its number: an error of ours, or a valid result. Part of them runs
-with bounds checks in the compiled loops, which find what would otherwise read or write beside an array."""
+"""Damaged streams, each made from its number: an error of ours, or a valid result. Part of them runs with
+bounds checks in the compiled loops, which find what would otherwise read or write beside an array.
+
+`./dev fuzz` tries 20,000 (`FBA_FUZZ=long`); among the other tests, the first 2,500 run.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,7 @@ import pytest
 
 from fba_conformance import fuzz
 
-COUNT = 20_000
-CHECKED = 1_500
+COUNT, CHECKED = (20_000, 1_500) if os.environ.get("FBA_FUZZ") == "long" else (2_500, 250)
 SEED = 20_000
 SLOWEST = 5.0
 """Seconds that one small stream may take on a machine that is busy with other things."""
@@ -23,9 +25,17 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def checked_process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen[str]]:
-    """The fuzzer with every array access checked; it compiles and runs while the others are at work."""
-    cache = tmp_path_factory.mktemp("numba")
+def checked_process(
+    tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config
+) -> Iterator[subprocess.Popen[str]]:
+    """The fuzzer with every array access checked; it compiles and runs while the others are at work.
+
+    What it compiles is kept in pytest's cache, if there is one: `fba.machine_code` sees when that is too old.
+    """
+    try:
+        cache = pytestconfig.cache.mkdir("fuzz-numba")  # type: ignore[union-attr]
+    except (AttributeError, OSError):  # -p no:cacheprovider, or a checkout that may only be read
+        cache = tmp_path_factory.mktemp("numba")
     process = subprocess.Popen(
         [sys.executable, "-m", "fba_conformance.fuzz", "--count", str(CHECKED), "--seed", str(SEED + 1)],
         cwd=ROOT,

@@ -11,6 +11,9 @@ import numpy as np
 from fba.cli import options, step_tables
 from fba.codec.stream_info import StreamInfo
 
+LONGEST = 1 << 16
+"""Characters of a row: names of files are shorter."""
+
 
 @click.command(cls=options.Command, epilog=options.examples("fba stats talk.fba", "fba stats --json *.fba"))
 @click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
@@ -72,7 +75,9 @@ def _print(rows: list[dict[str, Any]]) -> None:
             f"{row['predicted_bits_95']:.0f}",
             f"{100 * row['intra_share']:.0f} %",
         )
-    console = Console(width=None if Console().is_terminal else 160)
+    wide = Console(width=LONGEST)
+    # On a terminal, long names are folded; a program that reads it finds every row on one line.
+    console = Console(width=None if wide.is_terminal else max(160, wide.measure(table).maximum))
     with console.capture() as text:  # rich, as it prints, would exit with 1 where a pipe is closed
         console.print(table)
     click.echo(text.get(), nl=False)

@@ -30,6 +30,14 @@ class BitReader:
         number = int.from_bytes(self.data[first:last].tobytes(), "big")
         return (number >> (8 * last - stop)) & ((1 << count) - 1)
 
+    def ahead(self, count: int) -> UInt8 | None:
+        """The next `count` bits, one an element, without going on; None where there are not so many."""
+        start, stop = self.bit, self.bit + count
+        if stop > self.end:
+            return None
+        first = start >> 3
+        return np.unpackbits(self.data[first : (stop + 7) >> 3])[start - 8 * first : stop - 8 * first]
+
 
 class BitWriter:
     """Grows a zeroed buffer; `bit` is the position after what was written."""

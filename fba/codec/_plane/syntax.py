@@ -16,14 +16,18 @@ Reading and writing stand side by side, element by element. A plane is::
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import NamedTuple, NoReturn
+
 import numpy as np
+import numpy.typing as npt
 
 from fba.codec._plane import slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, BitWriter, OutOfDataError
 from fba.codec._plane.loops import STATUS_TEXT
 from fba.codec._plane.loops import read_skip as read_skip_words
-from fba.codec.settings import RANGE_CODE_MAX, FrameRate, PartSettings, RangeLists, TimeCode
+from fba.codec.settings import FrameRate, PartSettings, RangeLists, TimeCode
 from fba.errors import BitstreamError
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_groups, fap_groups
 
@@ -40,6 +44,7 @@ MASK_NONE, MASK_KEEP, MASK_INTERPOLATE, MASK_ALL = range(4)
 LISTS = ("i_max", "i_min", "p_max", "p_min")
 RANGE_BITS = 5
 _MARKER_EVERY = 4
+_RANGE_WEIGHTS = 1 << np.arange(RANGE_BITS, dtype=np.uint8)[::-1]
 
 
 def interpolated(settings: PartSettings) -> slots.Bool | None:
@@ -155,23 +160,56 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
 
 def _read_ranges(reader: BitReader, part: int, mask: slots.Bool) -> RangeLists:
     flags = [reader.read(1) for _ in LISTS]
-    chunks = _range_chunks(part, mask) if any(flags) else []
+    layout = _range_layout(part, mask.tobytes()) if any(flags) else None
     lists: list[np.ndarray | None] = []
     for name, present in zip(LISTS, flags, strict=True):
-        if not present:
+        if not present or layout is None:
             lists.append(None)
             continue
         codes = np.zeros(len(mask), dtype=np.uint8)
-        for chunk in chunks:
-            bits = reader.read(1 + RANGE_BITS * len(chunk))
-            if not bits >> RANGE_BITS * len(chunk):
-                raise _marker_error(reader, f"in the {name} range list", 1 + RANGE_BITS * len(chunk))
-            for parameter in reversed(chunk):
-                codes[parameter - 1] = bits & RANGE_CODE_MAX
-                bits >>= RANGE_BITS
+        bits = reader.ahead(layout.size)
+        if bits is not None and bits[layout.markers].all():
+            codes[layout.columns] = bits[layout.codes] @ _RANGE_WEIGHTS
+            reader.bit += layout.size
+        else:
+            _read_wrong_ranges(reader, name, layout.chunks)
         codes.flags.writeable = False
         lists.append(codes)
     return RangeLists(*lists)
+
+
+def _read_wrong_ranges(reader: BitReader, name: str, chunks: list[list[int]]) -> NoReturn:
+    """Find where a range list goes wrong: a marker bit of 0, or the end of the data. Raises the error."""
+    for chunk in chunks:
+        bits = reader.read(1 + RANGE_BITS * len(chunk))
+        if not bits >> RANGE_BITS * len(chunk):
+            raise _marker_error(reader, f"in the {name} range list", 1 + RANGE_BITS * len(chunk))
+    raise AssertionError("this range list is right")
+
+
+class _RangeLayout(NamedTuple):
+    """A range list of one mask, in bits from its start. columns, codes: (C,), (C, 5) each limit's."""
+
+    chunks: list[list[int]]
+    markers: npt.NDArray[np.intp]
+    columns: npt.NDArray[np.intp]
+    codes: npt.NDArray[np.intp]
+    size: int
+
+
+@lru_cache(maxsize=64)
+def _range_layout(part: int, mask: bytes) -> _RangeLayout:
+    chunks = _range_chunks(part, np.frombuffer(mask, dtype=bool))
+    markers: list[int] = []
+    codes: list[int] = []
+    at = 0
+    for chunk in chunks:
+        markers.append(at)
+        codes += range(at + 1, at + 1 + RANGE_BITS * len(chunk), RANGE_BITS)
+        at += 1 + RANGE_BITS * len(chunk)
+    columns = np.array([number - 1 for chunk in chunks for number in chunk], dtype=np.intp)
+    starts = np.array(codes, dtype=np.intp)[:, None]
+    return _RangeLayout(chunks, np.array(markers, dtype=np.intp), columns, starts + np.arange(RANGE_BITS), at)
 
 
 def _range_chunks(part: int, mask: slots.Bool) -> list[list[int]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
+from operator import itemgetter
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,8 +20,10 @@ from fba.face.calibration._shape import INNER, Shape, deform, rebuilt
 from fba.face.fapu import PER_DISTANCE
 from fba.face.feature_points import names, row_of
 from fba.face.model import FaceModel, Part
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 if TYPE_CHECKING:
+    from fba.face.checks.posing import Poser
     from fba.face.tables import FaceDefTables
 
 Float64 = npt.NDArray[np.float64]
@@ -220,28 +223,35 @@ def _check_folds(model: FaceModel, parts: tuple[Part, ...], targets: Float64, kn
 
 def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) -> FaceModel:
     from fba.face.calibration._carry import carried_tables
+    from fba.face.checks.posing import Poser
 
     if not model.tables:
         return fitted
     if how == "author":
         return _authored(model, fitted)
     carried = replace(fitted, tables=carried_tables(model, fitted.parts, fitted.points, fitted.fapu, shape))
-    if how == "carry" or _errors(carried) <= _errors(model):
+    if how == "carry":
         return carried
-    anew = _authored(model, fitted)
-    candidates = (anew, _best_of(anew, carried), carried)
-    return min(candidates, key=_errors)
+    bent = Poser(carried)
+    broken = _errors(bent)
+    if broken <= _errors(Poser(model)):
+        return carried
+    new = Poser(_authored(model, fitted), like=bent)
+    best = Poser(_best_of(new, bent), like=new)
+    return min((new.model, _errors(new)), (best.model, _errors(best)), (carried, broken), key=itemgetter(1))[
+        0
+    ]
 
 
-def _best_of(first: FaceModel, second: FaceModel) -> FaceModel:
+def _best_of(first: Poser, second: Poser) -> FaceModel:
     """The first model's tables, but the second's for every FAP that they serve better."""
-    chosen = {table.fap: table for table in first.tables}
-    for table in second.tables:
+    chosen = {table.fap: table for table in first.model.tables}
+    for table in second.model.tables:
         number = table.fap
         if number not in chosen or _errors(second, number) < _errors(first, number):
             chosen[number] = table
-    lost = {number: why for number, why in first.lost.items() if number not in chosen}
-    return first.with_tables(tuple(chosen.values()), lost)
+    lost = {number: why for number, why in first.model.lost.items() if number not in chosen}
+    return first.model.with_tables(tuple(chosen.values()), lost)
 
 
 def _authored(model: FaceModel, fitted: FaceModel) -> FaceModel:
@@ -260,10 +270,10 @@ def _authored(model: FaceModel, fitted: FaceModel) -> FaceModel:
     return made.with_tables(served, {**made.lost, **model.lost})
 
 
-def _errors(model: FaceModel, fap: int | None = None) -> int:
-    from fba.face.checks import check_faps
+def _errors(poser: Poser, fap: int | None = None) -> int:
+    from fba.face.checks.fap_checks import check_posed
 
-    findings = check_faps(model, None if fap is None else [fap])
+    findings = check_posed(poser, range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1) if fap is None else [fap])
     return sum(finding.severity == "error" for finding in findings)
 
 

@@ -11,7 +11,7 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 from fba.parameters import faps as fap_table
 
 if TYPE_CHECKING:
-    from fba.face.checks._posing import Poser
+    from fba.face.checks.posing import Poser
     from fba.face.model import FaceModel
 
 
@@ -27,13 +27,18 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
 
     Raises OptionError for another number.
     """
-    from fba.face.checks._posing import Poser
+    from fba.face.checks.posing import Poser
 
     wanted = list(range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1)) if faps is None else list(faps)
     for fap in wanted:
         if not FIRST_LOW_LEVEL_FAP <= fap <= FAP_COUNT:
             raise OptionError(f"FAP {fap} cannot be checked: there are {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}")
-    poser = Poser(model)
+    return check_posed(Poser(model), wanted)
+
+
+def check_posed(poser: Poser, wanted: Iterable[int]) -> list[Finding]:
+    """The same for FAPs of 3..68, of a model under measurement: for who asks more than once."""
+    wanted = list(wanted)
     found: list[Finding] = []
     for fap in wanted:
         found += _one(poser, fap)

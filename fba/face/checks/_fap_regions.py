@@ -10,7 +10,7 @@ from importlib.resources import files
 import numpy as np
 
 from fba.face.checks._findings import Finding
-from fba.face.checks._posing import Poser
+from fba.face.checks.posing import Poser
 from fba.face.feature_points import row_of
 from fba.parameters import faps
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.face.checks._findings import Finding
-from fba.face.checks._posing import Poser
+from fba.face.checks.posing import Poser
 
 Float64 = npt.NDArray[np.float64]
 

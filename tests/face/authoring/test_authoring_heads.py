@@ -11,7 +11,7 @@ from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import check_faps
 from fba.face.checks._lid_rules import SPLITS, lid_cut, lid_gap
-from fba.face.checks._posing import Poser
+from fba.face.checks.posing import Poser
 
 
 def test_the_built_in_head_plays_every_fap_right() -> None:

@@ -321,19 +321,27 @@ def test_no_allocation_when_arrays_are_given() -> None:
     count = len(deformer.model.vertices)
     out, normals = (np.empty((count, 3), np.float32) for _ in range(2))
     vector = frame(f31=50, f49=20)
-    for _ in range(500):  # numba and Python fill their free lists
+    rounds = []
+    for _ in range(400):  # numba and Python fill their free lists
         deformer(vector, out, normals)
     tracemalloc.start()
     try:
-        before = tracemalloc.get_traced_memory()[0]
-        tracemalloc.reset_peak()
-        for _ in range(20):
+        # What replaces objects from before the start counts as new: let all that a call replaces be seen.
+        for _ in range(100):
             deformer(vector, out, normals)
-        after, peak = tracemalloc.get_traced_memory()
+        for _ in range(50):
+            before = tracemalloc.get_traced_memory()[0]
+            tracemalloc.reset_peak()
+            for _ in range(20):
+                deformer(vector, out, normals)
+            after, peak = tracemalloc.get_traced_memory()
+            rounds.append((peak - before, after - before))
     finally:
         tracemalloc.stop()
-    assert peak - before < 4096  # a few objects of Python; one array of vertices would be 14,700 bytes
-    assert after - before < 1024
+    # What the code allocates or keeps, it does in every round; free lists that turn over show in some.
+    most, kept = map(min, zip(*rounds, strict=True))
+    assert most < 4096  # a few objects of Python; one array of vertices would be 14,700 bytes
+    assert kept < 1024
 
 
 def test_threads_do_not_disturb_each_other() -> None:

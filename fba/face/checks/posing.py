@@ -24,11 +24,16 @@ KIND_ORDER = ("scale", "rotation", "translation")
 
 
 class Poser:
-    """A model under measurement."""
+    """A model under measurement.
 
-    def __init__(self, model: FaceModel) -> None:
+    like: another one; where its model has the same neutral face, what was found on that is taken from there.
+    """
+
+    def __init__(self, model: FaceModel, like: Poser | None = None) -> None:
         self.model = model
         self.neutral: Float64 = model.vertices.astype(np.float64)
+        if like is not None and _same_face(model, like.model):
+            self.__dict__.update(_surface=like._surface, marks=like.marks, eyes=like.eyes)
 
     def pose(self, values: Mapping[int, float]) -> Float64:
         """(V, 3): all vertices under some FAPs, head turns left out."""
@@ -101,6 +106,16 @@ class Poser:
     def contour(self, name: str, moved: Float64) -> Float64:
         """(M, 3): a contour of the posed face, corner to corner; empty where the face has none."""
         return self.surface(moved)[self.marks.contour(name)]
+
+
+def _same_face(one: FaceModel, other: FaceModel) -> bool:
+    """Whether two models differ in their tables and names alone."""
+    return (
+        len(one.parts) == len(other.parts)
+        and all(a is b for a, b in zip(one.parts, other.parts, strict=True))
+        and np.array_equal(one.points, other.points, equal_nan=True)
+        and np.array_equal(one.bound, other.bound)
+    )
 
 
 def transformed(points: Float64, kind: str, amount: Float64, centre: npt.ArrayLike) -> Float64:
