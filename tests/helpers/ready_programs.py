@@ -90,11 +90,11 @@ def prepare() -> None:
     from fba.cli.main import _COMMANDS
 
     for name in _COMMANDS:
-        import_module(f"fba.cli.{name}")
+        import_module(f"fba.cli.commands.{name}")
     import numpy as np
 
     import fba
-    import player
+    from fba import player
     from fba.face import Deformer, FaceModel
 
     for name in player.__all__:
@@ -207,7 +207,7 @@ def start(folder: Path) -> None:
     for name in FOREIGN:
         with contextlib.suppress(ImportError):
             import_module(name)
-    assert not {"fba", "player", "conformance"} & set(sys.modules)
+    assert not {"fba", "fba_player", "fba_conformance"} & set(sys.modules)
     out = os.dup(1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     if os.fork() == 0:
