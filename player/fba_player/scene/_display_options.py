@@ -106,8 +106,8 @@ class Dressing:
             view = replace(view, eyes=[])
         if not switches["shadows"]:
             free = np.array(UNSHADED, dtype=np.float32)
-            lit = [np.broadcast_to(free, (len(mesh.places), len(free))) for mesh in view.faces]
-            faces = [replace(mesh, reaching=light) for mesh, light in zip(view.faces, lit, strict=True)]
+            lit = [np.broadcast_to(free, (len(mesh.positions), len(free))) for mesh in view.faces]
+            faces = [replace(mesh, light=light) for mesh, light in zip(view.faces, lit, strict=True)]
             view = replace(view, faces=faces, blobs=no_shadows())
         return view
 

@@ -82,8 +82,3 @@ class Extras:
     shells: tuple[FaceMesh, ...] = field(default=())
     grid: Grid | None = None
     legend: Legend | None = None
-
-    @property
-    def is_fine(self) -> bool:
-        """Whether there are lines or dots in it, which would not become better by being smoothed."""
-        return bool(self.lines or self.dots) or self.grid is not None
