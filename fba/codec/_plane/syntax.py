@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba.arrays import Bool
 from fba.codec._plane import slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, BitWriter, OutOfDataError
@@ -42,7 +43,7 @@ RANGE_BITS = 5
 _MARKER_EVERY = 4
 
 
-def interpolated(settings: PartSettings) -> slots.Bool | None:
+def interpolated(settings: PartSettings) -> Bool | None:
     """bool (68,): the FAPs that are not sent and that mask type 2 asks to interpolate; None where none."""
     if MASK_INTERPOLATE not in settings.mask_types:
         return None
@@ -153,7 +154,7 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
                 writer.write(bits, 1 + RANGE_BITS * len(chunk))
 
 
-def _read_ranges(reader: BitReader, part: int, mask: slots.Bool) -> RangeLists:
+def _read_ranges(reader: BitReader, part: int, mask: Bool) -> RangeLists:
     flags = [reader.read(1) for _ in LISTS]
     chunks = _range_chunks(part, mask) if any(flags) else []
     lists: list[np.ndarray | None] = []
@@ -174,7 +175,7 @@ def _read_ranges(reader: BitReader, part: int, mask: slots.Bool) -> RangeLists:
     return RangeLists(*lists)
 
 
-def _range_chunks(part: int, mask: slots.Bool) -> list[list[int]]:
+def _range_chunks(part: int, mask: Bool) -> list[list[int]]:
     """How a range list is cut: parameters whose limits follow one marker bit, those masked out left out."""
     listed = groups(part)[1:] if part == slots.FACE_BIT else groups(part)  # FAP 1 and 2 have no ranges
     return [

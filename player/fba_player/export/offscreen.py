@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import UInt8
 from fba.parameters import FAP_COUNT
 from fba_player.gl.context import offscreen_context
 from fba_player.gl.framebuffer import Target
@@ -18,8 +19,6 @@ from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 from fba_player.view.view import View
-
-UInt8 = npt.NDArray[np.uint8]
 
 SAMPLES = 0
 """Samples a pixel; 0: one, and edges smoothed afterwards."""

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Intp
 from fba.compiled import compiled
-
-Float32 = npt.NDArray[np.float32]
-Rows = npt.NDArray[np.intp]
 
 
 class Table(NamedTuple):
@@ -30,7 +27,7 @@ class Table(NamedTuple):
     """(16, M)"""
     wide_open: Float32
     """(M,)"""
-    near: Rows
+    near: Intp
 
 
 @compiled
@@ -60,7 +57,7 @@ def light_vertices(table: Table, basis: Float32, share: float, more: float, foun
 
 
 @compiled
-def blend_swaying(found: Float32, still: Float32, rows: Rows, share: Float32) -> None:
+def blend_swaying(found: Float32, still: Float32, rows: Intp, share: Float32) -> None:
     """Blend rows of found (N, 4) with `still` (M, 4), the same vertices standing still. share: (M,), how far
     each goes with the head."""
     for k in range(len(rows)):

@@ -9,21 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Float32, Float64, Int32, Integer
 from fba.body.model import BodyModel
 from fba.cache import kept, key_of
 from fba.compiled import compiled, is_compiled
 from fba_player.figure.face_light import KEY_DIRECTION, kept_visibility
 from fba_player.mesh.simplify import Coarser
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Rows = npt.NDArray[np.integer[Any]]
 Prepared = tuple[Int32, Int32, Float32, Float32]
 
 REACH = (1.0, 0.95, 0.0, 0.25)
@@ -90,7 +85,7 @@ class BodyLight:
         """(N,) vertices at which light is computed; (V, NEAREST) indices into these from which each vertex is
         interpolated, and (V, NEAREST) their weights; (V,) how much of the sky folds leave each vertex."""
         body = self._body
-        rows: list[Rows] = []
+        rows: list[Integer] = []
         for part in body.parts:
             if part.name not in self._coarser:
                 rows.append(np.arange(min(len(part.vertices), 1)))  # not drawn
@@ -110,11 +105,11 @@ class BodyLight:
         )
 
 
-def _near(parts: list[Float32], rows: list[Rows]) -> tuple[Int32, Float32]:
+def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
     """For each vertex of all parts, (V, 3) each, the places of the nearest of its part's rows among the rows
     of all: (V, NEAREST), and their shares."""
 
-    def make() -> list[npt.NDArray[Any]]:
+    def make() -> list[Array]:
         from scipy.spatial import cKDTree
 
         near, shares = [], []

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from fba.parameters import FAP_COUNT
@@ -17,9 +17,6 @@ from fba_player.figure._face_parts import coarser_part, known_middle, part_shape
 from fba_player.figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player.view.camera import Subject
 from fba_player.view.view import Eye, FaceMesh, FaceShape, rotation_vector
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 CUT = 0.45
 """On a body, what sways less than this is left out: the body has a neck of its own."""

@@ -8,20 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
 from fba.cache import kept
 from fba.compiled import is_compiled
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.figure._face_light_loops import Table, blend_swaying, light_vertices
 from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Bool = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
 
 KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
 """As in shaders/lighting.glsl."""
@@ -159,7 +153,7 @@ class FaceLight:
 def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
     """`bake`, but done once and kept on disk: it is half a second of every start."""
 
-    def make() -> list[npt.NDArray[np.float16]]:
+    def make() -> list[Float16]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
 
     digest = hashlib.sha256(BAKING.encode())
@@ -196,7 +190,7 @@ class _PartLight:
             blend_swaying(light, still, self._swaying, self._sway)
 
 
-def _table(baked: Baked, chosen: Rows) -> Table:
+def _table(baked: Baked, chosen: Intp) -> Table:
     near = np.flatnonzero(baked.near[chosen])
     shut, wide = (
         [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.body.head_attachment import HeadOnBody
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
@@ -15,9 +15,6 @@ from fba_player.figure._face_parts import coarser_part, part_shape, with_triangl
 from fba_player.figure.body_light import BodyLight
 from fba_player.figure.face import FaceFigure
 from fba_player.view.view import Eye, FaceMesh, FaceShape
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
 SEEN_WEIGHTS, BEND = 6, 0.02

@@ -12,16 +12,11 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.compiled import compiled, is_compiled
 from fba_player.figure.face_light import KEY_DIRECTION
 from fba_player.view.view import FaceMesh, FaceShape
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-UInt8 = npt.NDArray[np.uint8]
-Int32 = npt.NDArray[np.int32]
 
 CELLS, CELL = 96, 0.05
 """The grid: so many squares each way, of this size (m)."""

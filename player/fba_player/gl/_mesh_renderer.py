@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, UInt8
 from fba_player.figure.texture_images import Pictures, halved
 from fba_player.gl.lod import distance, same
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
 from fba_player.mesh.skin_relief import RELIEF, relief
 from fba_player.view.view import FaceMesh, FaceShape
-
-Float64 = npt.NDArray[np.float64]
 
 MOST_SHAPES = 64
 """Parts remembered on the graphics card; the longest unused goes first."""
@@ -29,7 +27,7 @@ class FaceRenderer:
         self._programs: dict[tuple[str, ...], Any] = {}
         self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
         self._reliefs: dict[int, Any] = {}
-        self._pixels: npt.NDArray[np.uint8] | None = None
+        self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
@@ -188,7 +186,7 @@ def _upload_vertices(mesh: FaceMesh, parts: dict[str, Any]) -> None:
         _write(parts["light"], mesh.light)
 
 
-def _write(buffer: Any, array: npt.NDArray[np.float32]) -> None:
+def _write(buffer: Any, array: Float32) -> None:
     buffer.orphan()
     buffer.write(np.ascontiguousarray(array, dtype="f4"))
 

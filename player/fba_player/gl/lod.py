@@ -9,12 +9,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32, Intp
 from fba.compiled import compiled
 from fba_player.mesh.simplify import TOLERANCES
 from fba_player.view.view import FaceMesh, FaceShape
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 PIXELS = 1.3
 """How far the coarser mesh may be off, in pixels."""
@@ -27,7 +25,7 @@ class _Level:
     """A coarser shape, the vertices (V,) that it has left, and their light as it was last seen."""
 
     shape: FaceShape
-    rows: npt.NDArray[np.intp]
+    rows: Intp
     light: tuple[Float32, Float32] | None = None
 
 
@@ -71,7 +69,7 @@ class Details:
         return levels[number]
 
 
-def _left(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> _Level:
+def _left(shape: FaceShape, triangles: Int32) -> _Level:
     rows, corners = np.unique(triangles, return_inverse=True)
     kept = replace(
         shape,
@@ -107,7 +105,7 @@ def _nearest(positions: Float32, matrix: Float64, eye: Float64) -> float:
     return np.sqrt(least / scale) if least < np.inf and scale > 0.0 else 0.0
 
 
-def same(one: npt.NDArray[np.float32], other: npt.NDArray[np.float32]) -> bool:
+def same(one: Float32, other: Float32) -> bool:
     """Whether two arrays, both of them kept alive, are the same numbers in the same place."""
     if one is other:
         return True

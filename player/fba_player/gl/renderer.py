@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
 from fba_player.gl._annotation_renderer import ExtrasRenderer
 from fba_player.gl._antialias_region import Steps, steps
 from fba_player.gl._ground_shadow import ShadowCaster
@@ -133,9 +133,7 @@ class Renderer:
         ):  # fmt: skip
             part.release()
 
-    def _uploaded(
-        self, vertices: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]
-    ) -> tuple[Any, Any]:
+    def _uploaded(self, vertices: Float32, triangles: Int32) -> tuple[Any, Any]:
         return self._gl.buffer(vertices.tobytes()), self._gl.buffer(triangles.tobytes())
 
     def _capsule_array(self) -> Any:
@@ -149,7 +147,7 @@ class Renderer:
         )
 
     def _draw_studio(
-        self, view: View, matrix: npt.NDArray[np.float64], size: tuple[int, int], centre: tuple[float, float]
+        self, view: View, matrix: Float64, size: tuple[int, int], centre: tuple[float, float]
     ) -> None:
         """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs. centre: x
         and z of where the ground is brightest."""
@@ -249,7 +247,7 @@ class Renderer:
         parts = self._shapes[key][1]
         return parts[0], parts[1], parts[2]
 
-    def _draw_capsules(self, capsules: npt.NDArray[np.float32]) -> None:
+    def _draw_capsules(self, capsules: Float32) -> None:
         if not len(capsules):
             return
         data = np.ascontiguousarray(capsules, dtype="f4")
@@ -262,7 +260,7 @@ class Renderer:
         self._instances.write(data)
         self._capsules.render(instances=len(data))
 
-    def _draw_marks(self, marks: npt.NDArray[np.float32]) -> None:
+    def _draw_marks(self, marks: Float32) -> None:
         """Marks as capsules; those behind something faintly through it."""
         if not len(marks):
             return

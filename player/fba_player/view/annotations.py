@@ -9,12 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import Float32
 from fba_player.view.view import FaceMesh
 
-Float32 = npt.NDArray[np.float32]
 Colour = tuple[float, float, float, float]
 
 

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
+
 if TYPE_CHECKING:
     from fba_player.mesh.simplify import Coarser
     from fba_player.mesh.texture_image import FacePicture
     from fba_player.view.annotations import Extras
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 CAPSULE_FLOATS = 16
 """A capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
@@ -34,7 +34,7 @@ class MeshShape:
     thinner than about a pixel.
     """
 
-    triangles: npt.NDArray[np.int32]
+    triangles: Int32
     colours: Float32
     two_sided: bool = False
     raised: float = 0.0
@@ -67,7 +67,7 @@ class FaceShape:
     its triangles are so large that their light changes visibly within them.
     """
 
-    triangles: npt.NDArray[np.int32]
+    triangles: Int32
     colours: Float32
     sway: Float32
     texcoords: Float32 | None = None
