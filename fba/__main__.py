@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fba.cli.exit_quietly import leave_on_interrupt
+from fba.cli.startup import leave_on_interrupt
 
 
 def main() -> None:

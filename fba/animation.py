@@ -15,7 +15,8 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from fba.tracks import BodyTrack, Bool, FaceTrack, freeze, integers
+from fba.arrays import Array, Bool, Float64, Int64, Intp
+from fba.tracks import BodyTrack, FaceTrack, freeze, integers
 
 __all__ = ["MAX_FRAMES", "Animation", "BodyTrack", "FaceTrack", "Frame"]
 
@@ -72,7 +73,7 @@ class Animation:
     """
 
     rate: Fraction
-    index: npt.NDArray[np.int64]
+    index: Int64
     face: FaceTrack | None = None
     body: BodyTrack | None = None
     name: str = ""
@@ -125,7 +126,7 @@ class Animation:
                 "Animation.concatenate: the parts have different frame rates "
                 f"({', '.join(map(str, sorted(rates)))}); resample them to one"
             )
-        indices: list[npt.NDArray[np.int64]] = []
+        indices: list[Int64] = []
         following: int | None = None
         for part in parts:
             if not len(part):
@@ -188,7 +189,7 @@ class Animation:
         return f"<Animation {named}{', '.join([about, *parts])}>"
 
     @property
-    def times(self) -> npt.NDArray[np.float64]:
+    def times(self) -> Float64:
         """(T,) seconds at which the frames are shown."""
         whole, part = _scaled(self.index, 1 / self.rate)
         return whole.astype(np.float64) + part
@@ -241,9 +242,7 @@ class Animation:
         return Animation(rate, index, face, body, self.name)
 
 
-def _scaled(
-    index: npt.NDArray[np.int64], factor: Fraction
-) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
+def _scaled(index: Int64, factor: Fraction) -> tuple[Array, Float64]:
     """index x factor: whole part, exact, and the rest in 0..1. In Python's integers where 64 bits end."""
     largest = max(abs(int(index[0])), abs(int(index[-1])), 1) if len(index) else 1
     fits = largest * factor.numerator < _INDEX_MAX > factor.denominator
@@ -255,9 +254,9 @@ def _scaled(
 
 def _between(
     values: npt.NDArray[np.signedinteger],
-    before: npt.NDArray[np.intp],
-    after: npt.NDArray[np.intp],
-    weight: npt.NDArray[np.float64],
+    before: Intp,
+    after: Intp,
+    weight: Float64,
     both: Bool,
 ) -> npt.NDArray[np.signedinteger]:
     start = values[before]
@@ -267,9 +266,9 @@ def _between(
 
 def _resampled_face(
     face: FaceTrack,
-    before: npt.NDArray[np.intp],
-    after: npt.NDArray[np.intp],
-    weight: npt.NDArray[np.float64],
+    before: Intp,
+    after: Intp,
+    weight: Float64,
     fresh: Bool,
 ) -> FaceTrack:
     mask = face.mask[before]

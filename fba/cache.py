@@ -14,7 +14,9 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-Kept = TypeVar("Kept", bound=npt.NDArray[Any])
+from fba.arrays import Array
+
+Kept = TypeVar("Kept", bound=Array)
 
 MOST_FILES = 96
 """So many are kept; the longest unused goes first."""

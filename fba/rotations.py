@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Float = npt.NDArray[np.float64]
+from fba.arrays import Float64, Intp
 
 LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(0, 2, 1)
 """(3, 3, 3): summed with an axis over the first index, the matrix that takes v to axis x v."""
 
 
-def multiply(a: Float, b: Float) -> Float:
+def multiply(a: Float64, b: Float64) -> Float64:
     """Quaternion product, a after b: (..., 4)."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
@@ -26,7 +25,7 @@ def multiply(a: Float, b: Float) -> Float:
     )
 
 
-def about(axis: int, angle: Float) -> Float:
+def about(axis: int, angle: Float64) -> Float64:
     """Quaternions (..., 4) of turns about x, y or z (0, 1, 2) by angles (...) in radians."""
     result = np.zeros((*np.shape(angle), 4))
     result[..., 0] = np.cos(np.asarray(angle) / 2)
@@ -34,7 +33,7 @@ def about(axis: int, angle: Float) -> Float:
     return result
 
 
-def matrices(quaternions: Float) -> Float:
+def matrices(quaternions: Float64) -> Float64:
     """Matrices (..., 3, 3) of unit quaternions (..., 4)."""
     w, x, y, z = np.moveaxis(quaternions, -1, 0)
     rows = [
@@ -45,7 +44,7 @@ def matrices(quaternions: Float) -> Float:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def cross(a: Float, b: Float) -> Float:
+def cross(a: Float64, b: Float64) -> Float64:
     """a x b, for vectors (..., 3); NumPy's takes three times as long for some hundreds."""
     (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))
@@ -55,18 +54,18 @@ def cross(a: Float, b: Float) -> Float:
     return result
 
 
-def turn(axis: Float, angle: Float) -> Float:
+def turn(axis: Float64, angle: Float64) -> Float64:
     """Matrices (..., 3, 3) of turns about unit axes (3,) or (..., 3) by angles (...)."""
     axis = np.asarray(axis, dtype=np.float64)
     across = np.tensordot(axis, LEVI_CIVITA, axes=1)
     s = np.sin(angle)[..., None, None]
     c = np.cos(angle)[..., None, None]
     square = axis[..., :, None] * axis[..., None, :]
-    result: Float = c * (np.eye(3) - square) + s * across + square
+    result: Float64 = c * (np.eye(3) - square) + s * across + square
     return result
 
 
-def between(start: Float, end: Float) -> Float:
+def between(start: Float64, end: Float64) -> Float64:
     """The smallest rotation (3, 3) that takes one direction (3,) to another; neither may be zero."""
     a = start / np.linalg.norm(start)
     b = end / np.linalg.norm(end)
@@ -82,9 +81,7 @@ def between(start: Float, end: Float) -> Float:
     return turn(axis / sine, np.array(np.arctan2(sine, cosine)))
 
 
-def interpolate(
-    quaternions: Float, before: npt.NDArray[np.intp], after: npt.NDArray[np.intp], weight: Float
-) -> Float:
+def interpolate(quaternions: Float64, before: Intp, after: Intp, weight: Float64) -> Float64:
     """Spherical interpolation: quaternions (T, J, 4) at frames before (S,) to after (S,), weight in 0..1."""
     a = quaternions[before]
     b = quaternions[after]
@@ -97,11 +94,11 @@ def interpolate(
         mixed = (np.sin((1 - w) * angle) * a + np.sin(w * angle) * b) / sine
     near = (1 - w) * a + w * b  # the same to working accuracy where the two almost coincide
     mixed = np.where(sine < 1e-6, near, mixed)
-    result: Float = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+    result: Float64 = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
     return result
 
 
-def part(start: Float, end: Float, weight: Float | float) -> Float:
+def part(start: Float64, end: Float64, weight: Float64 | float) -> Float64:
     """Matrices (..., 3, 3) a share of the smallest turn from start to end (..., 3, 3): spherical
     interpolation."""
     step = np.swapaxes(start, -1, -2) @ end
@@ -117,11 +114,11 @@ def part(start: Float, end: Float, weight: Float | float) -> Float:
     angle = np.arctan2(sine, np.trace(step, axis1=-2, axis2=-1) - 1.0)
     axis = vector / np.maximum(sine, 1e-300)[..., None]
     axis = np.where(sine[..., None] > 1e-12, axis, [1.0, 0.0, 0.0])
-    result: Float = start @ turn(axis, angle * weight)
+    result: Float64 = start @ turn(axis, angle * weight)
     return result
 
 
-def between_all(start: Float, end: Float) -> Float:
+def between_all(start: Float64, end: Float64) -> Float64:
     """The smallest rotations (T, 3, 3) that take directions (T, 3) to others (T, 3), for less than half
     turns."""
     a = start / np.linalg.norm(start, axis=-1, keepdims=True)
@@ -133,7 +130,7 @@ def between_all(start: Float, end: Float) -> Float:
     return turn(axis, angle)
 
 
-def inside(frame: Float, direction: Float) -> Float:
+def inside(frame: Float64, direction: Float64) -> Float64:
     """World directions (T, 3) as seen in frames (T, 3, 3)."""
-    result: Float = np.einsum("tji,tj->ti", frame, direction)
+    result: Float64 = np.einsum("tji,tj->ti", frame, direction)
     return result

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Array, Bool, Int16, Int32
 from fba.parameters import (
     BAP_COUNT,
     EXPRESSION_FIELDS,
@@ -17,10 +18,6 @@ from fba.parameters import (
     VISEME_FIELDS,
     VISEME_SELECT_MAX,
 )
-
-Int32 = npt.NDArray[np.int32]
-Int16 = npt.NDArray[np.int16]
-Bool = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -172,7 +169,7 @@ class BodyTrack:
 Track = TypeVar("Track", FaceTrack, BodyTrack)
 
 
-def trusted(kind: type[Track], **arrays: npt.NDArray[Any] | None) -> Track:
+def trusted(kind: type[Track], **arrays: Array | None) -> Track:
     """A track of arrays that are known to be right, such as parts of another's, without any check."""
     track: Track = object.__new__(kind)
     freeze(track, **arrays)
@@ -245,7 +242,7 @@ def freeze(instance: object, **fields: object) -> None:
         object.__setattr__(instance, name, value)
 
 
-def _stacked(arrays: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+def _stacked(arrays: list[Array]) -> Array:
     """One array of all, read-only, so that a track takes it over without a copy."""
     stacked = np.concatenate(arrays)
     stacked.flags.writeable = False

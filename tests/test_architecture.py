@@ -26,6 +26,7 @@ MOST_FILES = 20
 """Modules in a folder, its `__init__` not counted."""
 
 _FLOORS = """
+fba.arrays
 fba.parameters
 fba
 fba.mesh

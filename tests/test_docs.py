@@ -34,7 +34,7 @@ from ready_programs import BIN, ready_programs
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md"))]
 SAMPLES = ROOT / "fba" / "samples"
 
 RUN = {"sh", "python"}
@@ -53,6 +53,7 @@ ILLUSTRATIONS = {
     ("README.md", "./dev demo --out demo"): CHECKOUT,
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
     ("README.md", "pip install ."): "makes an environment; .ci/run installs the wheel and runs the demo",
+    ("CONTRIBUTING.md", "./dev setup"): CHECKOUT,
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",

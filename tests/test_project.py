@@ -144,18 +144,25 @@ def test_tables_come_with_the_package(name: str, rows: int) -> None:
     assert len(text.strip().splitlines()) == 1 + rows
 
 
-def test_wheel_holds_every_file_of_the_packages_and_no_other(tmp_path: Path) -> None:
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from this checkout."""
+    pytest.importorskip("hatchling", reason="hatchling comes with the extra `dev`")
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+def test_wheel_holds_every_file_of_the_packages_and_no_other(wheel: Path) -> None:
     expected = {
         f"{package}/{name.removeprefix(f'{folder}/')}"
         for name in tracked()
         for package, folder in PACKAGES.items()
         if name.startswith(f"{folder}/") and (ROOT / name).exists()
     }
-    pytest.importorskip("hatchling", reason="hatchling comes with the extra `dev`")
-    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
-    done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    (wheel,) = tmp_path.glob("*.whl")
     assert wheel.name.startswith("mpeg4_fba-")  # `fba` is someone else's on the index
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
@@ -163,6 +170,43 @@ def test_wheel_holds_every_file_of_the_packages_and_no_other(tmp_path: Path) -> 
     assert expected - held == set()
     assert {name for name in held if not name.startswith(tuple(f"{p}/" for p in PACKAGES))} == set()
     assert {name for name in held if "__pycache__" in name} == set()
+
+
+INSTALLED = """
+import sys
+checkout, site, mine = sys.argv[1:]
+sys.path[:] = [site, *(path for path in sys.path if not path.startswith(checkout) or ".venv" in path), mine]
+import conformance, fba, player
+from fba.player import Scene
+import fba_conformance.runner
+print(player.WHOSE, conformance.WHOSE)
+for module in (fba, sys.modules[Scene.__module__], fba_conformance.runner):
+    print(module.__file__.startswith(site))
+"""
+
+
+def test_installed_beside_a_users_own_modules_each_finds_its_own(wheel: Path, tmp_path: Path) -> None:
+    """A user's `player.py` and `conformance.py` lie last on the path, where any module of ours would win."""
+    site, mine = tmp_path / "site", tmp_path / "mine"
+    mine.mkdir()
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    for name in ("player", "conformance"):
+        (mine / f"{name}.py").write_text("WHOSE = 'mine'\n", encoding="utf-8")
+    command = [sys.executable, "-c", INSTALLED, str(ROOT), str(site), str(mine)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.stdout.split(), done.stderr) == (["mine", "mine", "True", "True", "True"], "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("player", "from fba.player import"), ("conformance", "from fba_conformance import")]
+)
+def test_old_names_of_packages_fail_with_the_new_ones(old: str, new: str) -> None:
+    command = [sys.executable, "-c", f"import {old}"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith(f"ImportError: the package '{old}' is now called 'fba")
+    assert new in done.stderr
 
 
 PC = {"sys_platform": "linux", "platform_machine": "x86_64", "platform_python_implementation": "CPython"}

@@ -9,12 +9,9 @@ codes, so that both do the same work for every bit.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int64, UInt8
 from fba.compiled import compiled
-
-UInt8 = npt.NDArray[np.uint8]
-Int64 = npt.NDArray[np.int64]
 
 
 @compiled

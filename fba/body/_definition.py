@@ -15,13 +15,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Int64
 from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.errors import ModelError
 from fba.source import Path, read_whole
-
-Float = npt.NDArray[np.float64]
 
 PROFILES = ("simple", "calibration", "predictable")
 
@@ -135,7 +133,7 @@ def calibrated(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Ske
     return Skeleton(generic.names, parents, places)
 
 
-def _first_given_below(parents: npt.NDArray[np.int64], given: Mapping[int, Float]) -> list[int]:
+def _first_given_below(parents: Int64, given: Mapping[int, Float64]) -> list[int]:
     """For each joint the closest given joint on the way down, -1 for none; of several ways, the first."""
     result = [-1] * len(parents)
     depth = [0] * len(parents)
@@ -149,25 +147,25 @@ def _first_given_below(parents: npt.NDArray[np.int64], given: Mapping[int, Float
     return result
 
 
-def _share(old: Float, parents: npt.NDArray[np.int64], parent: int, number: int, below: int) -> float:
+def _share(old: Float64, parents: Int64, parent: int, number: int, below: int) -> float:
     """How far along the line from a parent to a given joint below, in the generic body, a joint stands."""
     line = old[below] - old[parent]
     length = float(line @ line)
     return float((old[number] - old[parent]) @ line) / length if length > 1e-12 else 1.0
 
 
-def _aside(offset: Float, line: Float, new_line: Float) -> Float:
+def _aside(offset: Float64, line: Float64, new_line: Float64) -> Float64:
     """What of an offset is not along the line, at the scale of the new line."""
     length = float(line @ line)
     if length <= 1e-12:
         return np.zeros(3)
-    result: Float = (offset - line * (offset @ line) / length) * math.sqrt(
+    result: Float64 = (offset - line * (offset @ line) / length) * math.sqrt(
         float(new_line @ new_line) / length
     )
     return result
 
 
-def _size(places: Float) -> float:
+def _size(places: Float64) -> float:
     """The extent of joints: the diagonal of their box, or the height of a single one."""
     if len(places) == 1:
         return abs(float(places[0, 1]))

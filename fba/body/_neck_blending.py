@@ -5,17 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from fba.body.model import BodyPart
 from fba.body.skin.skin_weights import INFLUENCES, strongest
 from fba.cache import kept, key_of
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
-Bool = npt.NDArray[np.bool_]
 
 NEAR, FAR = 0.010, 0.030
 """Metres from the body's neck: up to the first a vertex moves as the neck there, beyond the second with the
@@ -57,7 +51,7 @@ def carried_by_neck(neck: list[BodyPart], joints: int, skull: int, placed: Float
     carries the head. free: (V,) vertices that the neck may bend.
     """
 
-    def make() -> list[npt.NDArray[Any]]:
+    def make() -> list[Array]:
         found = _carried(neck, joints, skull, placed, free)
         return [*found[:4], np.array([found.brings_neck])]
 
@@ -124,9 +118,7 @@ def _dense(neck: list[BodyPart], joints: int) -> Float64:
     return dense
 
 
-def _nearest(
-    tree: Any, dense: Float64, places: Float64, skull: int, below: npt.NDArray[np.bool_]
-) -> tuple[Int32, Float32]:
+def _nearest(tree: Any, dense: Float64, places: Float64, skull: int, below: Bool) -> tuple[Int32, Float32]:
     """Weights of the nearest anchors, handed over to the skull with distance, but for what lies below."""
     away, rows = tree.query(places, k=min(NEIGHBOURS, len(dense)))
     away, rows = away.reshape(len(places), -1), rows.reshape(len(places), -1)
@@ -178,14 +170,12 @@ def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
     return np.concatenate(found)
 
 
-def _beyond(
-    tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64
-) -> npt.NDArray[np.bool_]:
+def _beyond(tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64) -> Bool:
     """(V,) places nearest to the edge and past it."""
     away, rows = tree.query(places)
     number = np.full(len(anchors), -1)
     number[edge] = np.arange(len(edge))
     at = number[rows]
-    past: npt.NDArray[np.bool_] = (at >= 0) & (away > SEAM)
+    past: Bool = (at >= 0) & (away > SEAM)
     past &= ((places - anchors[rows]) * outward[at]).sum(axis=1) > 0
     return past

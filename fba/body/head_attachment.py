@@ -7,15 +7,13 @@ import copy
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64, Intp
 from fba.body._neck_blending import carried_by_neck
 from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
 from fba.body.skin.skinning import Skinner
 from fba.errors import ModelError
 from fba.mesh.meshes import float_rows
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
@@ -41,7 +39,7 @@ class HeadOnBody:
         body: BodyModel,
         vertices: npt.ArrayLike,
         eyes: npt.ArrayLike,
-        skull: npt.NDArray[np.bool_] | None = None,
+        skull: Bool | None = None,
     ) -> None:
         places = float_rows(vertices, (-1, 3), "a face on a body: vertices")
         self._skull = skull_of(body)
@@ -54,7 +52,7 @@ class HeadOnBody:
         joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
         weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
         joints[:, 0], weights[:, 0] = self._skull, 1.0
-        self.hidden: npt.NDArray[np.bool_] = np.zeros(len(places), dtype=bool)
+        self.hidden: Bool = np.zeros(len(places), dtype=bool)
         """(V,): vertices beyond the lower edge of the body's neck, which its clothes hide."""
         self.brings_neck = not neck
         """Whether the face has a neck that meets the body, whose own then is not to be shown."""
@@ -127,7 +125,7 @@ class HeadOnBody:
         sized(local, self.size, self.shift, self._placed)
         return self.skinner.carry(self._placed, upright, matrices, out, normals, method)
 
-    def chosen(self, rows: npt.NDArray[np.intp]) -> HeadOnBody:
+    def chosen(self, rows: Intp) -> HeadOnBody:
         """The same for some of the face's vertices, rows (N,), each once: `skin` takes and gives these."""
         some = copy.copy(self)
         some.skinner = self.skinner.chosen(rows)

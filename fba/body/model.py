@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import checked_weights
 from fba.errors import ModelError
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["BODY_PART_KINDS", "BodyModel", "BodyPart", "Material"]
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 BODY_PART_KINDS = ("skin", "neck", "head", "cloth", "shoe", "hair", "other")
 """What a part is. "neck": neck and shoulders under the clothes, shown only where the face that stands on the

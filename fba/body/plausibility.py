@@ -15,15 +15,13 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int64
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, WHOLE, widest
 from fba.body.solve.pose_loops import MILLIMETRE, UNIT
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
 from fba.tracks import BodyTrack
-
-Float = npt.NDArray[np.float64]
-Int = npt.NDArray[np.int64]
 
 SAMPLES = 32
 RUN = 64
@@ -121,7 +119,7 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
     return None
 
 
-def measure(values: Int, index: Int, rate: Fraction) -> Motion:
+def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
     """A motion in numbers: BAPs int64 (T, 296) at frame numbers (T,); successive ones are compared."""
     pairs = np.flatnonzero(np.diff(index) == 1)
     root = values[:, [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in _ROOT]]
@@ -162,7 +160,7 @@ def _compared(now: Motion, other: Motion) -> tuple[str, ...]:
     return () if wrong else tuple(findings)
 
 
-def _samples(count: int) -> Int:
+def _samples(count: int) -> Int64:
     """Which of so many frames are looked at: all, or runs of successive ones."""
     if count <= SAMPLES * RUN:
         return np.arange(count)
@@ -170,17 +168,17 @@ def _samples(count: int) -> Int:
     return np.asarray((starts[:, None] + np.arange(RUN)).reshape(-1))
 
 
-def _beyond(values: Int) -> npt.NDArray[np.bool_]:
+def _beyond(values: Int64) -> Bool:
     """bool (T,): whether a joint is beyond all limits by the margin. Whole turns do not count."""
     turning = np.flatnonzero(widest().any(axis=1))
     low, high = widest()[turning].T
     angles = values[:, turning] * DEGREES
     angles -= WHOLE * np.rint((angles - (low + high) / 2) / WHOLE)
-    over: npt.NDArray[np.bool_] = ((angles < low - MARGIN) | (angles > high + MARGIN)).any(axis=1)
+    over: Bool = ((angles < low - MARGIN) | (angles > high + MARGIN)).any(axis=1)
     return over
 
 
-def _feet(values: Int) -> Float:
+def _feet(values: Int64) -> Float64:
     """float64 (T, 4, 3), metres: ankles and balls of the feet from the root's place, along the world's axes.
 
     `BapSolver` poses whole bodies; this turns four points and needs no compiled loop.
@@ -199,7 +197,7 @@ def _feet(values: Int) -> Float:
     return result
 
 
-def _turn(point: Float, values: Int, row: int) -> None:
+def _turn(point: Float64, values: Int64, row: int) -> None:
     """Turn points (T, 3) in place by the BAPs of a joint, a row of the convention."""
     rules = convention()
     for bap, axis, sign in reversed(list(zip(rules.bap[row], rules.axis[row], rules.sign[row], strict=True))):

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Int64
 from fba.errors import ModelError
 from fba.parameters import joints
 
@@ -32,8 +32,8 @@ class Skeleton:
     """
 
     names: tuple[str, ...]
-    parents: npt.NDArray[np.int64]
-    centres: npt.NDArray[np.float64]
+    parents: Int64
+    centres: Float64
     _numbers: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -121,7 +121,7 @@ class Skeleton:
         return self._numbers[name]
 
     @property
-    def offsets(self) -> npt.NDArray[np.float64]:
+    def offsets(self) -> Float64:
         """float64 (J, 3): from the parent's centre to the joint's; the root's own centre for the root."""
         result = self.centres.copy()
         result[1:] -= self.centres[self.parents[1:]]

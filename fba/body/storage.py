@@ -11,9 +11,9 @@ import os
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from fba.body.model import BODY_PART_KINDS, BodyModel, BodyPart, Float32, Int32
+from fba.arrays import Float32, Float64, Int32, Int64
+from fba.body.model import BODY_PART_KINDS, BodyModel, BodyPart
 from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.body.skin.skin_weights import INFLUENCES
 from fba.errors import ModelError
@@ -94,7 +94,7 @@ def build(model: BodyModel) -> Builder:
     return builder
 
 
-def local_turns(model: BodyModel) -> npt.NDArray[np.float64]:
+def local_turns(model: BodyModel) -> Float64:
     """(J, 3, 3) how each joint is turned in its parent's frame, as modelled."""
     turns = model.bind[:, :3, :3].copy()
     parents = model.skeleton.parents
@@ -102,11 +102,11 @@ def local_turns(model: BodyModel) -> npt.NDArray[np.float64]:
     return turns
 
 
-def _quaternions(turns: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _quaternions(turns: Float64) -> Float64:
     """(N, 4) x, y, z, w of rotation matrices (N, 3, 3), w not negative; exactly 0 0 0 1 for none."""
     from scipy.spatial.transform import Rotation
 
-    found: npt.NDArray[np.float64] = Rotation.from_matrix(turns).as_quat(canonical=True)
+    found: Float64 = Rotation.from_matrix(turns).as_quat(canonical=True)
     found[(turns == np.eye(3)).all(axis=(1, 2))] = (0, 0, 0, 1)
     return found
 
@@ -170,9 +170,7 @@ def _notes(content: Value) -> dict[str, str]:
     return notes
 
 
-def _skeleton(
-    gltf: Gltf, joints: tuple[int, ...]
-) -> tuple[Skeleton, npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+def _skeleton(gltf: Gltf, joints: tuple[int, ...]) -> tuple[Skeleton, Float64, Int64]:
     """The skeleton, the bind matrices, and which of the skin's joints each of its joints is."""
     place = {node: number for number, node in enumerate(joints)}
     wanted = [node for node in gltf.order if node in place]  # parents first
@@ -203,9 +201,7 @@ def _skeleton(
     return skeleton, bind, np.array([place[node] for node in wanted], dtype=np.int64)
 
 
-def _check_bind(
-    inverse: npt.NDArray[np.float64], bind: npt.NDArray[np.float64], names: tuple[str, ...]
-) -> None:
+def _check_bind(inverse: Float64, bind: Float64, names: tuple[str, ...]) -> None:
     """That the mesh was modelled where the nodes stand."""
     off = np.abs(inverse @ bind - np.eye(4)).max(axis=(1, 2))
     if not (off < BIND_TOLERANCE).all():

@@ -6,17 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Float64
 from fba.body import BapSolver
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import matching
 from fba.capture.limbs import ground, soles
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
-
-Float = npt.NDArray[np.float64]
 
 CHUNK = 2048
 """Frames posed at a time."""
@@ -157,14 +155,14 @@ def retarget_report(
     )
 
 
-def _between(a: Float, b: Float) -> Float:
+def _between(a: Float64, b: Float64) -> Float64:
     """Degrees (T,) between vectors (T, 3)."""
     sine = np.linalg.norm(np.cross(a, b), axis=1)
-    result: Float = np.degrees(np.arctan2(sine, np.sum(a * b, axis=1)))
+    result: Float64 = np.degrees(np.arctan2(sine, np.sum(a * b, axis=1)))
     return result
 
 
-def _feet(source: soles.Soles, body: Float) -> FeetError | None:
+def _feet(source: soles.Soles, body: Float64) -> FeetError | None:
     middles = source.points.mean(axis=1)
     level = ground.found(source.lowest, middles).under(middles)[:, : body.shape[1]]
     above = source.lowest[:, : body.shape[1]] - level

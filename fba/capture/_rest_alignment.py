@@ -15,15 +15,13 @@ from importlib.resources import files
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.capture._spine import joints as spine_joints
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
-
-Float = npt.NDArray[np.float64]
 
 SHORT = 1e-6
 """Bones shorter than this share of the skeleton's size have no direction."""
@@ -63,8 +61,8 @@ class Alignment:
     that are turned upright. aims: joint -> joint at the other end of its bone, where both are mapped.
     """
 
-    upright: Float
-    corrections: dict[str, Float]
+    upright: Float64
+    corrections: dict[str, Float64]
     aims: dict[str, str]
 
 
@@ -79,14 +77,14 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     ends = motion.end_offsets @ upright.T
     short = SHORT * size
 
-    def default(joint: str) -> Float:
-        place: Float = skeleton.centres[skeleton.number(joint)]
+    def default(joint: str) -> Float64:
+        place: Float64 = skeleton.centres[skeleton.number(joint)]
         return place
 
-    corrections: dict[str, Float] = {}
+    corrections: dict[str, Float64] = {}
     aims: dict[str, str] = {}
 
-    def aligned(joint: str, aim: str, start: Float, via: str = "") -> Float:
+    def aligned(joint: str, aim: str, start: Float64, via: str = "") -> Float64:
         source = rest[mapped[aim]] - rest[mapped[joint]]
         if np.linalg.norm(source) <= short:
             return start
@@ -140,7 +138,7 @@ def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     return None
 
 
-def _facing(rest: Float, mapped: Mapping[str, int]) -> tuple[Float, Float]:
+def _facing(rest: Float64, mapped: Mapping[str, int]) -> tuple[Float64, Float64]:
     """upright, and the rotation from the default posture's heading to that of the (upright) rest pose.
 
     Heading only: a rest pose stands on its feet, so a lean of its joints is its proportions.

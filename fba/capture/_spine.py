@@ -15,13 +15,11 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.parameters import baps
-
-Float = npt.NDArray[np.float64]
 
 GROUPS = 5
 """Groups Spine1 to Spine5."""
@@ -52,8 +50,8 @@ def turning(skeleton: Skeleton, groups: int) -> list[str]:
 
 def spread(
     skeleton: Skeleton,
-    wanted: dict[str, Float],
-    places: dict[str, Float],
+    wanted: dict[str, Float64],
+    places: dict[str, Float64],
     anchors: list[str],
     groups: int,
     with_anchors: bool,
@@ -73,17 +71,17 @@ def spread(
     keys = [at[0], *((a + b) / 2 for a, b in pairwise(at)), at[-1]]
     turned = [wanted[anchors[0]], *(wanted[joint] for joint in anchors)]
 
-    def rotation(where: float) -> Float:
+    def rotation(where: float) -> Float64:
         upper = int(np.clip(np.searchsorted(keys, where), 1, len(keys) - 1))
         low, high = keys[upper - 1], keys[upper]
         share = float(np.clip((where - low) / max(high - low, 1e-12), 0.0, 1.0))
         return rotations.part(turned[upper - 1], turned[upper], share)
 
-    def place(where: float) -> Float:
+    def place(where: float) -> Float64:
         upper = int(np.clip(np.searchsorted(at, where), 1, len(at) - 1))
         low, high = at[upper - 1], at[upper]
         share = float(np.clip((where - low) / max(high - low, 1e-12), 0.0, 1.0))
-        result: Float = places[anchors[upper - 1]] * (1 - share) + places[anchors[upper]] * share
+        result: Float64 = places[anchors[upper - 1]] * (1 - share) + places[anchors[upper]] * share
         return result
 
     turn_too = {*turning(skeleton, groups), *(anchors if with_anchors else ())}
@@ -124,8 +122,8 @@ def spread(
 
 
 def _settled(
-    parts: list[Float], own: list[int], centres: Float, ends: list[int], lines: list[Float]
-) -> list[Float]:
+    parts: list[Float64], own: list[int], centres: Float64, ends: list[int], lines: list[Float64]
+) -> list[Float64]:
     """Parts of the spine, turned a little more, so that all source bones together are missed by the least.
 
     parts: rotations (T, 3, 3) of the vertebrae own, and of those above them up to the next. centres: (N, 3)

@@ -8,15 +8,13 @@ other skeletons need it.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Int32
 from fba.body import BapSolver, Skeleton, wrapped
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
-
-Float = npt.NDArray[np.float64]
 
 CHUNK = 2048
 SAME = np.cos(np.radians(1.0))
@@ -56,9 +54,7 @@ def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
     return True
 
 
-def values(
-    motion: SkeletonMotion, solver: BapSolver, scale: float | None, origin: str
-) -> npt.NDArray[np.int32]:
+def values(motion: SkeletonMotion, solver: BapSolver, scale: float | None, origin: str) -> Int32:
     """int32 (T, 296): BAPs of a motion that `is_direct`; scale and origin as of `from_skeleton`."""
     skeleton = solver.skeleton
     numbers = [skeleton.number(name) for name in motion.names]

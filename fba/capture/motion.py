@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
 from fba.animation import MAX_FRAMES
+from fba.arrays import Float64, Int64
 from fba.errors import ModelError
 
 
@@ -28,13 +28,13 @@ class SkeletonMotion:
     """
 
     names: tuple[str, ...]
-    parents: npt.NDArray[np.int64]
-    offsets: npt.NDArray[np.float64]
-    rotations: npt.NDArray[np.float64]
-    positions: npt.NDArray[np.float64]
+    parents: Int64
+    offsets: Float64
+    rotations: Float64
+    positions: Float64
     rate: Fraction
-    end_parents: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    end_offsets: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    end_parents: Int64 = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    end_offsets: Float64 = field(default_factory=lambda: np.zeros((0, 3)))
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -101,7 +101,7 @@ class SkeletonMotion:
         turned = rotations.interpolate(self.rotations, before, after, weight)
         return replace(self, rate=rate, rotations=turned, positions=positions)
 
-    def world(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    def world(self) -> tuple[Float64, Float64]:
         """Forward kinematics: world rotations (T, J, 4), quaternions, and joint positions (T, J, 3)."""
         turned = np.array(self.rotations)
         places = np.empty((len(self), len(self.names), 3))  # every joint is written below
@@ -114,7 +114,7 @@ class SkeletonMotion:
             places[:, joint] = places[:, parent] + offset
         return turned, places
 
-    def rest(self) -> npt.NDArray[np.float64]:
+    def rest(self) -> Float64:
         """(J, 3): joint positions in the rest pose, the root at its offset."""
         places = np.array(self.offsets)
         for joint, parent in enumerate(self.parents):

@@ -6,9 +6,9 @@ import warnings
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Float64, Int32
 from fba.body import BapSolver, wrapped
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _spine as spine
@@ -18,8 +18,6 @@ from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning, Remedy
 from fba.parameters import BAP_COUNT, baps
-
-Float = npt.NDArray[np.float64]
 
 CHUNK = 2048
 """Frames solved at a time: joint matrices of a long capture would not fit into memory."""
@@ -54,7 +52,7 @@ def find_targets(
     upright = alignment.upright
     source_rotations, source_positions = motion.world()
     source_positions = source_positions @ upright.T
-    targets: dict[str, Float] = {}
+    targets: dict[str, Float64] = {}
     for joint, correction in alignment.corrections.items():
         source = mapped.get(joint, mapped["HumanoidRoot"])
         world = upright @ rotations.matrices(source_rotations[:, source]) @ upright.T
@@ -104,7 +102,7 @@ def metres_per_unit(targets: Targets, scale: float | None) -> float:
     return float(scale)
 
 
-def solve_baps(targets: Targets, scale: float, origin: str, floor: str, plant: bool) -> npt.NDArray[np.int32]:
+def solve_baps(targets: Targets, scale: float, origin: str, floor: str, plant: bool) -> Int32:
     """BAPs, int32 (T, 296), that reach the target rotations and positions; may change the legs' targets.
 
     scale: metres for one unit of the source. origin, floor, plant: as `fba.capture.from_skeleton` has them.
@@ -209,10 +207,10 @@ def _curl_finger(targets: Targets, finger: str) -> None:
             _swing(targets, joints[0])
         return
     above = targets.parent_rotation(joints[0])
-    axes: list[Float] = []
-    starts: list[Float] = []
+    axes: list[Float64] = []
+    starts: list[Float64] = []
     goals = []
-    pieces: tuple[tuple[Float, int], ...]
+    pieces: tuple[tuple[Float64, int], ...]
     before = above
     for joint in joints:
         own, *_ = targets.axes(joint)
@@ -233,7 +231,7 @@ def _curl_finger(targets: Targets, finger: str) -> None:
         used += count
 
 
-def _root_positions(targets: Targets, scale: float) -> Float:
+def _root_positions(targets: Targets, scale: float) -> Float64:
     """(T, 3): where the root must be for the middle of the hips to be where the source's is."""
     centres, number = targets.skeleton.centres, targets.skeleton.number
     hips = [j for j in ("l_hip", "r_hip") if j in targets.mapped]
@@ -242,7 +240,7 @@ def _root_positions(targets: Targets, scale: float) -> Float:
         pelvis = centres[number("sacroiliac")]
         own = centres[[number(j) for j in hips]].mean(axis=0)
         lower = targets.rotations["sacroiliac"] @ (own - pelvis)
-        place: Float = middle - lower - targets.rotations["HumanoidRoot"] @ (pelvis - centres[0])
+        place: Float64 = middle - lower - targets.rotations["HumanoidRoot"] @ (pelvis - centres[0])
         return place
-    start: Float = targets.source_positions[:, targets.mapped["HumanoidRoot"]] * scale
+    start: Float64 = targets.source_positions[:, targets.mapped["HumanoidRoot"]] * scale
     return start

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack
+from fba.arrays import Int32
 from fba.body import BapSolver
 from fba.capture import _spine as spines
 from fba.capture import _standard_skeleton as standard_skeleton
@@ -114,7 +114,7 @@ def from_skeleton(
     return _track(motion, solve_baps(targets, metres, origin, ground, plant), turned)
 
 
-def _track(motion: SkeletonMotion, values: npt.NDArray[np.int32], turned: set[str]) -> Animation:
+def _track(motion: SkeletonMotion, values: Int32, turned: set[str]) -> Animation:
     """The animation; turned: the joints whose BAPs are sent."""
     moved = np.zeros(BAP_COUNT, dtype=bool)
     moved[[b.number - 1 for b in baps() if b.joint in turned]] = True

@@ -16,7 +16,7 @@ import time
 from types import FrameType, TracebackType
 from typing import Any, Protocol
 
-from fba.cli.exit_quietly import leave
+from fba.cli.startup import leave
 
 AGAIN_AFTER = 0.05
 """Seconds until it comes again."""

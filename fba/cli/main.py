@@ -13,12 +13,10 @@ from typing import Any, NoReturn
 import click
 
 from fba import __version__
-from fba.cli._compile_notice import Notice
 from fba.cli._program import NAME, program_words, with_program
 from fba.cli._sigint import Interruptions
-from fba.cli._startup import hasten
-from fba.cli.exit_quietly import INTERRUPTED, TEXT
 from fba.cli.options import Group, described, examples
+from fba.cli.startup import INTERRUPTED, TEXT, collect_less
 from fba.compiled import compilation_listener
 from fba.errors import FbaError, FbaWarning, did_you_mean
 
@@ -38,6 +36,29 @@ _COMMANDS = {
 }
 
 BAD_DATA, BAD_USAGE = 1, 2
+
+COMPILED_FUNCTIONS = 5
+"""The notice is printed when this many functions are to be compiled; fewer take less than about 2 s."""
+COMPILE_SECONDS = {"info": 8, "stats": 5, "decode": 5, "bench": 8, "encode": 13, "convert": 13}
+"""How long compiling everything that a command may need takes, in seconds of one core."""
+LONGEST_COMPILE_SECONDS = 35
+"""The same for all other commands."""
+
+
+class CompileNotice:
+    """Prints one line to standard error when a command is about to compile for seconds.
+
+    It is called before each function that is compiled.
+    """
+
+    def __init__(self, command: str) -> None:
+        self._seconds = COMPILE_SECONDS.get(command, LONGEST_COMPILE_SECONDS)
+        self._functions = 0
+
+    def __call__(self) -> None:
+        self._functions += 1
+        if self._functions == COMPILED_FUNCTIONS:
+            click.echo(f"fba: compiling, once (up to about {self._seconds} s)", err=True)
 
 
 class _ReaderGoneError(Exception):
@@ -111,14 +132,14 @@ def main(arguments: list[str] | None = None) -> None:
     """
     program, own = NAME, arguments is None
     if arguments is None:
-        hasten()
+        collect_less()
         program = program_words()
         arguments = sys.argv[1:]
     debug = "--debug" in arguments or bool(os.environ.get("FBA_DEBUG"))
     warnings.simplefilter("always", FbaWarning)
     warnings.showwarning = _show_warning
     interruptions = Interruptions()
-    notice = Notice(next((one for one in arguments if one in _COMMANDS), "")) if own else None
+    notice = CompileNotice(next((one for one in arguments if one in _COMMANDS), "")) if own else None
     try:
         with interruptions, compilation_listener(notice):
             result = group.main(arguments, prog_name=program, standalone_mode=False)

@@ -269,25 +269,6 @@ def view_option(command: Decorated) -> Decorated:
     )(command)
 
 
-def deform_option(command: Decorated) -> Decorated:
-    """Heard by the player, wherever it draws; no argument of the command."""
-    return click.option(
-        "--deform",
-        type=click.Choice(["auto", "cpu", "gpu"]),
-        default="auto",
-        help="Who moves the vertices of figures; the picture is the same. Default: FBA_DEFORM, else what is "
-        "faster.",
-        expose_value=False,
-        callback=_preferred,
-    )(command)
-
-
-def _preferred(context: click.Context, option: click.Parameter, value: str) -> None:
-    from fba_player.gl.gpu.choice import prefer
-
-    prefer(value)
-
-
 class ShowType(click.ParamType[tuple[str, Any]]):
     """A switch of the player: wireframe, influence=open_jaw, shadows=off."""
 

@@ -63,7 +63,6 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Command], Command]:
         options.camera_option,
         options.view_option,
         options.show_option,
-        options.deform_option,
         options.axes_option,
         options.bap_steps_option,
         options.salvage_option,

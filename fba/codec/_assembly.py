@@ -7,9 +7,9 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack
+from fba.arrays import Array, Bool, Int64
 from fba.codec.block import Block
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.tracks import trusted
@@ -21,10 +21,10 @@ class _Rows:
     """An array (T, columns) that grows at its end, by an eighth at a time and in place where that goes."""
 
     def __init__(self, columns: int, dtype: type[np.generic], count: int) -> None:
-        self._array: npt.NDArray[Any] = np.zeros((count, columns), dtype=dtype)
+        self._array: Array = np.zeros((count, columns), dtype=dtype)
         self._count = count
 
-    def append(self, rows: npt.NDArray[Any] | None, count: int) -> None:
+    def append(self, rows: Array | None, count: int) -> None:
         """Append rows, or zeros."""
         need = self._count + count
         if need > len(self._array):
@@ -34,7 +34,7 @@ class _Rows:
             self._array[self._count : need] = rows
         self._count = need
 
-    def finished(self) -> npt.NDArray[Any]:
+    def finished(self) -> Array:
         self._array.resize((self._count, self._array.shape[1]), refcheck=False)
         self._array.flags.writeable = False
         return self._array
@@ -48,7 +48,7 @@ class _Masks:
         self._rows = [np.zeros(columns, dtype=bool)] if count else []
         self._counts = [count] if count else []
 
-    def append(self, mask: npt.NDArray[np.bool_] | None, count: int) -> None:
+    def append(self, mask: Bool | None, count: int) -> None:
         row = mask if mask is not None else np.zeros(self._columns, dtype=bool)
         if self._rows and np.array_equal(row, self._rows[-1]):
             self._counts[-1] += count
@@ -56,10 +56,10 @@ class _Masks:
             self._rows.append(row)
             self._counts.append(count)
 
-    def finished(self) -> npt.NDArray[np.bool_]:
+    def finished(self) -> Bool:
         if len(self._rows) == 1:
             return np.broadcast_to(self._rows[0], (self._counts[0], len(self._rows[0])))
-        masks: npt.NDArray[np.bool_] = np.repeat(self._rows, self._counts, axis=0)
+        masks: Bool = np.repeat(self._rows, self._counts, axis=0)
         masks.flags.writeable = False
         return masks
 
@@ -69,7 +69,7 @@ class Assembly:
 
     def __init__(self) -> None:
         self.frames = 0
-        self._times: list[tuple[npt.NDArray[np.int64], Fraction, Fraction]] = []
+        self._times: list[tuple[Int64, Fraction, Fraction]] = []
         self._face: dict[str, Any] = {}
         self._body: dict[str, Any] = {}
 
@@ -115,8 +115,8 @@ class Assembly:
 
 
 def _joined_times(
-    times: list[tuple[npt.NDArray[np.int64], Fraction, Fraction]],
-) -> tuple[Fraction, npt.NDArray[np.int64]]:
+    times: list[tuple[Int64, Fraction, Fraction]],
+) -> tuple[Fraction, Int64]:
     """Rate and index of blocks (index, start, rate); the smallest rate that holds all times, where the
     stream changes its own."""
     rates = {rate for _, _, rate in times}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+
+from fba.arrays import UInt8
 
 _SMALLEST = 4096
 
@@ -46,4 +47,4 @@ class Buffer:
 
     def _allocate(self, size: int) -> None:
         self._bytes = bytearray(size)  # searched; `data` is a view of it that compiled code can read
-        self.data: npt.NDArray[np.uint8] = np.frombuffer(self._bytes, dtype=np.uint8)
+        self.data: UInt8 = np.frombuffer(self._bytes, dtype=np.uint8)

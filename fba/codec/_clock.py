@@ -6,8 +6,8 @@ import math
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int64
 from fba.codec.settings import FrameRate, TimeCode
 
 DEFAULT_RATE = Fraction(25)
@@ -59,7 +59,7 @@ class StreamClock:
                 self.index = self._anchor_index = max(nearest, self.index)
         return odd
 
-    def advance(self, skips: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    def advance(self, skips: Int64) -> Int64:
         """Indices of planes with these skips, int64 (T,); the clock moves on behind them."""
         steps = np.cumsum(skips + 1)
         index = self.index + np.concatenate([[0], steps[:-1]])

@@ -7,9 +7,9 @@ from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack, Frame
+from fba.arrays import Bool, Int32, Int64
 from fba.codec import _planner as planner
 from fba.codec._plane import quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
@@ -21,7 +21,6 @@ from fba.parameters import INTENSITY_MAX
 
 _CHUNK = 4096
 """Frames that `encode` hands over at a time: what bounds its memory."""
-Int64 = npt.NDArray[np.int64]
 
 _PARTS = (slots.FACE_BIT, slots.BODY_BIT)
 
@@ -129,7 +128,7 @@ class Encoder:
             self._encode_run(frames, start, stop, rows, skips)
         self._position += count
 
-    def _clip_amounts(self, rows: slots.Int32) -> None:
+    def _clip_amounts(self, rows: Int32) -> None:
         """Bring blends and intensities into 0..63. Raises RangeError for those that no quantiser makes."""
         wrong = planner.clip_amounts(rows)
         if len(wrong) and not self.options.clamp:
@@ -143,9 +142,7 @@ class Encoder:
             ).with_remedies(planner.CLAMP)
         self.statistics.clamped += len(wrong)
 
-    def _encode_run(
-        self, frames: Animation, start: int, stop: int, rows: slots.Int32, skips: npt.NDArray[np.int64]
-    ) -> None:
+    def _encode_run(self, frames: Animation, start: int, stop: int, rows: Int32, skips: Int64) -> None:
         """Encode frames start..stop, which all send the same."""
         masks = _masks(frames, start)
         interpolated = _interpolated(frames, start)
@@ -209,9 +206,9 @@ class Encoder:
         frames: Animation,
         position: int,
         present: list[int],
-        masks: dict[int, slots.Bool],
+        masks: dict[int, Bool],
         types: dict[int, tuple[int, ...]],
-        rows: slots.Int32,
+        rows: Int32,
         skip: int,
     ) -> None:
         first = self.statistics.planes == 0
@@ -237,7 +234,7 @@ class Encoder:
         self.statistics.intra_planes += 1
         self._last_intra = index
 
-    def _levels(self, part: int, mask: slots.Bool, row: slots.Int32) -> tuple[Int64, Int64]:
+    def _levels(self, part: int, mask: Bool, row: Int32) -> tuple[Int64, Int64]:
         """Slots (K,) and levels (K,) of what an I plane codes of a part, without viseme and expression."""
         place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
         base = 0 if part == slots.FACE_BIT else place.start
@@ -245,13 +242,13 @@ class Encoder:
         step = quantiser.steps(part, self.options.quant(part), self.options.bap_steps)[coded - base]
         return coded, quantiser.levels(row[coded], step)
 
-    def _carried_by_intra(self, row: slots.Int32, masks: dict[int, slots.Bool], present: list[int]) -> bool:
+    def _carried_by_intra(self, row: Int32, masks: dict[int, Bool], present: list[int]) -> bool:
         return all(
             bool(self._ranges[part].fits(self._levels(part, masks[part], row)[1]).all()) for part in present
         )
 
     def _part_settings(
-        self, part: int, mask: slots.Bool, types: tuple[int, ...], row: slots.Int32, position: int
+        self, part: int, mask: Bool, types: tuple[int, ...], row: Int32, position: int
     ) -> PartSettings:
         """Settings for an I plane, with ranges that hold its values. Raises RangeError where none do."""
         options = self.options
@@ -304,13 +301,13 @@ def encode_with_statistics(
     return b"".join(chunks), encoder.statistics
 
 
-def _masks(frames: Animation, position: int) -> dict[int, slots.Bool]:
+def _masks(frames: Animation, position: int) -> dict[int, Bool]:
     """What a frame sends, by part; a part without a track is missing."""
     tracks = ((slots.FACE_BIT, frames.face), (slots.BODY_BIT, frames.body))
     return {part: track.mask[position] for part, track in tracks if track is not None}
 
 
-def _interpolated(frames: Animation, position: int) -> slots.Bool | None:
+def _interpolated(frames: Animation, position: int) -> Bool | None:
     """What a frame asks to have interpolated: bool (68,), or None."""
     asked = frames.face.interpolated if frames.face is not None else None
     return asked[position] if asked is not None else None

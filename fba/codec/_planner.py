@@ -9,21 +9,12 @@ from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Bool, Int32, Int64, UInt8
 from fba.codec._plane import quantiser, slots, syntax
 from fba.codec._plane.loops import quantise
-from fba.codec._plane.slots import Int64
-from fba.codec.settings import (
-    QUANT_MAX,
-    RANGE_CODE_MAX,
-    RANGE_UNIT,
-    FrameRate,
-    RangeLists,
-    TimeCode,
-    UInt8,
-)
+from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT, FrameRate, RangeLists, TimeCode
 from fba.compiled import compiled
 from fba.errors import FbaWarning, RangeError, Remedy
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, Bap, Fap, baps, faps
@@ -129,9 +120,9 @@ class Ranges:
         """Whether differences of a slot have the widest range there is."""
         return bool((self.codes[2:, slot - self._first] == RANGE_CODE_MAX).all())
 
-    def fits(self, levels: Int64) -> npt.NDArray[np.bool_]:
+    def fits(self, levels: Int64) -> Bool:
         """Which of the levels any range can hold."""
-        fitting: npt.NDArray[np.bool_] = self._codes(np.abs(levels)) <= RANGE_CODE_MAX
+        fitting: Bool = self._codes(np.abs(levels)) <= RANGE_CODE_MAX
         return fitting
 
     def lists(self) -> RangeLists:
@@ -145,7 +136,7 @@ class Ranges:
         return codes
 
 
-def mask_types(part: int, mask: slots.Bool, interpolated: slots.Bool | None, unsent: str) -> tuple[int, ...]:
+def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) -> tuple[int, ...]:
     """Mask type of every group: none, all, or masked (BAPs are always kept).
 
     interpolated: bool (68,), what the animation asks to have interpolated, or None. A group of which
@@ -227,9 +218,7 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
 
 
 @compiled
-def _extremes(
-    values: npt.NDArray[np.int32], mask: slots.Bool, step: slots.Int64, extremes: slots.Int64
-) -> None:
+def _extremes(values: Int32, mask: Bool, step: Int64, extremes: Int64) -> None:
     """Largest and negated smallest levels of I and P planes, per column, were each frame coded as both."""
     for column in range(values.shape[1]):
         one_step = int(step[column])
@@ -296,7 +285,7 @@ def _largest(part: int, column: int, quant: int, table: str) -> int:
     return limit * step + (step - 1) // 2
 
 
-def clip_amounts(rows: slots.Int32) -> list[tuple[int, int, int]]:
+def clip_amounts(rows: Int32) -> list[tuple[int, int, int]]:
     """Bring blends and intensities into 0..63: a coarse quantiser makes a decoder round them past it.
 
     Returns row, slot and value of those that are too far away for that, in order.

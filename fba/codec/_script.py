@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Int32, Intp
 from fba.codec._plane import slots
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec.settings import PlaneSettings
@@ -63,7 +63,7 @@ def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_
     return b"".join(chunks)
 
 
-def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> npt.NDArray[np.int32]:
+def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> Int32:
     rows = np.zeros((len(planes), slots.SLOTS), dtype=np.int32)
     if any(one.face is not None for one in planes):
         track = animation.face
@@ -81,9 +81,7 @@ def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> npt.NDArray[
     return rows
 
 
-def _frames(
-    animation: Animation, numbers: Sequence[int | None]
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _frames(animation: Animation, numbers: Sequence[int | None]) -> tuple[Intp, Intp]:
     """Which planes want a frame, and where in the animation it is."""
     chosen = np.array([i for i, number in enumerate(numbers) if number is not None], dtype=np.intp)
     wanted = np.array([number for number in numbers if number is not None], dtype=np.int64)

@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-import numpy as np
-import numpy.typing as npt
-
 from fba.animation import BodyTrack, FaceTrack, Frame
+from fba.arrays import Int64
 from fba.codec.settings import PlaneInfo, PlaneSettings
 
 
@@ -21,14 +19,14 @@ class Block:
     absolute bit positions. skips: int64 (T,).
     """
 
-    index: npt.NDArray[np.int64]
+    index: Int64
     start: Fraction
     rate: Fraction
     face: FaceTrack | None
     body: BodyTrack | None
     number: int
-    borders: npt.NDArray[np.int64]
-    skips: npt.NDArray[np.int64]
+    borders: Int64
+    skips: Int64
     settings: PlaneSettings
 
     def frames(self) -> Iterator[Frame]:

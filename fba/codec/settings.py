@@ -9,11 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-import numpy.typing as npt
-
-Bool = npt.NDArray[np.bool_]
-UInt8 = npt.NDArray[np.uint8]
+from fba.arrays import Bool, UInt8
 
 RANGE_UNIT = 60
 """Range limits are sent as multiples of this."""

@@ -8,9 +8,9 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Bool, Int64
 from fba.codec._decoder import Damage, Decoder
 from fba.codec._plane import syntax
 from fba.codec.block import Block
@@ -65,9 +65,9 @@ class StreamInfo:
     body: PartInfo | None
     intra_planes: int | None = None
     start_codes: int | None = None
-    plane_bits: npt.NDArray[np.int64] | None = field(default=None, repr=False)
-    plane_intra: npt.NDArray[np.bool_] | None = field(default=None, repr=False)
-    frame_index: npt.NDArray[np.int64] | None = field(default=None, repr=False)
+    plane_bits: Int64 | None = field(default=None, repr=False)
+    plane_intra: Bool | None = field(default=None, repr=False)
+    frame_index: Int64 | None = field(default=None, repr=False)
     damage: tuple[Damage, ...] = ()
 
     @property
@@ -159,9 +159,9 @@ def probe_stream(data: bytes | bytearray | memoryview, *, bap_steps: str = "iso"
     """
     decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
     face, body = _PartCount(), _PartCount()
-    bits: list[npt.NDArray[np.int64]] = []
-    intra: list[npt.NDArray[np.bool_]] = []
-    index: list[npt.NDArray[np.int64]] = []
+    bits: list[Int64] = []
+    intra: list[Bool] = []
+    index: list[Int64] = []
     start_codes = 0
     first: Block | None = None
     block: Block | None = None

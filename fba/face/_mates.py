@@ -11,13 +11,12 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Intp
 from fba.parameters import FAP_COUNT, faps
-
-Bool = npt.NDArray[np.bool_]
 
 
 @cache
-def donors() -> tuple[npt.NDArray[np.intp], ...]:
+def donors() -> tuple[Intp, ...]:
     """Columns (68,) from which an unsent FAP is copied, best first: mate, lip mate, the lip mate's mate.
 
     A FAP without such a relative names itself.

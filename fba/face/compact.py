@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32
 from fba.face.model import FaceModel, Part
 from fba.face.tables import FaceDefMesh, FaceDefTables
 
-Float32 = npt.NDArray[np.float32]
 BITS = 20
 """Displacements keep this many bits below the largest of their FaceDefMesh: one part in a million."""
 SHADES = 65535

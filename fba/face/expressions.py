@@ -14,12 +14,10 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32
 from fba.face._mates import fill
 from fba.parameters import EXPRESSION_SELECT_MAX, FAP_COUNT, VISEME_SELECT_MAX, fap_numbers
-
-Float32 = npt.NDArray[np.float32]
 
 VISEME_NAMES = (
     "none",

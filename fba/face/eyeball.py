@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Floating
 from fba.face.feature_points import row_of
 from fba.face.tables import FaceDefMesh, FaceDefTables
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
 
-Float64 = npt.NDArray[np.float64]
 
 PUPIL_FAP = {"left": 29, "right": 30}
 PUPIL_POINT = {"left": "3.5", "right": "3.6"}
@@ -131,7 +130,7 @@ def _scaled_part(model: FaceModel, table: FaceDefTables, centre: Float64, direct
     return None
 
 
-def _off_axis(vertices: npt.NDArray[np.floating], centre: Float64, direction: Float64) -> Float64:
+def _off_axis(vertices: Floating, centre: Float64, direction: Float64) -> Float64:
     arms = vertices.astype(np.float64) - centre
     distances: Float64 = np.linalg.norm(arms - np.outer(arms @ direction, direction), axis=1)
     return distances

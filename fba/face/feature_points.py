@@ -14,11 +14,11 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.parameters import feature_points
 
-Points = npt.NDArray[np.float64]
+Points = Float64
 
 MIRRORED = {
     "2.4": "2.5", "2.6": "2.7", "2.8": "2.9", "2.11": "2.12", "2.13": "2.14",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
 from fba.errors import ModelError
 from fba.face.expressions import Definitions
 from fba.face.fapu import Fapu
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PART_KINDS", "FaceModel", "Material", "Part", "bind", "point_row"]
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 PART_KINDS = ("skin", "eye", "teeth", "tongue", "mouth", "brow", "lash", "hair", "other")
 """What a part is. "mouth" is the inside of the mouth where it is not part of the skin; "eye" a whole

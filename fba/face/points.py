@@ -15,13 +15,11 @@ from importlib.resources import files
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.errors import ModelError
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
 from fba.parameters import FAP_COUNT, faps
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 DIRECTIONS = {
     "left": (1.0, 0.0, 0.0),

@@ -11,16 +11,14 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import FaceTrack
+from fba.arrays import Array, Bool, Float32, Int16, Int32, Intp
 from fba.face._mates import fill
 from fba.face.expressions import Definitions
 from fba.face.interpolation.evaluate import evaluate
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
-
-Float32 = npt.NDArray[np.float32]
 
 BLOCK = 4096
 """Frames resolved at once: keeps the working arrays in the processor's cache."""
@@ -63,7 +61,7 @@ class Resolver:
     def _push_block(self, track: FaceTrack) -> Float32:
         low, ever, asked = self._held.low_level(track)
         sent = ever
-        filled: npt.NDArray[Any] = low
+        filled: Array = low
         if asked is not None:
             sent = ever & ~asked
             filled = np.where(sent, low, np.int32(0))
@@ -86,7 +84,7 @@ class Resolver:
         shown[:, :2] = 0
         return shown
 
-    def _visemes_shown(self, track: FaceTrack, fields: npt.NDArray[np.int16]) -> Float32:
+    def _visemes_shown(self, track: FaceTrack, fields: Int16) -> Float32:
         blend = _share(fields[:, 2])
         defined = track.mask[:, 0] & (track.viseme[:, 3] == 1)
         table = _Redefined(self._visemes, defined, fields[:, 0], track, mouth_only=True)
@@ -95,7 +93,7 @@ class Resolver:
         shown: Float32 = table.look_up(fields[:, 0]) * blend + table.look_up(fields[:, 1]) * (1 - blend)
         return shown
 
-    def _expressions_shown(self, track: FaceTrack, fields: npt.NDArray[np.int16]) -> Float32:
+    def _expressions_shown(self, track: FaceTrack, fields: Int16) -> Float32:
         first, second = (_share(fields[:, column]) for column in (1, 3))
         # The same expression in both places is still one expression: never more than all of it.
         same = (fields[:, 0] == fields[:, 2])[:, None]
@@ -133,18 +131,16 @@ def resolve(track: FaceTrack, model: Any = None) -> Float32:
 class _Held:
     """The last values sent, and which ever were."""
 
-    values: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=np.int32))
-    sent: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
-    viseme: npt.NDArray[np.int16] = field(default_factory=lambda: np.zeros(4, dtype=np.int16))
-    expression: npt.NDArray[np.int16] = field(default_factory=lambda: np.zeros(6, dtype=np.int16))
-    asked: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
+    values: Int32 = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=np.int32))
+    sent: Bool = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
+    viseme: Int16 = field(default_factory=lambda: np.zeros(4, dtype=np.int16))
+    expression: Int16 = field(default_factory=lambda: np.zeros(6, dtype=np.int16))
+    asked: Bool = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
 
     def copy(self) -> _Held:
         return _Held(*(getattr(self, one.name).copy() for one in fields(self)))
 
-    def low_level(
-        self, track: FaceTrack
-    ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_], npt.NDArray[np.bool_] | None]:
+    def low_level(self, track: FaceTrack) -> tuple[Int32, Bool, Bool | None]:
         """Each (T, 68): values last sent, which of all FAPs were ever sent, and which low-level ones
         are to be interpolated, None where none are."""
         if track.mask[:, 2:].all():
@@ -156,7 +152,7 @@ class _Held:
         self.values, self.sent = values[-1].copy(), sent[-1].copy()
         return values, sent, self._asked(track)
 
-    def _asked(self, track: FaceTrack) -> npt.NDArray[np.bool_] | None:
+    def _asked(self, track: FaceTrack) -> Bool | None:
         if track.interpolated is None and not self.asked.any():
             return None
         own = track.interpolated if track.interpolated is not None else np.zeros_like(track.mask)
@@ -165,14 +161,14 @@ class _Held:
         self.asked = asked[-1].copy()
         return asked
 
-    def high_level(self, track: FaceTrack) -> tuple[npt.NDArray[np.int16], npt.NDArray[np.int16]]:
+    def high_level(self, track: FaceTrack) -> tuple[Int16, Int16]:
         viseme = hold(track.viseme, track.mask[:, :1], self.viseme)
         expression = hold(track.expression, track.mask[:, 1:2], self.expression)
         self.viseme, self.expression = viseme[-1].copy(), expression[-1].copy()
         return viseme, expression
 
 
-def _share(amounts: npt.NDArray[np.int16]) -> Float32:
+def _share(amounts: Int16) -> Float32:
     """(T, 1) blend or intensity as a share of its largest; quantised ones may lie a little outside."""
     share: Float32 = np.clip(amounts, 0, INTENSITY_MAX).astype(np.float32)[:, None] / np.float32(
         INTENSITY_MAX
@@ -180,7 +176,7 @@ def _share(amounts: npt.NDArray[np.int16]) -> Float32:
     return share
 
 
-def hold(values: npt.NDArray[Any], mask: npt.NDArray[np.bool_], before: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def hold(values: Array, mask: Bool, before: Array) -> Array:
     """Each column keeps its last masked-in value; (T, N), or mask (T, 1) for all columns together.
 
     before: (N,) values in force before the first frame.
@@ -188,7 +184,7 @@ def hold(values: npt.NDArray[Any], mask: npt.NDArray[np.bool_], before: npt.NDAr
     last = np.where(mask, np.arange(1, len(mask) + 1, dtype=np.int32)[:, None], np.int32(0))
     np.maximum.accumulate(last, axis=0, out=last)
     known = np.concatenate([before[None].astype(values.dtype), values])
-    held: npt.NDArray[Any] = np.take_along_axis(known, np.broadcast_to(last, values.shape), axis=0)
+    held: Array = np.take_along_axis(known, np.broadcast_to(last, values.shape), axis=0)
     return held
 
 
@@ -198,8 +194,8 @@ class _Redefined:
     def __init__(
         self,
         table: Float32,
-        defined: npt.NDArray[np.bool_],
-        select: npt.NDArray[np.int16],
+        defined: Bool,
+        select: Int16,
         track: FaceTrack,
         *,
         mouth_only: bool,
@@ -209,7 +205,7 @@ class _Redefined:
         mask = track.mask[events] & stored
         rows = fill(np.where(mask, track.values[events], 0), mask)[0].astype(np.float32)
         self._rows = np.concatenate([table, rows])
-        self._in_force: npt.NDArray[np.intp] | None = None
+        self._in_force: Intp | None = None
         if len(events):
             count = len(table)
             row = np.broadcast_to(np.arange(count), (len(track), count)).copy()
@@ -217,7 +213,7 @@ class _Redefined:
             self._in_force = np.maximum.accumulate(row, axis=0)
             table[:] = self._rows[self._in_force[-1]]
 
-    def look_up(self, select: npt.NDArray[np.int16]) -> Float32:
+    def look_up(self, select: Int16) -> Float32:
         """(T, 68) definition of the selected item at each frame."""
         if self._in_force is None:
             return self._rows[select]

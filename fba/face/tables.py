@@ -12,11 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Int32
 from fba.errors import ModelError
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
-
-Float32 = npt.NDArray[np.float32]
-Int32 = npt.NDArray[np.int32]
 
 HEAD = "head"
 """The part name that stands for all parts together: what turns with the head."""

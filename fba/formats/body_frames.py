@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Int32
 from fba.errors import FormatError
 from fba.parameters import BAP_COUNT
 from fba.source import Path
@@ -14,7 +14,7 @@ MOST_FRAMES = 500_000
 """As many as the readers of motion capture take."""
 
 
-def shown_baps(animation: Animation, path: Path, format: str) -> npt.NDArray[np.int32]:
+def shown_baps(animation: Animation, path: Path, format: str) -> Int32:
     """int32 (T, 296): what is shown at every frame from the first to the last, gaps filled in.
 
     Raises FormatError where there is no body or no frame, or there are more than `MOST_FRAMES`.
@@ -42,7 +42,7 @@ def check_frames(animation: Animation, path: Path, format: str) -> None:
         )
 
 
-def held_baps(animation: Animation) -> npt.NDArray[np.int32]:
+def held_baps(animation: Animation) -> Int32:
     """int32 (T, 296): at every frame the last value sent, 0 before that."""
     from fba.face.resolve import hold
 
@@ -50,5 +50,5 @@ def held_baps(animation: Animation) -> npt.NDArray[np.int32]:
     assert body is not None
     if body.mask.all():
         return body.values
-    held: npt.NDArray[np.int32] = hold(body.values, body.mask, np.zeros(BAP_COUNT, dtype=np.int32))
+    held: Int32 = hold(body.values, body.mask, np.zeros(BAP_COUNT, dtype=np.int32))
     return held

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack, FaceTrack
+from fba.arrays import Intp
 from fba.errors import FormatError, Remedy
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -49,7 +50,7 @@ def merge(face_animation: Animation, body_animation: Animation) -> Animation:
     return Animation(face_animation.rate, index, joined_face, joined_body, name)
 
 
-def _spread(rows: npt.NDArray[Scalar], at: npt.NDArray[np.intp], count: int) -> npt.NDArray[Scalar]:
+def _spread(rows: npt.NDArray[Scalar], at: Intp, count: int) -> npt.NDArray[Scalar]:
     """These rows at these places among `count`, zeros (False) elsewhere."""
     spread = np.zeros((count, rows.shape[1]), dtype=rows.dtype)
     spread[at] = rows

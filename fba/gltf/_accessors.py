@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Float32
 from fba.gltf._glb import MAX_BYTES
 from fba.gltf.document import Document
 from fba.gltf.values import Value
@@ -18,9 +18,6 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 UNSIGNED = (5121, 5123, 5125)
 MAX_ELEMENTS = 1 << 22
 """Most elements of one accessor: 4 million vertices or indices."""
-
-Array = npt.NDArray[Any]
-Float32 = npt.NDArray[np.float32]
 
 
 class Accessors:

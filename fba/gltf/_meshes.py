@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fba.arrays import Float32, Int32
 from fba.errors import FbaWarning
 from fba.gltf._accessors import Accessors
 from fba.gltf.document import MAX_ITEMS, Document
-from fba.gltf.scene import Float32, Int32, Mesh, Primitive
+from fba.gltf.scene import Mesh, Primitive
 from fba.gltf.values import Value
 
 TRIANGLES, STRIP, FAN = 4, 5, 6

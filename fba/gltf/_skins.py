@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.gltf._accessors import Accessors
 from fba.gltf.document import MAX_ITEMS, Document
-from fba.gltf.scene import Float64, Skin
+from fba.gltf.scene import Skin
 from fba.gltf.values import Value
 
 

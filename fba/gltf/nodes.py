@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.gltf.document import MAX_ITEMS, Document
-from fba.gltf.scene import Float64, Mesh, Node, Skin
+from fba.gltf.scene import Mesh, Node, Skin
 from fba.gltf.values import Value
 
 

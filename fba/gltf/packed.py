@@ -7,27 +7,24 @@ third and highest ones, which are much alike in neighbours and deflate well; the
 from __future__ import annotations
 
 import zlib
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array
 from fba.gltf.document import Document
 from fba.gltf.values import Value
 
 LEVEL = 9
 
 
-def pack(array: npt.NDArray[Any]) -> bytes:
+def pack(array: Array) -> bytes:
     """The bytes of an array of 32-bit numbers, in its own order, packed."""
     words = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).ravel()
     planes = words.view(np.uint8).reshape(-1, 4).T
     return zlib.compress(planes.tobytes(), LEVEL)
 
 
-def unpack(
-    document: Document, reference: Value, dtype: type[np.generic], shape: tuple[int, ...]
-) -> npt.NDArray[Any]:
+def unpack(document: Document, reference: Value, dtype: type[np.generic], shape: tuple[int, ...]) -> Array:
     """The array of 32-bit numbers in the buffer view that `reference` names; its shape must be known.
 
     Raises ModelError where the stream is damaged, or holds more or fewer numbers.

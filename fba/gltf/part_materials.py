@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.gltf.scene import Gltf
 from fba.gltf.values import Value
 from fba.gltf.writer import Builder
-from fba.mesh.meshes import Float32, Material, Mesh
+from fba.mesh.meshes import Material, Mesh
 
 WHITE = (1.0, 1.0, 1.0)
 

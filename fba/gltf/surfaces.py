@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning
 from fba.gltf.document import MAX_UNPACKED
-from fba.gltf.scene import Float32, Float64, Gltf, Int32, Material, Node, Primitive
+from fba.gltf.scene import Gltf, Material, Node, Primitive
 from fba.gltf.values import Budget
 
 

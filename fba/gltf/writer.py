@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Array, Floating
 from fba.atomic import atomic
 from fba.errors import ModelError
 from fba.gltf._accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
@@ -86,11 +87,11 @@ class Builder:
         view = self._blob(array.astype(array.dtype.newbyteorder("<")).tobytes())
         return self._accessor(array, False, view, 0)
 
-    def packed(self, array: npt.NDArray[Any]) -> int:
+    def packed(self, array: Array) -> int:
         """Buffer view of 32-bit numbers that no plain viewer needs, without loss in few bytes."""
         return self._blob(pack(array))
 
-    def displacements(self, values: npt.NDArray[np.floating[Any]]) -> int:
+    def displacements(self, values: Floating) -> int:
         """Accessor of a morph target, (V, 3): sparse where most vertices stay."""
         array = np.asarray(values, dtype=np.float32)
         rows = np.flatnonzero(array.any(axis=1))
@@ -158,7 +159,7 @@ class Builder:
         with atomic(path) as file:
             file.write(data)
 
-    def _append(self, array: npt.NDArray[Any], key: tuple[int | None, int | None]) -> tuple[int, int]:
+    def _append(self, array: Array, key: tuple[int | None, int | None]) -> tuple[int, int]:
         """Add to the stream of that target and stride; its buffer view, and the offset in it."""
         if key not in self._views:
             self._views[key] = (self.add("bufferViews", {}), bytearray())
@@ -175,11 +176,11 @@ class Builder:
         self._blobs.append((view, data))
         return view
 
-    def _accessor(self, array: npt.NDArray[Any], bounds: bool, view: int, offset: int) -> int:
+    def _accessor(self, array: Array, bounds: bool, view: int, offset: int) -> int:
         return self.add("accessors", _at(_entry(array, bounds), view, offset))
 
 
-def _entry(array: npt.NDArray[Any], bounds: bool) -> dict[str, Any]:
+def _entry(array: Array, bounds: bool) -> dict[str, Any]:
     if not 1 <= len(array) <= MAX_ELEMENTS:
         raise ModelError(f"a glTF accessor holds 1 to {MAX_ELEMENTS} elements, not {len(array)}")
     entry = {
@@ -196,7 +197,7 @@ def _at(entry: dict[str, Any], view: int, offset: int) -> dict[str, Any]:
     return entry | {"bufferView": view} | ({"byteOffset": offset} if offset else {})
 
 
-def _native(values: npt.ArrayLike) -> npt.NDArray[Any]:
+def _native(values: npt.ArrayLike) -> Array:
     array = np.asarray(values)
     if array.dtype.kind == "f":
         return np.ascontiguousarray(array, dtype=np.float32)
@@ -205,6 +206,6 @@ def _native(values: npt.ArrayLike) -> npt.NDArray[Any]:
     return np.ascontiguousarray(array)
 
 
-def _unsigned(array: npt.NDArray[Any], most_short: int) -> npt.NDArray[Any]:
+def _unsigned(array: Array, most_short: int) -> Array:
     kind = np.uint16 if not array.size or int(array.max()) <= most_short else np.uint32
     return np.ascontiguousarray(array, dtype=kind)

@@ -10,10 +10,8 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Floating, Int32, Integer
 from fba.errors import ModelError
-
-Float32 = npt.NDArray[np.float32]
-Int32 = npt.NDArray[np.int32]
 
 NORMAL_TOLERANCE = 1e-4
 """Lengths of normals within this of 1 are taken as 1."""
@@ -29,7 +27,7 @@ class Material:
     texture: bytes | None = None
 
 
-def vertex_normals(vertices: npt.NDArray[np.floating], triangles: npt.NDArray[np.integer]) -> Float32:
+def vertex_normals(vertices: Floating, triangles: Integer) -> Float32:
     """Unit normals weighted by area: float32 (V, 3); +z where no triangle touches a vertex."""
     corners = np.asarray(vertices, dtype=np.float64)[triangles]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

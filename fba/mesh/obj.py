@@ -6,8 +6,8 @@ import os
 from array import array
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
@@ -139,6 +139,6 @@ class _Reader:
         return whole_number(token, self.where, f"the number of a {what}")
 
 
-def _linear(colour: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def _linear(colour: Float32) -> Float32:
     """sRGB as such files hold it -> linear light."""
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).astype(np.float32)

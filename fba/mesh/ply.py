@@ -6,8 +6,8 @@ import os
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int64
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, whole, whole_number
@@ -62,7 +62,7 @@ class _Reader:
             self.word = 0
 
     def read(self) -> Polygons:
-        columns: dict[str, npt.NDArray[np.float64]] = {}
+        columns: dict[str, Float64] = {}
         starts, corners = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
         for element in self.elements:
             scalars, lists = self._element(element)
@@ -143,11 +143,7 @@ class _Reader:
             return tokens[4], TYPES[tokens[3]], TYPES[tokens[2]]
         raise ModelError(f"{where}: {' '.join(tokens)[:60]!r} is no property that is known")
 
-    def _element(
-        self, element: _Element
-    ) -> tuple[
-        dict[str, npt.NDArray[np.float64]], dict[str, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]
-    ]:
+    def _element(self, element: _Element) -> tuple[dict[str, Float64], dict[str, tuple[Int64, Int64]]]:
         if not element.properties and element.count:
             raise ModelError(f"{self.path}: element {element.name[:20]} has no properties")
         if any(length for _, _, length in element.properties):
@@ -169,18 +165,12 @@ class _Reader:
         self.word += need
         return {name: flat[i :: len(names)] for i, name in enumerate(names)}, {}
 
-    def _with_lists(
-        self, element: _Element
-    ) -> tuple[
-        dict[str, npt.NDArray[np.float64]], dict[str, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]
-    ]:
+    def _with_lists(self, element: _Element) -> tuple[dict[str, Float64], dict[str, tuple[Int64, Int64]]]:
         """Rows of different lengths; only the lists are kept."""
         even = self._even_lists(element) if self.order and element.count else None
         if even is not None:
             return {}, even
-        kept: dict[str, list[npt.NDArray[np.float64]]] = {
-            n: [] for n, _, length in element.properties if length
-        }
+        kept: dict[str, list[Float64]] = {n: [] for n, _, length in element.properties if length}
         total = 0
         for number in range(element.count):
             for name, kind, length in element.properties:
@@ -204,9 +194,7 @@ class _Reader:
             lists[name] = (starts, np.nan_to_num(values).astype(np.int64))
         return {}, lists
 
-    def _even_lists(
-        self, element: _Element
-    ) -> dict[str, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] | None:
+    def _even_lists(self, element: _Element) -> dict[str, tuple[Int64, Int64]] | None:
         """All rows at once where every list is as long as the first row's, as in a mesh of triangles."""
         lengths = [(name, length) for name, _, length in element.properties if length]
         at, row = self.at, []
@@ -236,7 +224,7 @@ class _Reader:
         flat = np.nan_to_num(values.reshape(-1).astype(np.float64))
         return {lengths[0][0]: (starts, np.clip(flat, -1, 2**53).astype(np.int64))}
 
-    def _take(self, kind: str, count: int, element: _Element, number: int) -> npt.NDArray[np.float64]:
+    def _take(self, kind: str, count: int, element: _Element, number: int) -> Float64:
         if self.order:
             row = np.dtype(self.order + kind)
             if len(self.data) - self.at < row.itemsize * count:
@@ -250,7 +238,7 @@ class _Reader:
         self.word += count
         return taken_words
 
-    def _floats(self, start: int, count: int, element: _Element) -> npt.NDArray[np.float64]:
+    def _floats(self, start: int, count: int, element: _Element) -> Float64:
         try:
             return np.array([float(word) for word in self.words[start : start + count]], dtype=np.float64)
         except (ValueError, OverflowError) as error:
@@ -262,7 +250,7 @@ class _Reader:
             f"{self.path}: ends within {element.count} of element {element.name[:20]}{place}; is it whole?"
         )
 
-    def _texcoords(self, columns: dict[str, npt.NDArray[np.float64]]) -> npt.NDArray[np.float64] | None:
+    def _texcoords(self, columns: dict[str, Float64]) -> Float64 | None:
         for s, t in zip(NAMES_S, NAMES_T, strict=True):
             if s in columns and t in columns:
                 pair = np.stack([columns[s], 1.0 - columns[t]], axis=1)
@@ -270,7 +258,7 @@ class _Reader:
         return None
 
     @staticmethod
-    def _colours(columns: dict[str, npt.NDArray[np.float64]]) -> npt.NDArray[np.float32] | None:
+    def _colours(columns: dict[str, Float64]) -> Float32 | None:
         if not {"red", "green", "blue"} <= set(columns):
             return None
         rgb = np.stack([columns[name] for name in ("red", "green", "blue")], axis=1)

@@ -13,7 +13,8 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
+
+from fba.arrays import Int64
 
 FAP_COUNT = 68
 BAP_COUNT = 296
@@ -219,20 +220,20 @@ def bap_groups() -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def fap_steps() -> npt.NDArray[np.int64]:
+def fap_steps() -> Int64:
     """(68,) quantiser steps before fap_quant; read-only."""
     return _frozen([f.step for f in faps()])
 
 
 @cache
-def bap_steps(table: str = "iso") -> npt.NDArray[np.int64]:
+def bap_steps(table: str = "iso") -> Int64:
     """(296,) quantiser steps before the predictive scale; table: "iso" or "visage"; read-only."""
     if table not in BAP_STEP_TABLES:
         raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {table!r}")
     return _frozen([b.step_iso if table == "iso" else b.step_visage for b in baps()])
 
 
-def _frozen(values: list[int]) -> npt.NDArray[np.int64]:
+def _frozen(values: list[int]) -> Int64:
     array = np.array(values, dtype=np.int64)
     array.flags.writeable = False
     return array

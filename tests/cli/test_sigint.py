@@ -78,7 +78,7 @@ def ran(code: str) -> tuple[int, str, str]:
 
 @pytest.mark.parametrize(
     "module",
-    ["fba.cli.main", "click", "inspect", "fba.cli._startup", "fba.cli.options", "fba.cli.commands.info"],
+    ["fba.cli.main", "click", "inspect", "fba.cli._sigint", "fba.cli.options", "fba.cli.commands.info"],
 )
 def test_ctrl_c_while_the_program_is_imported_leaves_no_traceback(module: str) -> None:
     code, out, err = ran(IMPORTING.format(module=module, handler="default_int_handler"))

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from fba.cli import options
-from fba.cli._compile_notice import MANY, Notice
+from fba.cli.main import COMPILED_FUNCTIONS, CompileNotice
 from fba.compiled import is_compiled
 
 Run = Callable[..., Any]
@@ -34,8 +34,8 @@ def on_terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
 
 def test_compiling_is_said_once_and_only_where_it_takes_long(capsys: pytest.CaptureFixture[str]) -> None:
-    notice = Notice("render")
-    for _ in range(MANY - 1):
+    notice = CompileNotice("render")
+    for _ in range(COMPILED_FUNCTIONS - 1):
         notice()
     assert capsys.readouterr().err == ""
     for _ in range(50):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.body.gait._limb import ELBOW, KNEE, Limb
-from fba.body.gait._rotations import Float
 from fba.body.skeleton import ROOT, Skeleton
 from fba.body.solve.conventions import convention
 from fba.errors import ModelError
@@ -32,13 +32,13 @@ class Side:
 
     letter: str
     way: float
-    hip: Float
+    hip: Float64
     leg: Limb
-    ankle: Float
-    subtalar: Float
-    heel: Float
-    toe: Float
-    tip: Float
+    ankle: Float64
+    subtalar: Float64
+    heel: Float64
+    toe: Float64
+    tip: Float64
     arm: Limb
 
 
@@ -50,7 +50,7 @@ class Anatomy:
     skeleton: Skeleton
     sides: dict[str, Side]
     scale: float
-    pelvis: Float
+    pelvis: Float64
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> Anatomy:
@@ -108,7 +108,7 @@ class Writer:
         """Column of the root's translation along z."""
         return int(self._rules.translation[2])
 
-    def turn(self, joint: str, axis: int, radians: Float | float) -> None:
+    def turn(self, joint: str, axis: int, radians: Float64 | float) -> None:
         """Set a joint's angle about x, y or z of the body's frame; KeyError where it has no such freedom."""
         rules = self._rules
         row = rules.joints.index(joint)
@@ -120,7 +120,7 @@ class Writer:
                 return
         raise KeyError(f"{joint} does not turn about {'xyz'[axis]}")
 
-    def move(self, metres: Float) -> None:
+    def move(self, metres: Float64) -> None:
         """Set the root's translation, (T, 3) from the default posture; rounded to whole mm."""
         for axis in range(3):
             column = self._rules.translation[axis]

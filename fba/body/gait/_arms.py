@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.body.gait._anatomy import Side, Writer
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import periodic
 from fba.body.gait._plan import KNOTS, Plan
-from fba.body.gait._rotations import Float, limb_angles
+from fba.body.gait._rotations import limb_angles
 from fba.body.solve.solver import BapSolver
 
 _LATE = 0.02
@@ -17,18 +18,18 @@ _REACH = 0.995
 """Share of its length to which an arm stretches."""
 
 
-def goals(side: Side, character: Character, size: float) -> Float:
+def goals(side: Side, character: Character, size: float) -> Float64:
     """(8, 3), metres from the shoulder to the palm at the eight poses of a cycle of the leg on this side."""
     out, down, forward = (np.array(character.curve(field)) for field in ("out", "down", "forward"))
     swing = forward - forward.mean()
     forward = forward.mean() + swing * np.clip(size, 0.0, 1.4)
     goal = np.stack([side.way * out, -down, forward], axis=-1) * side.arm.reach
     length = np.linalg.norm(goal, axis=-1, keepdims=True)
-    result: Float = goal * np.minimum(1.0, _REACH * side.arm.reach / length)
+    result: Float64 = goal * np.minimum(1.0, _REACH * side.arm.reach / length)
     return result
 
 
-def swing(writer: Writer, plan: Plan, phase: Float) -> None:
+def swing(writer: Writer, plan: Plan, phase: Float64) -> None:
     """Write the angles of shoulders and elbows; the spine stands in writer.values already.
 
     At the poses the palms are at their goals; in between, angles are interpolated.

@@ -7,15 +7,16 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-Float = npt.NDArray[np.float64]
+from fba.arrays import Float64
+
 Interpolation = Literal["linear", "smooth"]
 """"linear" as in the digest, or cubic."""
 
 
-def smoothstep(value: npt.ArrayLike) -> Float:
+def smoothstep(value: npt.ArrayLike) -> Float64:
     """From 0 to 1 over 0..1, level at both ends."""
     x = np.clip(np.asarray(value, dtype=np.float64), 0.0, 1.0)
-    result: Float = x * x * (3.0 - 2.0 * x)
+    result: Float64 = x * x * (3.0 - 2.0 * x)
     return result
 
 
@@ -26,7 +27,7 @@ def checked(interpolation: Interpolation) -> Interpolation:
     return interpolation
 
 
-def cosine(knots: npt.ArrayLike, phase: Float, interpolation: Interpolation) -> Float:
+def cosine(knots: npt.ArrayLike, phase: Float64, interpolation: Interpolation) -> Float64:
     """A wave that is 1 at phase 0."""
     if interpolation == "smooth":
         return np.cos(2.0 * np.pi * phase)
@@ -35,7 +36,7 @@ def cosine(knots: npt.ArrayLike, phase: Float, interpolation: Interpolation) -> 
 
 def periodic(
     knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike, interpolation: Interpolation = "smooth"
-) -> Float:
+) -> Float64:
     """A periodic curve that rises and falls only where its values do: flat where two neighbours are equal.
 
     knots: increasing phases in 0..1, values: one each. Cubic pieces, tangents by Fritsch and Butland (1984).
@@ -50,14 +51,16 @@ def periodic(
     one, two = step_before + 2.0 * step, 2.0 * step_before + step
     turns = before * slope <= 0.0
     safe = [np.where(turns, 1.0, s) for s in (before, slope)]
-    tangent: Float = np.where(turns, np.zeros(len(x)), (one + two) / (two / safe[0] + one / safe[1]))
+    tangent: Float64 = np.where(turns, np.zeros(len(x)), (one + two) / (two / safe[0] + one / safe[1]))
     u = np.mod(u - x[0], 1.0) + x[0]
     at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)
     after = (at + 1) % len(x)
     return _hermite((u - x[at]) / step[at], step[at], y[at], y[after], tangent[at], tangent[after])
 
 
-def spline(knots: npt.ArrayLike, values: Float, first: Float, last: Float, phase: npt.ArrayLike) -> Float:
+def spline(
+    knots: npt.ArrayLike, values: Float64, first: Float64, last: Float64, phase: npt.ArrayLike
+) -> Float64:
     """The cubic spline through values (K, ...) at knots (K,) that leaves and arrives with given slopes."""
     x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
     count, h = len(x), np.diff(x)
@@ -76,7 +79,7 @@ def spline(knots: npt.ArrayLike, values: Float, first: Float, last: Float, phase
     return _hermite(((u - x[at]) / h[at])[tail], h[at][tail], y[at], y[at + 1], tangent[at], tangent[at + 1])
 
 
-def _hermite(s: Float, step: Float, y0: Float, y1: Float, d0: Float, d1: Float) -> Float:
+def _hermite(s: Float64, step: Float64, y0: Float64, y1: Float64, d0: Float64, d1: Float64) -> Float64:
     t = 1.0 - s
-    result: Float = t * t * ((1 + 2 * s) * y0 + s * step * d0) + s * s * ((1 + 2 * t) * y1 - t * step * d1)
+    result: Float64 = t * t * ((1 + 2 * s) * y0 + s * step * d0) + s * s * ((1 + 2 * t) * y1 - t * step * d1)
     return result

@@ -14,9 +14,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Bool
 from fba.body.gait._anatomy import Anatomy
 from fba.body.gait._characters import POSES
 from fba.body.gait._signals import SHORTEST_SWING, STEP_SECONDS, Curves
@@ -98,7 +98,7 @@ class Gait:
         return tuple(sorted({frame for step in self.steps for frame in (*step.poses, step.end)}))
 
     @property
-    def walking(self) -> npt.NDArray[np.bool_]:
+    def walking(self) -> Bool:
         """(T,), which frames belong to a step."""
         result = np.zeros(self.frames, dtype=bool)
         for step in self.steps:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fba.body.gait._rotations import Float, about, turned
+from fba.arrays import Float64
+from fba.body.gait._rotations import about, turned
 
 KNEE, ELBOW = 1.0, -1.0
 """Which way a hinge bends: about +x a knee (backward), about -x an elbow (forward)."""
@@ -17,8 +18,8 @@ KNEE, ELBOW = 1.0, -1.0
 class Limb:
     """Upper and lower: float64 (3,), the bones in the default posture, metres. way: `KNEE` or `ELBOW`."""
 
-    upper: Float
-    lower: Float
+    upper: Float64
+    lower: Float64
     way: float
 
     def _hinge(self) -> tuple[float, float, float]:
@@ -34,22 +35,22 @@ class Limb:
         constant, m, _ = self._hinge()
         return float(np.sqrt(constant + 2.0 * m))
 
-    def length(self, bend: npt.ArrayLike) -> Float:
+    def length(self, bend: npt.ArrayLike) -> Float64:
         """Metres from end to end at a bend, radians (the rotation about x, times `way`)."""
         constant, m, straight = self._hinge()
-        result: Float = np.sqrt(
+        result: Float64 = np.sqrt(
             constant + 2.0 * m * np.cos(self.way * np.asarray(bend, dtype=np.float64) - straight)
         )
         return result
 
-    def bend(self, length: npt.ArrayLike) -> Float:
+    def bend(self, length: npt.ArrayLike) -> Float64:
         """The bend at which the ends are that far apart; where they cannot be, the closest."""
         constant, m, straight = self._hinge()
         cosine = (np.square(np.asarray(length, dtype=np.float64)) - constant) / (2.0 * m)
-        result: Float = self.way * straight + np.arccos(np.clip(cosine, -1.0, 1.0))
+        result: Float64 = self.way * straight + np.arccos(np.clip(cosine, -1.0, 1.0))
         return result
 
-    def solve(self, target: Float, twist: npt.ArrayLike) -> tuple[Float, Float]:
+    def solve(self, target: Float64, twist: npt.ArrayLike) -> tuple[Float64, Float64]:
         """Rotations (..., 3, 3) of the upper bone and bends (...) that take the end to target (..., 3).
 
         target: from the limb's root, in the frame of its parent. twist: about the upper bone's own length,

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Bool, Float64
 from fba.body.gait._anatomy import Anatomy
-from fba.body.gait._rotations import Float
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import convention
 from fba.body.solve.solver import BapSolver
@@ -23,12 +22,12 @@ class Soles:
     """Points of the feet in every frame. Float64 (2, 3, T, 3), metres: left and right; heel, ball of the
     foot, tip of the toes."""
 
-    points: Float
+    points: Float64
 
     @property
-    def touching(self) -> npt.NDArray[np.bool_]:
+    def touching(self) -> Bool:
         """(2, 3, T), whether a point is on the ground."""
-        result: npt.NDArray[np.bool_] = self.points[..., 1] <= ON_GROUND
+        result: Bool = self.points[..., 1] <= ON_GROUND
         return result
 
     @property
@@ -68,7 +67,7 @@ def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "i
     return sole_points(anatomy, BapSolver(skeleton, axes).pose(animation.body.values))
 
 
-def sole_points(anatomy: Anatomy, matrices: Float) -> Soles:
+def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
     """The feet in poses (T, J, 4, 4)."""
     points = np.zeros((2, 3, len(matrices), 3))
     for number, letter in enumerate("lr"):

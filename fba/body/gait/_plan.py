@@ -9,12 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.body.gait import _ground as ground
 from fba.body.gait._anatomy import Anatomy, Side
 from fba.body.gait._characters import CYCLE, PHASES, Character
 from fba.body.gait._curves import Interpolation, cosine, periodic, smoothstep, spline
 from fba.body.gait._ground import TOE_OFF, Footing, Leg
-from fba.body.gait._rotations import Float, about, limb_angles
+from fba.body.gait._rotations import about, limb_angles
 from fba.errors import ModelError
 
 KNOTS = np.array([*PHASES, *(phase + 0.5 for phase in PHASES)])
@@ -69,7 +70,7 @@ class Plan:
         if self._held_down() > _STRAIN * anatomy.sides["r"].leg.reach:
             raise self._too_long()
 
-    def pitch(self, phase: Float) -> Float:
+    def pitch(self, phase: Float64) -> Float64:
         """Of a foot at a phase of its own leg."""
         phase = np.mod(phase, 1.0)
         flat = self._foot_values[1]
@@ -77,21 +78,21 @@ class Plan:
         later = periodic(self._foot_knots, self._foot_values, phase, self.interpolation)
         return np.where(phase < FLAT, landing, later)
 
-    def knee(self, phase: Float) -> Float:
+    def knee(self, phase: Float64) -> Float64:
         """Bend that the poses ask for, at a phase of the leg's own."""
         return periodic(KNOTS, self._knee, phase, self.interpolation)
 
-    def toes(self, phase: Float) -> Float:
+    def toes(self, phase: Float64) -> Float64:
         """Bend of the toes against the foot, up, radians: they lie flat until they leave the ground."""
         phase = np.mod(phase, 1.0)
         flat = np.maximum(-self.pitch(np.minimum(phase, TOE_OFF)), 0.0)
         return np.where(phase < 0.9, flat * (1.0 - smoothstep((phase - TOE_OFF) / 0.15)), 0.0)
 
-    def lean(self, phase: Float) -> Float:
+    def lean(self, phase: Float64) -> Float64:
         """(T, 3, 3) rotation of the root."""
         return about(0, np.full(phase.shape, np.radians(self.character.pelvis.tilt)))
 
-    def pelvis_angles(self, phase: Float) -> tuple[Float, Float]:
+    def pelvis_angles(self, phase: Float64) -> tuple[Float64, Float64]:
         """Torsion about y and roll about z of the pelvis, against the root."""
         pelvis = self.character.pelvis
         turn = np.radians(pelvis.turn) * np.clip(self.size, 0.0, 1.5)
@@ -99,14 +100,14 @@ class Plan:
         hangs = cosine(KNOTS, phase - 0.25, self.interpolation)
         return turn * ahead, -np.radians(pelvis.list) * hangs
 
-    def pelvis(self, phase: Float) -> Float:
+    def pelvis(self, phase: Float64) -> Float64:
         turn, roll = self.pelvis_angles(phase)
         return about(1, turn) @ about(2, roll)
 
-    def side_phase(self, side: Side, phase: Float) -> Float:
+    def side_phase(self, side: Side, phase: Float64) -> Float64:
         return phase if side.letter == "r" else phase - 0.5
 
-    def place(self, side: Side, phase: Float) -> Float:
+    def place(self, side: Side, phase: Float64) -> Float64:
         """(T, 3), footprint of the foot that stands, or stood last, at a phase of the cycle."""
         own = self.side_phase(side, phase)
         result = np.zeros((*phase.shape, 3))
@@ -114,12 +115,12 @@ class Plan:
         result[..., 2] = self.stride * (np.floor(own + 1e-9) + (0.0 if side.letter == "r" else 0.5))
         return result
 
-    def footing(self, side: Side, phase: Float) -> Footing:
+    def footing(self, side: Side, phase: Float64) -> Footing:
         """The foot as it stands; meaningless while it swings."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
         return ground.standing(side, self.place(side, phase), self.pitch(own), side.way * self._yaw)
 
-    def _along(self, phase: Float) -> Float:
+    def _along(self, phase: Float64) -> Float64:
         """(T, 3), the root's place over the ground, its height still 0."""
         pelvis, scale = self.character.pelvis, self.anatomy.scale
         result = np.zeros((*phase.shape, 3))
@@ -128,10 +129,10 @@ class Plan:
         result[..., 2] = self.stride * (phase + pelvis.surge / (4.0 * np.pi) * wave)
         return result
 
-    def hip(self, side: Side, root: Float, phase: Float) -> Float:
+    def hip(self, side: Side, root: Float64, phase: Float64) -> Float64:
         return ground.hip_place(side, self.anatomy.pelvis, root, self.lean(phase), self.pelvis(phase))
 
-    def _root_height(self, side: Side, root: Float, phase: Float, bend: Float | None = None) -> Float:
+    def _root_height(self, side: Side, root: Float64, phase: Float64, bend: Float64 | None = None) -> Float64:
         """Height of the root at which a standing leg has the bend its poses ask for (or the one given)."""
         own = self.side_phase(side, phase)
         hip = self.hip(side, root, phase)
@@ -173,13 +174,13 @@ class Plan:
             f"to its next, and {self.character.stride * self.anatomy.scale:.2f} m of this character's own"
         )
 
-    def root(self, phase: Float) -> Float:
+    def root(self, phase: Float64) -> Float64:
         """(T, 3), place of the root: as high as the standing leg is long, over the standing foot."""
         root, wanted, limit = self._heights(phase)
         root[..., 1] = np.minimum(wanted, limit)
         return root
 
-    def _heights(self, phase: Float) -> tuple[Float, Float, Float]:
+    def _heights(self, phase: Float64) -> tuple[Float64, Float64, Float64]:
         """The root over the ground (T, 3), the height that its poses give it, and the most its legs allow."""
         root = self._along(phase) - (0.0, 0.0, self._ahead)
         share = smoothstep(np.mod(phase, 0.5) / _DOUBLE)
@@ -200,7 +201,7 @@ class Plan:
         _, wanted, limit = self._heights(np.arange(2 * CYCLE) / (2 * CYCLE))
         return float((wanted - limit).max())
 
-    def standing_leg(self, side: Side, phase: Float, root: Float | None = None) -> Leg:
+    def standing_leg(self, side: Side, phase: Float64, root: Float64 | None = None) -> Leg:
         """The leg while its foot is on the ground."""
         root = self.root(phase) if root is None else root
         footing = self.footing(side, phase)
@@ -216,11 +217,11 @@ class Plan:
         return float(leg.ankle()[2][0])
 
     @cached_property
-    def _swings(self) -> dict[str, tuple[Float, Float, Float, Float]]:
+    def _swings(self) -> dict[str, tuple[Float64, Float64, Float64, Float64]]:
         """For each side: knots, values and end slopes of thigh (x, z), in the world, and knee."""
         return {letter: self._swing(side) for letter, side in self.anatomy.sides.items()}
 
-    def _swing(self, side: Side) -> tuple[Float, Float, Float, Float]:
+    def _swing(self, side: Side) -> tuple[Float64, Float64, Float64, Float64]:
         start = 0.0 if side.letter == "r" else 0.5
         ends = start + np.array([TOE_OFF - _TINY, TOE_OFF, 1.0, 1.0 + _TINY])
         leg = self.standing_leg(side, ends)
@@ -249,7 +250,7 @@ class Plan:
         start = np.array([0.0 if side.letter == "r" else 0.5])
         return float(-np.degrees(limb_angles(plan.standing_leg(side, start).thigh)[0][0]))
 
-    def leg(self, side: Side, phase: Float, root: Float) -> Leg:
+    def leg(self, side: Side, phase: Float64, root: Float64) -> Leg:
         """The leg at any phase, standing or swinging, under a root that is where it is (T, 3)."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
         stands = own <= TOE_OFF

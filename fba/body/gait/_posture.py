@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.body.gait._anatomy import Writer
 from fba.body.gait._curves import cosine
 from fba.body.gait._plan import KNOTS, Plan
-from fba.body.gait._rotations import Float
 from fba.body.skeleton import Skeleton
 
 LUMBAR = tuple(f"vl{n}" for n in (5, 4, 3, 2, 1))
@@ -19,14 +19,14 @@ _MORE_CURL = {"index": 0.75, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
 """A hand at rest closes towards the little finger."""
 
 
-def spread(writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: int, angle: Float) -> None:
+def spread(writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: int, angle: Float64) -> None:
     """Turn a part of the spine by an angle, radians, shared evenly by those of its joints that there are."""
     there = [joint for joint in joints if joint in skeleton]
     for joint in there:
         writer.turn(joint, axis, angle / len(there))
 
 
-def hold(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float) -> None:
+def hold(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64) -> None:
     """Write the posture at phases of the cycle, from the contact of the right foot on.
 
     The shoulders turn against the pelvis; the neck turns back, so that the face looks ahead.

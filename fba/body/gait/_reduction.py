@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack
+from fba.arrays import Float64, Int32
 from fba.body.gait._curves import Interpolation
 from fba.body.gait._detection import Gait, detect
 from fba.body.skeleton import Skeleton
@@ -119,13 +119,13 @@ def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) 
     )  # fmt: skip
 
 
-def _values(animation: Animation) -> npt.NDArray[np.int32]:
+def _values(animation: Animation) -> Int32:
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     return animation.body.values
 
 
-def _unwound(values: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
+def _unwound(values: Int32) -> Float64:
     """Angles that follow each other without a whole turn between."""
     result = values.astype(np.float64)
     angles = [bap.number - 1 for bap in baps() if bap.unit == "1e-5 rad"]
@@ -133,7 +133,7 @@ def _unwound(values: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
     return result
 
 
-def _own(matrices: npt.NDArray[np.float64], skeleton: Skeleton) -> npt.NDArray[np.float64]:
+def _own(matrices: Float64, skeleton: Skeleton) -> Float64:
     """(T, J, 3, 3), each joint's rotation in its parent."""
     turns = matrices[:, :, :3, :3]
     result = turns.copy()
@@ -141,8 +141,8 @@ def _own(matrices: npt.NDArray[np.float64], skeleton: Skeleton) -> npt.NDArray[n
     return result
 
 
-def _angles(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _angles(a: Float64, b: Float64) -> Float64:
     """Radians between rotations; by the chord, which keeps its accuracy near 0."""
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
-    result: npt.NDArray[np.float64] = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
+    result: Float64 = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
     return result

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Float = npt.NDArray[np.float64]
+from fba.arrays import Float64
 
 
-def about(axis: int, angle: npt.ArrayLike) -> Float:
+def about(axis: int, angle: npt.ArrayLike) -> Float64:
     """Rotations about x, y or z (axis 0, 1, 2): float64 (..., 3, 3) for angles (...)."""
     angle = np.asarray(angle, dtype=np.float64)
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -20,19 +20,19 @@ def about(axis: int, angle: npt.ArrayLike) -> Float:
     return result
 
 
-def turned(rotation: Float, vector: Float) -> Float:
+def turned(rotation: Float64, vector: Float64) -> Float64:
     """Vectors (..., 3) under rotations (..., 3, 3)."""
-    result: Float = np.einsum("...ij,...j->...i", rotation, vector)
+    result: Float64 = np.einsum("...ij,...j->...i", rotation, vector)
     return result
 
 
-def turned_back(rotation: Float, vector: Float) -> Float:
+def turned_back(rotation: Float64, vector: Float64) -> Float64:
     """Vectors (..., 3) under the inverse of rotations (..., 3, 3)."""
-    result: Float = np.einsum("...ji,...j->...i", rotation, vector)
+    result: Float64 = np.einsum("...ji,...j->...i", rotation, vector)
     return result
 
 
-def limb_angles(rotation: Float) -> tuple[Float, Float, Float]:
+def limb_angles(rotation: Float64) -> tuple[Float64, Float64, Float64]:
     """Angles x, y, z of Rx . Rz . Ry, the order of a limb's joint: flexion outermost, twisting innermost."""
     z = np.arcsin(np.clip(-rotation[..., 0, 1], -1.0, 1.0))
     x = np.arctan2(rotation[..., 2, 1], rotation[..., 1, 1])
@@ -40,7 +40,7 @@ def limb_angles(rotation: Float) -> tuple[Float, Float, Float]:
     return x, y, z
 
 
-def foot_angles(rotation: Float) -> tuple[Float, Float, Float]:
+def foot_angles(rotation: Float64) -> tuple[Float64, Float64, Float64]:
     """Angles x, y, z of Rx . Ry . Rz: the ankle's flexion and twisting, then the subtalar joint's roll."""
     y = np.arcsin(np.clip(rotation[..., 0, 2], -1.0, 1.0))
     x = np.arctan2(-rotation[..., 1, 2], rotation[..., 2, 2])

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.body.gait._anatomy import Anatomy
 from fba.body.gait._measure import sole_points
-from fba.body.gait._rotations import Float
 
 STEP_SECONDS = (0.2, 1.8)
 """Shortest and longest time from the contact of one foot to that of the other."""
@@ -33,18 +33,18 @@ class Curves:
     (T,), radians; heel in the world (T, 3), height of the foot's lowest point (T,).
     heading: (T,), radians about y. reach: metres, of a leg."""
 
-    times: Float
-    heel: dict[str, Float]
-    toes: dict[str, Float]
-    knee: dict[str, Float]
-    thigh: dict[str, Float]
-    place: dict[str, Float]
-    lowest: dict[str, Float]
-    heading: Float
+    times: Float64
+    heel: dict[str, Float64]
+    toes: dict[str, Float64]
+    knee: dict[str, Float64]
+    thigh: dict[str, Float64]
+    place: dict[str, Float64]
+    lowest: dict[str, Float64]
+    heading: Float64
     reach: float
 
     @classmethod
-    def of(cls, anatomy: Anatomy, matrices: Float, times: Float) -> Curves:
+    def of(cls, anatomy: Anatomy, matrices: Float64, times: Float64) -> Curves:
         number = anatomy.skeleton.number
         rate = (len(times) - 1) / max(float(times[-1] - times[0]), 1e-9)
         pelvis = matrices[:, number("sacroiliac")]
@@ -58,7 +58,7 @@ class Curves:
                 matrices[:, number(f"{letter}_{j}"), :3, 3] for j in ("hip", "knee", "ankle")
             )
 
-            def ahead(point: Float) -> Float:
+            def ahead(point: Float64) -> Float64:
                 return _smoothed(np.sum((point - pelvis[:, :3, 3]) * facing, axis=1), SMOOTH * rate)
 
             upper, lower = knee_at - hip, ankle - knee_at
@@ -100,7 +100,7 @@ class Curves:
         """At least one."""
         return max(1, round(seconds / max(float(np.median(np.diff(self.times))), 1e-9)))
 
-    def _peaks(self, curve: Float) -> list[int]:
+    def _peaks(self, curve: Float64) -> list[int]:
         """Maxima that stand out; also of a curve that begins or ends at one, as loops do."""
         from scipy.signal import find_peaks
 
@@ -112,11 +112,11 @@ class Curves:
         return [int(frame) - 1 for frame in found]
 
 
-def _smoothed(curve: Float, width: float) -> Float:
+def _smoothed(curve: Float64, width: float) -> Float64:
     """A Gaussian of that many frames; the ends go on as they are."""
     if width < 0.3:
         return curve.copy()
     from scipy.ndimage import gaussian_filter1d
 
-    result: Float = gaussian_filter1d(curve, width, axis=0, mode="nearest")
+    result: Float64 = gaussian_filter1d(curve, width, axis=0, mode="nearest")
     return result

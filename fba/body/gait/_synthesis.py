@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation, BodyTrack
+from fba.arrays import Float64
 from fba.body.gait import _arms as arms
 from fba.body.gait import _ground as ground
 from fba.body.gait import _posture as posture
@@ -14,7 +15,6 @@ from fba.body.gait._anatomy import Anatomy, Writer
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import Interpolation, checked
 from fba.body.gait._plan import SHORTEST, Plan
-from fba.body.gait._rotations import Float
 from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
 
@@ -107,7 +107,7 @@ def cycle(plan: Plan, period: int) -> Writer:
     return writer
 
 
-def _write_leg(writer: Writer, letter: str, pelvis: Float, leg: ground.Leg) -> None:
+def _write_leg(writer: Writer, letter: str, pelvis: Float64, leg: ground.Leg) -> None:
     for axis, angle in enumerate(ground.hip_angles(pelvis, leg.thigh)):
         writer.turn(f"{letter}_hip", axis, angle)
     writer.turn(f"{letter}_knee", 0, leg.bend)

@@ -16,8 +16,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int64
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest
@@ -29,9 +29,6 @@ from fba.mesh.meshes import vertex_normals
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons, triangulate
 from fba.mesh.text_files import whole
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 METRES = 0.1
 """Metres per unit of the base mesh."""
@@ -237,7 +234,7 @@ def _neckline() -> tuple[int, ...]:
         return tuple(int(row["vertex"]) for row in csv.DictReader(file))
 
 
-def _above(triangles: Int64, vertices: Float64) -> npt.NDArray[np.bool_]:
+def _above(triangles: Int64, vertices: Float64) -> Bool:
     """(F,) triangles above the neckline, where heads made of this mesh end too, so that both meet."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -248,7 +245,7 @@ def _above(triangles: Int64, vertices: Float64) -> npt.NDArray[np.bool_]:
     _, label = connected_components(coo_array(links, shape=(len(vertices),) * 2), directed=False)
     used = np.unique(triangles)
     crown = used[vertices[used, 1].argmax()]
-    above: npt.NDArray[np.bool_] = (label[triangles] == label[crown]).any(axis=1)
+    above: Bool = (label[triangles] == label[crown]).any(axis=1)
     return above
 
 

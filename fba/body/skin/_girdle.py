@@ -12,14 +12,10 @@ a bag below a raised arm. It is stretched there, so matrices, which take the str
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin._girdle_loops import Girdle
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 CHAIN = ("sternoclavicular", "acromioclavicular", "shoulder", "elbow")
 TAUT = 0.7

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import Float32, Float64, Int64
 from fba.body.skin._girdle_loops import Girdle, lift
 from fba.body.skin.loops import Twisting, joint_duals, twist
 from fba.compiled import compiled
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 
 @compiled

@@ -6,17 +6,10 @@ between thumb and hand: there neighbours are turned otherwise. Four of them tell
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Float32, Float64, Int32, Int64, Integer
 from fba.cache import kept, key_of
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
 
 FLATTEST = 0.05
 """Sine between both ways across, below which they say nothing about the surface."""
@@ -26,9 +19,7 @@ MAKING = 1
 """Counts up with every change of what is found: what was kept before is then made anew."""
 
 
-def rings(
-    vertices: Float32, normals: Float32, triangles: npt.NDArray[np.integer[Any]]
-) -> tuple[Int32, Float32]:
+def rings(vertices: Float32, normals: Float32, triangles: Integer) -> tuple[Int32, Float32]:
     """Four neighbours of each vertex, (V, 4), -1 where they are of no use, and numbers (V, 3).
 
     With t = v[0] - v[2] and u = v[1] - v[3] of the neighbours, x t + y u + z (t x u) is the normal of the
@@ -38,7 +29,7 @@ def rings(
     if count < LARGE or not len(triangles):
         return _rings(vertices, normals, triangles)
 
-    def make() -> list[npt.NDArray[Any]]:
+    def make() -> list[Array]:
         return list(_rings(vertices, normals, triangles))
 
     key = key_of("rings", MAKING, vertices, normals, triangles)
@@ -48,9 +39,7 @@ def rings(
     return around, numbers
 
 
-def _rings(
-    vertices: Float32, normals: Float32, triangles: npt.NDArray[np.integer[Any]]
-) -> tuple[Int32, Float32]:
+def _rings(vertices: Float32, normals: Float32, triangles: Integer) -> tuple[Int32, Float32]:
     count = len(vertices)
     around = np.full((count, 4), -1, dtype=np.int32)
     numbers = np.zeros((count, 3), dtype=np.float32)

@@ -8,14 +8,10 @@ is therefore turned about its bone, before the joints carry it, by what it lacks
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin.loops import Twisting
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 LIMB = ("shoulder", "elbow", "wrist")
 WRIST_FROM = 0.35

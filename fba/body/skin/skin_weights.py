@@ -7,11 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 INFLUENCES = 4
 """Joints that carry a vertex, at most."""
@@ -71,7 +68,7 @@ def strongest(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int3
     return order[:, :INFLUENCES].astype(np.int32), share.astype(np.float32)
 
 
-def _thinned(dense: Float64, alike: npt.NDArray[np.bool_]) -> Float64:
+def _thinned(dense: Float64, alike: Bool) -> Float64:
     """The same weights with fewer of those that move alike, in all no more than there is room for."""
     dense = np.maximum(dense - LEAST, 0.0)
     dense /= np.maximum(dense.sum(axis=1, keepdims=True), 1e-12)

@@ -8,15 +8,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32, Intp
 from fba.body.skeleton import Skeleton
 from fba.body.skin._girdle import chosen_girdle, girdle
 from fba.body.skin._moving_normals import rings
 from fba.body.skin._twisting import chosen_twists, twists
 from fba.mesh.meshes import result_array
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 METHODS = ("dual", "linear")
 """Ways to blend the motion of several joints."""
@@ -133,7 +130,7 @@ class Skinner:
                 )
         return self._run(vertices, upright, matrices, out, normals, method)
 
-    def chosen(self, rows: npt.NDArray[np.intp]) -> Skinner:
+    def chosen(self, rows: Intp) -> Skinner:
         """A skinner of some vertices, rows (N,), each once. Their normals follow the surface where all the
         neighbours that they are taken from are among them (`with_neighbours`), else they only turn."""
         some = Skinner.__new__(Skinner)
@@ -152,7 +149,7 @@ class Skinner:
         some._lock = threading.Lock()
         return some
 
-    def with_neighbours(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    def with_neighbours(self, rows: Intp) -> Intp:
         """(N,) the rows and those that their normals are taken from, rising."""
         around = self._around[rows]
         return np.union1d(rows, np.where(around < 0, rows[:, None], around))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float64, Int32, Int64
 from fba.parameters import baps
 
 HALF_TURN = 314159
 """pi in 1e-5 rad."""
 
 
-def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> npt.NDArray[np.int32]:
+def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> Int32:
     """int32 (T, 296): the same poses with every angle within +-pi, kept continuous where possible.
 
     A column of angles that leaves +-limit (1e-5 rad) is first moved as a whole by full turns; only if
@@ -39,8 +40,8 @@ def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> npt.NDArray[np.int
     return result
 
 
-def _turns(angle: float | npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+def _turns(angle: float | Float64) -> Int64:
     """Whole turns in an angle, in 1e-5 rad."""
     full = 2e5 * np.pi
-    turns: npt.NDArray[np.int64] = np.rint(np.rint(np.asarray(angle) / full) * full).astype(np.int64)
+    turns: Int64 = np.rint(np.rint(np.asarray(angle) / full) * full).astype(np.int64)
     return turns

@@ -7,12 +7,10 @@ there against the default posture: arms at the sides, palms to the thighs, feet 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.parameters import joints
-
-Float64 = npt.NDArray[np.float64]
 
 FINGERS = ("index", "middle", "ring", "pinky")
 

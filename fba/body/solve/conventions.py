@@ -15,8 +15,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Int64
 from fba.parameters import baps
 
 NO_BAP = -1
@@ -37,11 +37,11 @@ class Convention:
     name: str
     about: str
     joints: tuple[str, ...]
-    bap: npt.NDArray[np.int64]
-    axis: npt.NDArray[np.int64]
-    sign: npt.NDArray[np.float64]
-    translation: npt.NDArray[np.int64]
-    translation_sign: npt.NDArray[np.float64]
+    bap: Int64
+    axis: Int64
+    sign: Float64
+    translation: Int64
+    translation_sign: Float64
 
     def freedoms(self, joint: str) -> tuple[int, ...]:
         """0-based BAP columns of a joint's rotations, outermost first; empty where it has none."""

@@ -16,6 +16,7 @@ from importlib.resources import files
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float64, Int32
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_numbers, baps
 
 DEGREES = np.degrees(1e-5)
@@ -86,7 +87,7 @@ class Limits:
                 found.append(Excess(limit, int(out.sum()), int(np.argmax(out)), worst))
         return tuple(found)
 
-    def clamp(self, values: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    def clamp(self, values: npt.ArrayLike) -> Int32:
         """The same BAPs within the limits, int32. Where several share a limit, all shrink by one factor.
 
         What keeps within a limit is left as it is. ValueError as `check`.
@@ -109,7 +110,7 @@ class Limits:
 
 
 @cache
-def widest() -> npt.NDArray[np.float64]:
+def widest() -> Float64:
     """float64 (296, 2), degrees: what the human limits or the standard's ranges allow to each BAP alone.
 
     Body turn, roll and tilt, which a person has no limits for, have half a turn either way (roll a quarter).
@@ -125,7 +126,7 @@ def widest() -> npt.NDArray[np.float64]:
     return result
 
 
-def _frames(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def _frames(values: npt.ArrayLike) -> Float64:
     array = np.atleast_2d(np.asarray(values, dtype=np.float64))
     if array.ndim != 2 or array.shape[1] not in (BAP_STANDARD_COUNT, BAP_COUNT):
         raise ValueError(f"Limits: needs BAPs of shape (T, {BAP_COUNT}), not {np.shape(values)}")
@@ -134,9 +135,7 @@ def _frames(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return array
 
 
-def _excess(
-    limit: Limit, array: npt.NDArray[np.float64]
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _excess(limit: Limit, array: Float64) -> tuple[Float64, Float64]:
     """Total (T,) in degrees, by whole turns as close to the range as can be, and what of it is too much."""
     total = array[:, list(limit.baps)].sum(axis=1) * DEGREES
     if len(limit.baps) == 1:

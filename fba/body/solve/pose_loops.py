@@ -8,13 +8,10 @@ joint's matrix is written where it is to stand, from its parent's, turned in pla
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Int32, Int64
 from fba.body.solve._fast_trig import sine_cosine
 from fba.compiled import compiled
-
-Float = npt.NDArray[np.float64]
-Int = npt.NDArray[np.int64]
 
 UNIT = 1e-5
 """Radians in one unit of a rotational BAP."""
@@ -23,17 +20,17 @@ MILLIMETRE = 1e-3
 
 @compiled
 def pose(
-    values: npt.NDArray[np.int32] | Float,
-    parents: Int,
-    offsets: Float,
-    turns: Int,
-    axes: Int,
-    radians: Float,
-    columns: Int,
-    counts: Int,
-    translation: Int,
-    metres: Float,
-    result: Float,
+    values: Int32 | Float64,
+    parents: Int64,
+    offsets: Float64,
+    turns: Int64,
+    axes: Int64,
+    radians: Float64,
+    columns: Int64,
+    counts: Int64,
+    translation: Int64,
+    metres: Float64,
+    result: Float64,
 ) -> None:
     """values int32 or float64 (T, 296) -> result float64 (T * J * 16,); every number of it is written.
 

@@ -7,6 +7,7 @@ from collections.abc import Collection
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.solve import pose_loops, solver_loops
 from fba.body.solve.conventions import NO_BAP, Convention, convention
@@ -53,9 +54,7 @@ class BapSolver:
         self._limits = np.zeros((count, 3, 2))
         self._limits[used] = ranges[self._columns]
 
-    def pose(
-        self, baps: npt.ArrayLike, out: npt.NDArray[np.float64] | None = None
-    ) -> npt.NDArray[np.float64]:
+    def pose(self, baps: npt.ArrayLike, out: Float64 | None = None) -> Float64:
         """Joint matrices of a pose: float64 (J, 4, 4) for baps (296,), (T, J, 4, 4) for (T, 296).
 
         186 columns do too. A matrix takes points of the default posture's frame, relative to the
@@ -99,7 +98,7 @@ class BapSolver:
         matrices: npt.ArrayLike,
         joints: Collection[str] | None = None,
         previous: npt.ArrayLike | None = None,
-    ) -> npt.NDArray[np.int32]:
+    ) -> Int32:
         """BAPs that reach these joint matrices: int32 (296,) for (J, 4, 4), (T, 296) for (T, J, 4, 4).
 
         Only the rotations count, and the root's translation. Where a joint lacks a freedom, it comes as
@@ -138,7 +137,7 @@ class BapSolver:
             raise ModelError("BapSolver.solve: the pose lies beyond what 32 bits of mm or 1e-5 rad can say")
         return values if array.ndim == 4 else values[0]
 
-    def _angles(self, baps: npt.ArrayLike | None) -> npt.NDArray[np.float64]:
+    def _angles(self, baps: npt.ArrayLike | None) -> Float64:
         angles = np.zeros(self._bap.shape)
         if baps is not None:
             values = np.asarray(baps, dtype=np.float64)

@@ -9,14 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int32, Int64
 from fba.body.solve._fast_trig import arc_tangent, sine_cosine
 from fba.body.solve.pose_loops import UNIT
 from fba.compiled import compiled, inlined
-
-Float = npt.NDArray[np.float64]
-Int = npt.NDArray[np.int64]
 
 NEAR_LOCK = 1e-5
 """Below this cosine of the middle angle, only sum or difference of the outer angles is determined."""
@@ -45,7 +42,7 @@ def _excess(angle: float, low: float, high: float) -> float:
 
 
 @inlined
-def _turn(m: Float, axis: int, sine: float, cosine: float) -> None:
+def _turn(m: Float64, axis: int, sine: float, cosine: float) -> None:
     """m := m . Rot(axis), in place."""
     first = axis + 1 if axis < 2 else 0
     second = axis - 1 if axis > 0 else 2
@@ -57,7 +54,7 @@ def _turn(m: Float, axis: int, sine: float, cosine: float) -> None:
 
 
 @inlined
-def _turn_rows(m: Float, axis: int, sine: float, cosine: float) -> None:
+def _turn_rows(m: Float64, axis: int, sine: float, cosine: float) -> None:
     """m := Rot(axis)^-1 . m, in place: takes an outermost turn off."""
     first = axis + 1 if axis < 2 else 0
     second = axis - 1 if axis > 0 else 2
@@ -69,7 +66,7 @@ def _turn_rows(m: Float, axis: int, sine: float, cosine: float) -> None:
 
 
 @inlined
-def _angle_about(m: Float, axis: int) -> float:
+def _angle_about(m: Float64, axis: int) -> float:
     """The turn about one axis that comes closest to the rotation m (largest trace of their quotient)."""
     a = axis + 1 if axis < 2 else 0
     b = axis - 1 if axis > 0 else 2
@@ -77,7 +74,7 @@ def _angle_about(m: Float, axis: int) -> float:
 
 
 @compiled
-def _closest_two(m: Float, f: int, a1: int, a2: int, start: Float, work: Float) -> None:
+def _closest_two(m: Float64, f: int, a1: int, a2: int, start: Float64, work: Float64) -> None:
     """Improves frame f of start (3, N): turns about two axes that come closest to rotations m (3, 3, N)."""
     x = float(start[0, f])
     y = float(start[1, f])
@@ -105,7 +102,9 @@ def _closest_two(m: Float, f: int, a1: int, a2: int, start: Float, work: Float) 
 
 
 @compiled
-def _locked(m: Float, f: int, a1: int, a2: int, a3: int, outer: float, middle: float, work: Float) -> float:
+def _locked(
+    m: Float64, f: int, a1: int, a2: int, a3: int, outer: float, middle: float, work: Float64
+) -> float:
     """The third turn where, at gimbal lock, the outer one is given."""
     for i in range(3):
         for k in range(3):
@@ -119,8 +118,8 @@ def _locked(m: Float, f: int, a1: int, a2: int, a3: int, outer: float, middle: f
 
 @compiled
 def _angles(
-    m: Float, frames: int, count: int, j: int, axis: Int, sign: Float, previous: Float, limits: Float,
-    bounded: bool, work: Float, cosines: Float, angles: Float,
+    m: Float64, frames: int, count: int, j: int, axis: Int64, sign: Float64, previous: Float64,
+    limits: Float64, bounded: bool, work: Float64, cosines: Float64, angles: Float64,
 ) -> None:  # fmt: skip
     """Angles (3, N), outermost first, whose turns give the rotations m (3, 3, N), frame after frame.
 
@@ -203,21 +202,21 @@ def _angles(
 
 @compiled
 def solve(
-    matrices: Float,
-    parents: Int,
-    centre: Float,
-    counts: Int,
-    bap: Int,
-    axis: Int,
-    sign: Float,
-    translation: Int,
-    metres: Float,
-    wanted: npt.NDArray[np.bool_],
-    previous: Float,
-    limits: Float,
+    matrices: Float64,
+    parents: Int64,
+    centre: Float64,
+    counts: Int64,
+    bap: Int64,
+    axis: Int64,
+    sign: Float64,
+    translation: Int64,
+    metres: Float64,
+    wanted: Bool,
+    previous: Float64,
+    limits: Float64,
     bounded: bool,
     largest: int,
-    values: npt.NDArray[np.int32],
+    values: Int32,
 ) -> bool:
     """matrices float64 (T, J, 4, 4) -> values int32 (T, 296), given filled with 0.
 
@@ -290,7 +289,7 @@ def solve(
     return True
 
 
-def joint_angles(local: Float, count: int, axis: Int, sign: Float, angles: Float) -> None:
+def joint_angles(local: Float64, count: int, axis: Int64, sign: Float64, angles: Float64) -> None:
     """local float64 (3, 3, T) -> angles (3, T), each frame close to the one before.
 
     count: number of freedoms, axis int64 (1, 3) and sign float64 (1, 3), see `Convention`.

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import Float64
 from fba.compiled import compiled
-
-Float = npt.NDArray[np.float64]
 
 
 @compiled
-def chain(own: Float, bonds: Float, pull: Float, course: Float) -> None:
+def chain(own: Float64, bonds: Float64, pull: Float64, course: Float64) -> None:
     """Fills course (T,): least sum of own[t] x[t]^2 + bonds[t] (x[t + 1] - x[t])^2 - 2 pull[t] x[t].
 
     own: (T,), positive; bonds: (T - 1,), not negative; pull: (T,). own and pull are overwritten. Thomas's

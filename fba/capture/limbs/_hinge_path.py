@@ -11,12 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.capture.limbs._coupled_paths import chain
 from fba.compiled import compiled, inlined
-
-Float = npt.NDArray[np.float64]
 
 STATES = 48
 """Lines of the grid: every 7.5 degrees."""
@@ -51,7 +49,9 @@ def _away(turn: float, usual: float) -> float:
     return difference - TURN * math.floor(difference / TURN + 0.5)
 
 
-def follow(sideways: Float, natural: Float, ease: Float, usual: float, period: float, path: Float) -> None:
+def follow(
+    sideways: Float64, natural: Float64, ease: Float64, usual: float, period: float, path: Float64
+) -> None:
     """Fills path, float64 (T,): turns in radians, without jumps of whole turns.
 
     sideways, natural: (T, 3), of the wanted direction: what is left sideways of the hinge, and how far it
@@ -65,7 +65,9 @@ def follow(sideways: Float, natural: Float, ease: Float, usual: float, period: f
 
 
 @compiled
-def _search(sideways: Float, natural: Float, ease: Float, usual: float, period: float, path: Float) -> None:
+def _search(
+    sideways: Float64, natural: Float64, ease: Float64, usual: float, period: float, path: Float64
+) -> None:
     """Fills the path with the best one over the grid: dynamic programming."""
     count = path.shape[0]
     step = TURN / STATES
@@ -110,7 +112,9 @@ def _search(sideways: Float, natural: Float, ease: Float, usual: float, period: 
 
 
 @compiled
-def _refine(sideways: Float, natural: Float, ease: Float, centre: float, period: float, path: Float) -> None:
+def _refine(
+    sideways: Float64, natural: Float64, ease: Float64, centre: float, period: float, path: Float64
+) -> None:
     """Improves the path: Newton's method, whose equations couple each frame with its neighbours only.
 
     centre: the usual turn, with the number of whole turns that brings it closest to the path.

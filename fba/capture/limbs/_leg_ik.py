@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
-
-Float = npt.NDArray[np.float64]
+from fba.arrays import Float64
 
 STIFF = 0.05
 """Metres of length a radian of the knee changes: below this, the leg counts as almost straight."""
@@ -25,20 +23,20 @@ ROUNDS = 3
 class Leg:
     """Places (T, 3) of hip, knee and ankle, and the axis (T, 3), unit, about which the knee turns."""
 
-    hip: Float
-    knee: Float
-    ankle: Float
-    axis: Float
+    hip: Float64
+    knee: Float64
+    ankle: Float64
+    axis: Float64
 
 
-def pliancy(leg: Leg) -> Float:
+def pliancy(leg: Leg) -> Float64:
     """(T,), 0 for a straight leg, close to 1 for a bent one: which share of a change of length it follows."""
     slope = _lengths(leg)[1]
-    result: Float = slope * slope / (slope * slope + STIFF * STIFF)
+    result: Float64 = slope * slope / (slope * slope + STIFF * STIFF)
     return result
 
 
-def reach(leg: Leg, move: Float) -> tuple[Float, Float]:
+def reach(leg: Leg, move: Float64) -> tuple[Float64, Float64]:
     """World turns (T, 3, 3) of the thigh, and of the shank, that move the ankle by move (T, 3), metres."""
     target = leg.ankle + move - leg.hip
     wanted = np.linalg.norm(target, axis=1)
@@ -56,7 +54,7 @@ def reach(leg: Leg, move: Float) -> tuple[Float, Float]:
     return swing, swing @ rotations.turn(leg.axis, bend)
 
 
-def _lengths(leg: Leg) -> tuple[Float, Float]:
+def _lengths(leg: Leg) -> tuple[Float64, Float64]:
     """(T,) each: from hip to ankle, and by how much a radian more of the knee changes that."""
     line = leg.ankle - leg.hip
     length = np.maximum(np.linalg.norm(line, axis=1), 1e-9)

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
-
-Float = npt.NDArray[np.float64]
+from fba.arrays import Float64
 
 STEPS = 8
 LEAP = 0.5
@@ -26,11 +24,11 @@ class Target:
     turn it, counted from the outermost. wanted: unit (T, 3).
     """
 
-    pieces: tuple[tuple[Float, int], ...]
-    wanted: Float
+    pieces: tuple[tuple[Float64, int], ...]
+    wanted: Float64
 
 
-def product(axes: Float, angles: Float) -> Float:
+def product(axes: Float64, angles: Float64) -> Float64:
     """Matrices (T, 3, 3): turns about axes (K, 3) by angles (T, K), outermost first."""
     result = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
     for number, axis in enumerate(axes):
@@ -38,7 +36,7 @@ def product(axes: Float, angles: Float) -> Float:
     return result
 
 
-def aim(axes: Float, start: Float, bone: Float, wanted: Float, weights: Float) -> Float:
+def aim(axes: Float64, start: Float64, bone: Float64, wanted: Float64, weights: Float64) -> Float64:
     """Angles (T, K) whose turns about axes (K, 3) bring bone (3,) or (T, 3) to wanted (T, 3).
 
     Of all that do, those closest to start (T, K), freedoms with small weights (K,) giving way first.
@@ -47,7 +45,7 @@ def aim(axes: Float, start: Float, bone: Float, wanted: Float, weights: Float) -
     return aim_all(axes, start, (Target(((bone, len(axes)),), wanted),), weights)
 
 
-def aim_all(axes: Float, start: Float, targets: Sequence[Target], weights: Float) -> Float:
+def aim_all(axes: Float64, start: Float64, targets: Sequence[Target], weights: Float64) -> Float64:
     """Angles (T, K) of turns about axes (K, 3), one inside the other, that meet several targets at once.
 
     See `aim`. Where they cannot all be met, the sum of squares of what is missed is least. Gauss-Newton.

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Float64
 from fba.capture.limbs import _leg_ik as leg_ik
 from fba.capture.limbs import bone_ik, ground, soles
 from fba.capture.limbs.targets import Targets
-
-Float = npt.NDArray[np.float64]
 
 STEPS = 4
 """Steps of the search for the ankle and the roll that point a foot exactly."""
@@ -41,7 +39,7 @@ def turn_foot(targets: Targets, side: str) -> None:
     _split_foot(targets, ankle, subtalar, foot)
 
 
-def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float) -> None:
+def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float64) -> None:
     """Sets both joints so that together they turn the foot: flexion, twist and roll reach any rotation."""
     above = targets.parent_rotation(ankle)
     own = targets.axes(ankle)[0]
@@ -56,7 +54,7 @@ def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float) -> Non
     targets.rotations[ankle] = above @ bone_ik.product(own, np.stack([outer, inner], axis=1))
 
 
-def plant_feet(targets: Targets, root: Float, scale: float, floor: str, plant: bool) -> Float:
+def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant: bool) -> Float64:
     """Positions of the root (T, 3), metres, at which the feet stand as the source's do.
 
     root: positions to start from. scale: metres for one unit of the source. floor: "floor" where the ground
@@ -102,7 +100,7 @@ def plant_feet(targets: Targets, root: Float, scale: float, floor: str, plant: b
     return root
 
 
-def _move_foot(targets: Targets, side: str, root: Float, move: Float) -> None:
+def _move_foot(targets: Targets, side: str, root: Float64, move: Float64) -> None:
     """Bends a leg so that its foot moves by move (T, 3), metres."""
     thigh, shank = leg_ik.reach(_leg(targets, side, root), move)
     targets.rotations[f"{side}_hip"] = thigh @ targets.rotations[f"{side}_hip"]
@@ -110,7 +108,7 @@ def _move_foot(targets: Targets, side: str, root: Float, move: Float) -> None:
     turn_foot(targets, side)
 
 
-def _leg(targets: Targets, side: str, root: Float) -> leg_ik.Leg:
+def _leg(targets: Targets, side: str, root: Float64) -> leg_ik.Leg:
     """World positions of a leg's joints, and the axis of its knee."""
     knee = f"{side}_knee"
     frames = {

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Float = npt.NDArray[np.float64]
+from fba.arrays import Float64
 
 LOWEST = 20
 """Percentile of the lower foot's height that is the ground: single frames may dip through it."""
@@ -33,13 +32,13 @@ class Ground:
     height: float
     slope: tuple[float, float] = (0.0, 0.0)
 
-    def under(self, points: Float) -> Float:
+    def under(self, points: Float64) -> Float64:
         """Heights (...) of the ground under points (..., 3)."""
-        result: Float = self.height + points[..., 0] * self.slope[0] + points[..., 2] * self.slope[1]
+        result: Float64 = self.height + points[..., 0] * self.slope[0] + points[..., 2] * self.slope[1]
         return result
 
 
-def found(lowest: Float, points: Float) -> Ground:
+def found(lowest: Float64, points: Float64) -> Ground:
     """The ground under feet that stand on it now and then; at height 0 where they never do.
 
     lowest: (2, T), heights of the lowest points of the feet, points: (2, T, 3), where the feet are, metres.
@@ -66,7 +65,7 @@ def found(lowest: Float, points: Float) -> Ground:
     return Ground(sloping - float(middle @ plane[1:]), (float(plane[1]), float(plane[2])))
 
 
-def _plane(heights: Float, across: Float) -> Float:
+def _plane(heights: Float64, across: Float64) -> Float64:
     """Height and slopes (3,) of the plane under most points: least squares, those above counting little."""
     columns = np.column_stack([np.ones(len(heights)), across])
     hold = np.diag([0.0, 1.0, 1.0]) * len(heights) * (0.3 * LONG) ** 2 * UPPER

@@ -16,13 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Float64
 from fba.capture.limbs._hinge_path import follow
 from fba.capture.limbs.bone_ik import aim, product
-
-Float = npt.NDArray[np.float64]
 
 STIFF = 0.3
 """Weight of the twists that were found against the lower bone's direction, in the last step: a limb that is
@@ -43,14 +41,14 @@ class Hinge:
     flexion outermost. natural: +1 where it bends by positive flexion, -1 by negative.
     """
 
-    upper: Float
-    lower: Float
-    flexion: Float
-    twist: Float
+    upper: Float64
+    lower: Float64
+    flexion: Float64
+    twist: Float64
     natural: float
 
 
-def solve(hinge: Hinge, direction: Float, local: Float, rate: float) -> Float:
+def solve(hinge: Hinge, direction: Float64, local: Float64, rate: float) -> Float64:
     """Angles (T, 3): turn about the upper bone, flexion, twist.
 
     direction: (T, 3), wanted for the lower bone, and local: (T, 3, 3), wanted rotation of the lower bone,
@@ -70,14 +68,14 @@ def solve(hinge: Hinge, direction: Float, local: Float, rate: float) -> Float:
     return aim(axes, start, hinge.lower, direction, np.array([STIFF, LOOSE, STIFF]))
 
 
-def matrices(hinge: Hinge, angles: Float) -> tuple[Float, Float]:
+def matrices(hinge: Hinge, angles: Float64) -> tuple[Float64, Float64]:
     """Rotations (T, 3, 3): the turn of the upper bone, and that of the hinge."""
     return rotations.turn(hinge.upper, angles[:, 0]), product(
         np.stack([hinge.flexion, hinge.twist]), angles[:, 1:]
     )
 
 
-def turn_about(rotation: Float, axis: Float) -> Float:
+def turn_about(rotation: Float64, axis: Float64) -> Float64:
     """Angles (T,), without jumps, of the turn about an axis that comes closest to each rotation."""
     m = rotation
     vector = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
@@ -86,12 +84,12 @@ def turn_about(rotation: Float, axis: Float) -> Float:
     return _centred(np.unwrap(np.arctan2(vector @ axis, trace - along)))
 
 
-def _centred(angle: Float) -> Float:
+def _centred(angle: Float64) -> Float64:
     """Moved by whole turns as a whole, to lie around 0."""
     return angle - 2 * np.pi * np.rint(np.median(angle) / (2 * np.pi)) if len(angle) else angle
 
 
-def _turn(hinge: Hinge, direction: Float, total: Float, along: float, rate: float) -> Float:
+def _turn(hinge: Hinge, direction: Float64, total: Float64, along: float, rate: float) -> Float64:
     """Turns (T,) of the upper bone: the hinge's plane right where it means something, and no jumps."""
     a, h, y, d = hinge.upper, hinge.flexion, hinge.twist, hinge.lower
     # sideways part of the wanted direction, seen from the turned upper bone, less that of the lower bone
@@ -114,11 +112,11 @@ def _turn(hinge: Hinge, direction: Float, total: Float, along: float, rate: floa
     return _centred(path)
 
 
-def _flexion(hinge: Hinge, direction: Float, turn: Float, twist: Float) -> Float:
+def _flexion(hinge: Hinge, direction: Float64, turn: Float64, twist: Float64) -> Float64:
     """Flexion (T,) that brings the twisted lower bone closest to its direction."""
     wanted = (rotations.turn(hinge.upper, -turn) @ direction[:, :, None])[:, :, 0]
     bone = rotations.turn(hinge.twist, twist) @ hinge.lower
     sine = np.cross(bone, wanted) @ hinge.flexion
     cosine = np.einsum("ti,ti->t", bone, wanted) - (bone @ hinge.flexion) * (wanted @ hinge.flexion)
-    result: Float = np.arctan2(sine, cosine)
+    result: Float64 = np.arctan2(sine, cosine)
     return result

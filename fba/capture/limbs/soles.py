@@ -13,14 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Float64
 from fba.body.skeleton import Skeleton
 from fba.capture.limbs._coupled_paths import chain
 from fba.capture.motion import SkeletonMotion
-
-Float = npt.NDArray[np.float64]
 
 TOES = 0.06
 """Metres from the metatarsal joint to the tip of the toes of the default body."""
@@ -62,12 +60,12 @@ class Soles:
     T, 3), the heel, and the ball or the tip, whatever the source has.
     """
 
-    lowest: Float
-    points: Float
+    lowest: Float64
+    points: Float64
 
 
-def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Float, turned: Float,
-                 places: Float, metres: float) -> Soles | None:  # fmt: skip
+def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Float64, turned: Float64,
+                 places: Float64, metres: float) -> Soles | None:  # fmt: skip
     """The source's soles. None where it has not both ankles.
 
     turned: (T, J, 4) world rotations of the source's own frame, places: (T, J, 3), upright, in its units.
@@ -109,7 +107,7 @@ def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Flo
     return Soles(np.array(lows) * metres, np.array(points) * metres)
 
 
-def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float], root: Float, toes: bool) -> Soles | None:
+def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, toes: bool) -> Soles | None:
     """The body's soles: heel, ball, and tip of the toes where toes. None where it lacks parts of feet.
 
     wanted: joint -> world rotations (T, 3, 3); joints that are not there turn with their parents. root: (T,
@@ -138,8 +136,8 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float], root: Float, toe
 
 
 def followed(
-    skeleton: Skeleton, wanted: Mapping[str, Float], root: Float, last: str
-) -> list[tuple[str, Float, Float]]:
+    skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, last: str
+) -> list[tuple[str, Float64, Float64]]:
     """From the root down to a joint: name, place (T, 3) and rotation (T, 3, 3); see `body_soles`."""
     path = [skeleton.number(last)]
     while skeleton.parents[path[-1]] >= 0:
@@ -155,7 +153,7 @@ def followed(
     return result
 
 
-def lift(above: Float, body: Float, stiff: Float, rate: float) -> Float:
+def lift(above: Float64, body: Float64, stiff: Float64, rate: float) -> Float64:
     """(T,), metres to raise the body by, so that feet are as high as the source's.
 
     above: (2, T), heights wanted, in metres above the ground; body: (2, T), those that are. stiff: (2, T), by
@@ -169,22 +167,22 @@ def lift(above: Float, body: Float, stiff: Float, rate: float) -> Float:
     return smoothed(result, rate)
 
 
-def grounded(above: Float) -> Float:
+def grounded(above: Float64) -> Float64:
     """The say of feet at heights above the ground, 0 to 1."""
-    say: Float = np.exp(-((np.maximum(above, 0.0) / ON_GROUND) ** 2))
+    say: Float64 = np.exp(-((np.maximum(above, 0.0) / ON_GROUND) ** 2))
     return say
 
 
-def heights(above: Float, body: Float, rate: float) -> Float:
+def heights(above: Float64, body: Float64, rate: float) -> Float64:
     """(2, T), metres to raise each foot by, after the body was: no more than needed, nothing in the air."""
     lacking = above - body
     needed = np.sign(lacking) * np.maximum(np.abs(lacking) - TOLERATED, 0.0)
     moves = np.array([smoothed(foot, rate) for foot in needed * grounded(above - WITHIN)])
-    result: Float = np.clip(moves, -FARTHEST, FARTHEST)
+    result: Float64 = np.clip(moves, -FARTHEST, FARTHEST)
     return result
 
 
-def pitches(body: Float, ups: Float) -> Float:
+def pitches(body: Float64, ups: Float64) -> Float64:
     """(2, T, 3, 3), world turns of the feet: what stands on its ball raises or lowers that, by some of ups.
 
     body: (2, 2, T, 3), points of the soles; ups: (2, T), metres to raise the feet by. Legs do the rest.
@@ -197,13 +195,13 @@ def pitches(body: Float, ups: Float) -> Float:
     return rotations.turn(across, angle)
 
 
-def tiptoe(body: Float) -> Float:
+def tiptoe(body: Float64) -> Float64:
     """(2, T), 0 for feet on their heels, 1 on their balls, of points of the soles (2, 2, T, 3)."""
-    result: Float = 0.5 - 0.5 * np.tanh((body[:, 1, :, 1] - body[:, 0, :, 1]) / TIPTOE)
+    result: Float64 = 0.5 - 0.5 * np.tanh((body[:, 1, :, 1] - body[:, 0, :, 1]) / TIPTOE)
     return result
 
 
-def slips(source: Float, body: Float, level: Float, rate: float) -> tuple[Float, Float]:
+def slips(source: Float64, body: Float64, level: Float64, rate: float) -> tuple[Float64, Float64]:
     """Metres along x and z to move the body by, (T, 2), and then each foot, (2, T, 2), so that feet move on
     the ground as the source's do.
 
@@ -220,7 +218,7 @@ def slips(source: Float, body: Float, level: Float, rate: float) -> tuple[Float,
     return whole, np.array([_course(left[foot], firm[foot], RETURN, rate) for foot in range(2)])
 
 
-def _course(aim: Float, firm: Float, back: float, rate: float) -> Float:
+def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
     """(T, 2): aim (T - 1, 2), changes from frame to frame times their weights firm (T - 1,)."""
     count = len(firm) + 1
     bonds = (firm + SWING) * rate
@@ -232,11 +230,11 @@ def _course(aim: Float, firm: Float, back: float, rate: float) -> Float:
         chain(np.full(count, back / rate), bonds, pull, result[axis])
     course = result.T
     length = np.linalg.norm(course, axis=1, keepdims=True)
-    bounded: Float = course * (FARTHEST * np.tanh(length / FARTHEST) / np.maximum(length, 1e-12))
+    bounded: Float64 = course * (FARTHEST * np.tanh(length / FARTHEST) / np.maximum(length, 1e-12))
     return bounded
 
 
-def smoothed(values: Float, rate: float) -> Float:
+def smoothed(values: Float64, rate: float) -> Float64:
     """Moving average, twice over."""
     half = max(1, round(SMOOTH * rate))
     for _ in range(2):

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Int64
 from fba.body import BapSolver, Skeleton
 from fba.body.solve.solver_loops import joint_angles
 from fba.capture.motion import SkeletonMotion
-
-Float = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,29 +29,29 @@ class Targets:
     motion: SkeletonMotion
     mapped: dict[str, int]
     aims: dict[str, str]
-    upright: Float
-    source_rotations: Float
-    source_positions: Float
-    rotations: dict[str, Float]
-    feet: dict[str, Float]
+    upright: Float64
+    source_rotations: Float64
+    source_positions: Float64
+    rotations: dict[str, Float64]
+    feet: dict[str, Float64]
 
     @property
     def skeleton(self) -> Skeleton:
         """The body's skeleton."""
         return self.solver.skeleton
 
-    def bone(self, joint: str, aim: str) -> Float:
+    def bone(self, joint: str, aim: str) -> Float64:
         """Unit vector (3,) from one joint of the resting body to another."""
         centres, number = self.skeleton.centres, self.skeleton.number
         vector = centres[number(aim)] - centres[number(joint)]
-        unit: Float = vector / np.linalg.norm(vector)
+        unit: Float64 = vector / np.linalg.norm(vector)
         return unit
 
-    def direction(self, joint: str) -> Float:
+    def direction(self, joint: str) -> Float64:
         """Unit vectors (T, 3) in which the bone that begins at a joint is to point."""
         return self.rotations[joint] @ self.bone(joint, self.aims[joint])
 
-    def axes(self, joint: str) -> tuple[Float, npt.NDArray[np.int64], Float]:
+    def axes(self, joint: str) -> tuple[Float64, Int64, Float64]:
         """Signed axes (K, 3) of a joint, outermost first, and their numbers (3,) and signs (3,)."""
         rules = self.solver.convention
         row = rules.joints.index(joint)
@@ -61,7 +59,7 @@ class Targets:
         axes = np.eye(3)[rules.axis[row]] * rules.sign[row][:, None]
         return axes[:count], rules.axis[row], rules.sign[row]
 
-    def parent_rotation(self, joint: str) -> Float:
+    def parent_rotation(self, joint: str) -> Float64:
         """Target (T, 3, 3) of the closest joint above that has one."""
         number = self.skeleton.number(joint)
         while (number := int(self.skeleton.parents[number])) >= 0:
@@ -69,7 +67,7 @@ class Targets:
                 return self.rotations[self.skeleton.names[number]]
         return np.broadcast_to(np.eye(3), (len(self.motion), 3, 3))
 
-    def closest_angles(self, joint: str, local: Float) -> Float:
+    def closest_angles(self, joint: str, local: Float64) -> Float64:
         """Angles (T, K) about a joint's axes that come closest to the rotations local (T, 3, 3)."""
         axes, numbers, signs = self.axes(joint)
         angles = np.zeros((3, len(local)))

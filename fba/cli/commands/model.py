@@ -14,9 +14,7 @@ from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_op
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
-
+    from fba.arrays import Float64
     from fba.face.checks import Finding
     from fba.face.model import FaceModel
 
@@ -219,7 +217,7 @@ def fit(
     _write(face, output, outputs)
 
 
-def _points(path: Path, model: FaceModel) -> npt.NDArray[np.float64]:
+def _points(path: Path, model: FaceModel) -> Float64:
     """Feature points of a file; of an Xface file without its mesh those that its distances tell."""
     from fba.face.importers.points.fdp import load_fdp
     from fba.face.importers.points.points_file import read_points

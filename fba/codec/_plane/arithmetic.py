@@ -24,8 +24,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int64, UInt8, UInt16
 from fba.compiled import compiled
 
 QUARTER = 16384
@@ -48,10 +48,6 @@ BAD_GUARD = 2
 """A 0 where the 1 after 22 zeros must stand."""
 BAD_FLUSH = 3
 """The two closing bits are not those that the final interval asks for."""
-
-UInt8 = npt.NDArray[np.uint8]
-UInt16 = npt.NDArray[np.uint16]
-Int64 = npt.NDArray[np.int64]
 
 
 class Counts(NamedTuple):

@@ -5,15 +5,13 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int64
 from fba.codec._plane import quantiser, slots
 from fba.codec._plane.arithmetic import STRIDE, Counts
 from fba.codec._plane.loops import Coding
 from fba.codec.settings import RANGE_UNIT, PartSettings
 from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, baps, faps
-
-Int64 = npt.NDArray[np.int64]
 
 UNDEFINED = -1
 """Limit of a parameter that has neither a default range nor a sent one."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int32, Int64, UInt8
 from fba.codec._plane import arithmetic, slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA, Counts, decode_segment, encode_segment, learn
 from fba.compiled import compiled
@@ -38,11 +38,6 @@ NO_START_CODE = -1
 UNDECIDED = -2
 
 _INT32_MAX = 2147483647
-
-UInt8 = npt.NDArray[np.uint8]
-UInt16 = npt.NDArray[np.uint16]
-Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
 
 
 class Layout(NamedTuple):

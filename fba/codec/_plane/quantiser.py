@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int64, Integer
 from fba.codec._plane import slots
 from fba.parameters import bap_steps, fap_steps
 
@@ -20,7 +20,7 @@ def scale(part: int, quant: int) -> int:
     return max(quant if part == slots.FACE_BIT else BAP_PREDICTIVE_SCALE[quant], 1)
 
 
-def steps(part: int, quant: int, bap_table: str) -> npt.NDArray[np.int64]:
+def steps(part: int, quant: int, bap_table: str) -> Int64:
     """Step of every slot of a part, int64 (73,) or (296,) in slot order; 1 where values go unquantised."""
     factor = scale(part, quant)
     if part == slots.BODY_BIT:
@@ -33,8 +33,8 @@ def steps(part: int, quant: int, bap_table: str) -> npt.NDArray[np.int64]:
     return result
 
 
-def levels(values: npt.NDArray[np.integer], step: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def levels(values: Integer, step: Int64) -> Int64:
     """Levels of values: the nearest multiple of the step, halves away from zero, but 0 up to step // 2."""
     size, half = np.abs(values.astype(np.int64)), step // 2
-    quantised: npt.NDArray[np.int64] = np.sign(values) * np.where(size <= half, 0, (size + half) // step)
+    quantised: Int64 = np.sign(values) * np.where(size <= half, 0, (size + half) // step)
     return quantised

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int32, Int64, UInt8
 from fba.codec._plane import loops, slots, syntax
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, OutOfDataError
@@ -14,8 +14,6 @@ from fba.codec._plane.coder_state import Models
 from fba.codec._plane.loops import Layout
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings
 from fba.errors import BitstreamError, UnsupportedError
-
-Int64 = npt.NDArray[np.int64]
 
 _RUN = 512
 """Planes that one call of the compiled loop decodes at most."""
@@ -27,7 +25,7 @@ class Planes:
     """What was read: rows of values int32 (T, columns), see `slots`; bit positions int64 (T + 1,); skips
     int64 (T,). Arrays belong to the reader and change with the next call."""
 
-    rows: slots.Int32
+    rows: Int32
     borders: Int64
     skips: Int64
     settings: PlaneSettings
@@ -62,7 +60,7 @@ class PlaneReader:
         self._settings.clear()
         self._layouts.clear()
 
-    def read(self, data: loops.UInt8, bit: int, end: int, *, after_code: bool) -> Planes | None:
+    def read(self, data: UInt8, bit: int, end: int, *, after_code: bool) -> Planes | None:
         """The plane at `bit`, and P planes that follow it; None where none is complete.
 
         after_code: a start code ends at `bit`. Raises OutOfDataError where even the first plane goes
@@ -127,7 +125,7 @@ class PlaneReader:
         return settings
 
     def _intra_values(
-        self, reader: BitReader, part: int, settings: PartSettings, row: slots.Int32
+        self, reader: BitReader, part: int, settings: PartSettings, row: Int32
     ) -> tuple[Int64, Int64]:
         """Slots and values of a part; also written into row (1, columns)."""
         face = part == slots.FACE_BIT

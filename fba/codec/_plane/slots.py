@@ -10,9 +10,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import BodyTrack, FaceTrack
+from fba.arrays import Bool, Int32, Int64
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, bap_groups, baps, faps
 
 VISEME = slice(0, 3)
@@ -27,10 +27,6 @@ SLOTS = 372
 
 FACE_BIT, BODY_BIT = 1, 2
 """Bits of fba_object_mask."""
-
-Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
-Bool = npt.NDArray[np.bool_]
 
 
 def row_width(*, body: bool) -> int:

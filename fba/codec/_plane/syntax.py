@@ -22,6 +22,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool
 from fba.codec._plane import slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, BitWriter, OutOfDataError
@@ -47,7 +48,7 @@ _MARKER_EVERY = 4
 _RANGE_WEIGHTS = 1 << np.arange(RANGE_BITS, dtype=np.uint8)[::-1]
 
 
-def interpolated(settings: PartSettings) -> slots.Bool | None:
+def interpolated(settings: PartSettings) -> Bool | None:
     """bool (68,): the FAPs that are not sent and that mask type 2 asks to interpolate; None where none."""
     if MASK_INTERPOLATE not in settings.mask_types:
         return None
@@ -158,7 +159,7 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
                 writer.write(bits, 1 + RANGE_BITS * len(chunk))
 
 
-def _read_ranges(reader: BitReader, part: int, mask: slots.Bool) -> RangeLists:
+def _read_ranges(reader: BitReader, part: int, mask: Bool) -> RangeLists:
     flags = [reader.read(1) for _ in LISTS]
     layout = _range_layout(part, mask.tobytes()) if any(flags) else None
     lists: list[np.ndarray | None] = []
@@ -212,7 +213,7 @@ def _range_layout(part: int, mask: bytes) -> _RangeLayout:
     return _RangeLayout(chunks, np.array(markers, dtype=np.intp), columns, starts + np.arange(RANGE_BITS), at)
 
 
-def _range_chunks(part: int, mask: slots.Bool) -> list[list[int]]:
+def _range_chunks(part: int, mask: Bool) -> list[list[int]]:
     """How a range list is cut: parameters whose limits follow one marker bit, those masked out left out."""
     listed = groups(part)[1:] if part == slots.FACE_BIT else groups(part)  # FAP 1 and 2 have no ranges
     return [

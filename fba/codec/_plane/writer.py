@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Int32, Int64
 from fba.codec._plane import loops, quantiser, slots, syntax
 from fba.codec._plane.arithmetic import OUT_OF_DATA
 from fba.codec._plane.bits import BitWriter
 from fba.codec._plane.coder_state import Models
 from fba.codec._plane.loops import Layout
 from fba.codec.settings import PartSettings, PlaneSettings
-
-Int64 = npt.NDArray[np.int64]
 
 _SEGMENT_BITS = 20
 
@@ -57,7 +55,7 @@ class PlaneWriter:
         self._writer.align()
         self._start_code(syntax.END_CODE)
 
-    def mask_in_force(self, part: int) -> slots.Bool | None:
+    def mask_in_force(self, part: int) -> Bool | None:
         """What the last I plane with this part sends of it."""
         settings = self._settings.get(part)
         return settings.mask if settings is not None else None
@@ -74,7 +72,7 @@ class PlaneWriter:
         reached = min(max(level, low), low + int(models.size[slot]) - 1)
         return int(models.last[slot]) + reached * int(models.step[slot])
 
-    def intra(self, settings: PlaneSettings, row: slots.Int32, *, clamp: bool = False) -> int:
+    def intra(self, settings: PlaneSettings, row: Int32, *, clamp: bool = False) -> int:
         """Write an I plane with the values of row (columns,); how many values were clamped to their range.
 
         Raises DoesNotFitError before anything was written, unless `clamp`.
@@ -127,7 +125,7 @@ class PlaneWriter:
         self.planes += 1
         return clamped
 
-    def predicted(self, mask: int, rows: slots.Int32, skips: Int64, *, start_code: bool = False) -> None:
+    def predicted(self, mask: int, rows: Int32, skips: Int64, *, start_code: bool = False) -> None:
         """Write P planes with fba_object_mask `mask` and the values of rows (T, columns).
 
         start_code: with a plane start code before the first. Raises DoesNotFitError at the first that

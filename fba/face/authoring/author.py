@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float64
 from fba.errors import ModelError
 from fba.face.authoring.regions.brows_cheeks_nose import spot_motions
 from fba.face.authoring.regions.ears import ear_motions
@@ -36,7 +37,6 @@ from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
 if TYPE_CHECKING:
     from fba.face.interpolation.table import InterpolationTable
 
-Float64 = npt.NDArray[np.float64]
 
 MOST_VERTICES = 250_000
 """A denser mesh is refused: it shows nothing more, and would take minutes and gigabytes."""
@@ -203,7 +203,7 @@ class _Authoring:
         for fap in (THRUST_JAW, SHIFT_JAW):
             self._slide(fap, found, shares)
 
-    def _pinned(self) -> npt.NDArray[np.bool_]:
+    def _pinned(self) -> Bool:
         """What goes exactly where the jaw wants it."""
         pinned = self.marks.on(*LIP_CONTOURS)
         pinned[[self.marks.vertex[name] for name in CHIN if self.marks.has(name)]] = True

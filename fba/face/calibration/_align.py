@@ -6,12 +6,10 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-
-Float64 = npt.NDArray[np.float64]
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of length that files are in, in metres."""
@@ -80,12 +78,12 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
     return Alignment(placed, scale, name, angle, mirrored, flat, expected, residual)
 
 
-def known_rows(*points: Float64) -> npt.NDArray[np.bool_]:
+def known_rows(*points: Float64) -> Bool:
     """Rows (N,) that are finite in every one of some arrays (N, 3)."""
     return np.asarray(np.isfinite(np.hstack(points)).all(axis=1))
 
 
-def _check(given: Float64, known: npt.NDArray[np.bool_]) -> None:
+def _check(given: Float64, known: Bool) -> None:
     if known.sum() < FEWEST_POINTS:
         raise ModelError(
             f"only {int(known.sum())} feature points are known to both the person and the face "

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Floating
 from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import FittedEye
 from fba.face.calibration._lid_paths import LID_FAPS, slid
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from fba.face.fapu import Fapu
     from fba.face.model import FaceModel, Part
 
-Float64 = npt.NDArray[np.float64]
 
 LEAST = 1e-6
 """How much a direction that no edge has counts as stretched like the others."""
@@ -165,7 +164,7 @@ def _turn(a: Float64, b: Float64) -> Float64:
     return turn
 
 
-def stretches(part: Part, after: npt.NDArray[np.floating]) -> Float64:
+def stretches(part: Part, after: Floating) -> Float64:
     """(V, 3, 3): how the surface around each vertex was turned and stretched.
 
     Least squares over the edges around it; along the normal it is turned with the surface and grows as

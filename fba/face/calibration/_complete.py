@@ -6,12 +6,10 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.errors import FbaWarning
 from fba.face.feature_points import MIRRORED, names, row_of
-
-Float64 = npt.NDArray[np.float64]
 
 APART = 0.012
 """Points that the face has further apart than this share of the pupils' distance are not one point."""

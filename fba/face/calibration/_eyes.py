@@ -6,13 +6,11 @@ import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Floating
 from fba.errors import FbaWarning
 from fba.face.calibration._field import between
 from fba.face.eyeball import Eyeball
-
-Float64 = npt.NDArray[np.float64]
 
 LID = 1.10
 """Vertices within so many radii of the eyeball's centre lie on it: lids, and the skin that lines them."""
@@ -41,7 +39,7 @@ class FittedEye:
     iris: float
     iris_was: float
 
-    def __call__(self, vertices: npt.NDArray[np.floating]) -> Float64:
+    def __call__(self, vertices: Floating) -> Float64:
         """Vertices of the eyeball moved: turned nowhere, scaled, the iris widened along the sphere."""
         arms = np.asarray(vertices, dtype=np.float64) - self.was.centre
         distance = np.linalg.norm(arms, axis=1)
@@ -177,7 +175,7 @@ def _outside(
     eye: FittedEye,
     skin: Float64,
     moved: Float64,
-    near: npt.NDArray[np.bool_],
+    near: Bool,
     sources: Float64,
 ) -> Float64:
     """What was outside the eyeball and has come inside, put back onto it; given points stay."""

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Float64 = npt.NDArray[np.float64]
+from fba.arrays import Float64, Floating
 
 WELL_KNOWN = 0.02
 """Metres: the affine part is trusted along directions in which the points are spread by more."""
@@ -32,7 +31,7 @@ class Field:
     target: Float64
     rest: Any
 
-    def __call__(self, places: npt.NDArray[np.floating]) -> Float64:
+    def __call__(self, places: Floating) -> Float64:
         flat = np.asarray(places, dtype=np.float64)
         moved: Float64 = self.affine(flat) + self.rest(flat)
         return moved
@@ -41,22 +40,20 @@ class Field:
         moved: Float64 = (places - self.origin) @ self.matrix.T + self.target
         return moved
 
-    def turns(self, places: npt.NDArray[np.floating]) -> Float64:
+    def turns(self, places: Floating) -> Float64:
         """(N, 3, 3): the rotation in the deformation at each place, without its stretch."""
         u, _, vt = np.linalg.svd(self.jacobians(places))
         turned: Float64 = u @ vt
         return turned
 
-    def jacobians(self, places: npt.NDArray[np.floating], step: float = 1e-4) -> Float64:
+    def jacobians(self, places: Floating, step: float = 1e-4) -> Float64:
         """(N, 3, 3): how the deformation stretches and turns space at each place."""
         flat = np.asarray(places, dtype=np.float64)
         columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * step]
         return np.stack(columns, axis=2) / (2 * step)
 
 
-def deformation(
-    sources: Float64, targets: Float64, mesh: npt.NDArray[np.floating], kernel: str, size: float
-) -> Field:
+def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str, size: float) -> Field:
     """The deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
 
     size: how big the person is by the face. An affine part, trusted as far as the points are spread, and

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning, ModelError
 from fba.face.calibration._align import Alignment, align, centred, known_rows
 from fba.face.calibration._complete import between_lids, mirrored, shut, without_mistakes
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from fba.face.checks.posing import Poser
     from fba.face.tables import FaceDefTables
 
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 TURNED_OVER = 0.002
 """Share of the surface that may turn over, in wrinkles, before the deformation counts as folded."""
@@ -192,7 +191,7 @@ def _smooth(
     mesh = np.concatenate(
         [part.vertices for part in model.parts if part.kind in ("skin", "mouth")] or [model.vertices]
     )
-    worst: npt.NDArray[np.intp] = np.zeros(0, dtype=np.intp)
+    worst: Intp = np.zeros(0, dtype=np.intp)
     for kernel in KERNELS:
         field = deformation(sources, places, mesh, kernel, size)
         worst = folded(field, mesh, size)

@@ -5,28 +5,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Floating, Integer, Intp
 from fba.face.feature_points import names
 
 if TYPE_CHECKING:
     from fba.face.calibration._field import Field
 
-Float64 = npt.NDArray[np.float64]
 
 LEAST = 0.04
 """Share of its usual volume to which space may be pressed together."""
 
 
-def folded(field: Field, mesh: npt.NDArray[np.floating], size: float) -> npt.NDArray[np.intp]:
+def folded(field: Field, mesh: Floating, size: float) -> Intp:
     """Vertices at which the deformation turns space inside out, or nearly so; size: usual, of lengths."""
     volume = np.linalg.det(field.jacobians(mesh)) / size**3
     return np.flatnonzero(~(volume > LEAST))
 
 
-def turned_over(
-    before: npt.NDArray[np.floating], after: Float64, triangles: npt.NDArray[np.integer]
-) -> tuple[npt.NDArray[np.intp], float]:
+def turned_over(before: Floating, after: Float64, triangles: Integer) -> tuple[Intp, float]:
     """Triangles that look the other way than their surroundings do after a deformation, and their area.
 
     The area is a share of the whole, before.
@@ -47,7 +44,7 @@ def turned_over(
     return wrong, float(areas[0][wrong].sum() / max(areas[0].sum(), 1e-30))
 
 
-def blamed(places: Float64, sources: Float64, rows: npt.NDArray[np.intp], count: int = 4) -> tuple[str, ...]:
+def blamed(places: Float64, sources: Float64, rows: Intp, count: int = 4) -> tuple[str, ...]:
     """Names of the feature points (rows, at sources) that are nearest to most of the places."""
     from scipy.spatial import cKDTree
 

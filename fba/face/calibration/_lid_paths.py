@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Integer
 from fba.face.calibration._eyes import FittedEye, weight_of
-
-Float64 = npt.NDArray[np.float64]
 
 LID_FAPS = {19: "left", 20: "right", 21: "left", 22: "right"}
 
@@ -17,7 +15,7 @@ LID_FAPS = {19: "left", 20: "right", 21: "left", 22: "right"}
 def slid(
     eyes: Mapping[str, FittedEye],
     fap: int,
-    borders: npt.NDArray[np.integer],
+    borders: Integer,
     before: tuple[Float64, Float64],
     after: tuple[Float64, Float64],
 ) -> Float64:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Floating
 from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lids_on
 from fba.face.calibration._field import Field, bumps
@@ -19,8 +19,6 @@ from fba.mesh.meshes import vertex_normals
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
 
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 TEETH = {"upper": ("9.10", "9.8"), "lower": ("9.11", "9.9")}
 """Points of each jaw: the edge of the teeth first, then the gums."""
@@ -59,7 +57,7 @@ class Similar:
     target: Float64
     size: float
 
-    def __call__(self, places: npt.NDArray[np.floating]) -> Float64:
+    def __call__(self, places: Floating) -> Float64:
         moved: Float64 = self.target + self.size * (np.asarray(places, dtype=np.float64) - self.origin)
         return moved
 
@@ -142,7 +140,7 @@ def _fixed(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
     return model.points[known], targets[known]
 
 
-def similar(before: npt.NDArray[np.floating], after: Float64) -> Similar:
+def similar(before: Floating, after: Float64) -> Similar:
     """The scale and shift that come nearest to a deformation of some vertices."""
     places = np.asarray(before, dtype=np.float64)
     a, b = places - places.mean(axis=0), after - after.mean(axis=0)
@@ -202,7 +200,7 @@ class _Tongue:
         self._base = base
         self._rest = bumps(here, there - base(here), TONGUE_WIDTH) if len(here) else None
 
-    def __call__(self, places: npt.NDArray[np.floating]) -> Float64:
+    def __call__(self, places: Floating) -> Float64:
         moved = self._base(places)
         return moved if self._rest is None else moved + self._rest(np.asarray(places, dtype=np.float64))
 
@@ -215,9 +213,7 @@ def _jaw(model: FaceModel, part: Part) -> str:
     return "upper" if float(part.vertices[:, 1].mean()) >= boundary else "lower"
 
 
-def _carried(
-    vertices: npt.NDArray[np.floating], skin: Float64, shift: Float64, eyes: Mapping[str, FittedEye]
-) -> Float64:
+def _carried(vertices: Floating, skin: Float64, shift: Float64, eyes: Mapping[str, FittedEye]) -> Float64:
     """What laying the skin on the eyeballs did to it, for parts that stand on it: (V, 3)."""
     from scipy.spatial import cKDTree
 

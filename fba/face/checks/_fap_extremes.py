@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Integer
 from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
 from fba.face.model import Part
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_ROLL
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 TURNING = {OPEN_JAW, 19, 20, 21, 22, TONGUE_ROLL}
 """Where these move the skin, it turns: a triangle has turned over when it faces away from its neighbours."""
@@ -69,7 +66,7 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
                 )
 
 
-def _counted(poser: Poser, part: Part, fap: int) -> npt.NDArray[np.integer]:
+def _counted(poser: Poser, part: Part, fap: int) -> Integer:
     """Triangles of a part, without those about the corners of the eyes where lids close on themselves."""
     if fap not in LIDS:
         return part.triangles
@@ -77,13 +74,11 @@ def _counted(poser: Poser, part: Part, fap: int) -> npt.NDArray[np.integer]:
     wide = np.linalg.norm(corners[0] - corners[1]), np.linalg.norm(corners[2] - corners[3])
     away = np.linalg.norm(part.vertices[:, None] - corners, axis=2)
     within = (np.nan_to_num(away, nan=np.inf) < CORNER * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
-    counted: npt.NDArray[np.integer] = part.triangles[~within[part.triangles].any(axis=1)]
+    counted: Integer = part.triangles[~within[part.triangles].any(axis=1)]
     return counted
 
 
-def damage(
-    before: Float64, after: Float64, triangles: npt.NDArray[np.integer], *, turning: bool
-) -> tuple[int, int, float]:
+def damage(before: Float64, after: Float64, triangles: Integer, *, turning: bool) -> tuple[int, int, float]:
     """(triangles turned over, edges torn, share of the moving area turned over)."""
     moving = (np.abs(after - before).max(axis=1) > 1e-9)[triangles].any(axis=1)
     chosen = triangles[moving]
@@ -107,7 +102,7 @@ def damage(
     return int(over.sum()), int(torn.sum()), share
 
 
-def _facing(normals: Float64, triangles: npt.NDArray[np.integer], count: int) -> Float64:
+def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
     """(F,) cosine between each triangle's normal and that of the triangles around it."""
     sums = np.zeros((count, 3))
     for corner in range(3):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Intp
 from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
 from fba.face.points import (
@@ -22,8 +22,6 @@ from fba.face.points import (
 )
 from fba.face.tables import HEAD
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
 
 SMALL = 10.0
 """A value that every face can follow."""
@@ -208,7 +206,7 @@ def _roll(poser: Poser, fap: int) -> Iterator[Finding]:
             )
 
 
-def _eye_vertices(poser: Poser, side: str) -> npt.NDArray[np.intp]:
+def _eye_vertices(poser: Poser, side: str) -> Intp:
     found = [np.zeros(0, dtype=np.intp)]
     for name in poser.eyes[side].parts:
         start = poser.model.starts[name]

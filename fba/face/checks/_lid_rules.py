@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
-
-Float64 = npt.NDArray[np.float64]
 
 SIDES = {"left": (19, 21), "right": (20, 22)}
 """FAPs of the upper and the lower lid."""

@@ -14,12 +14,10 @@ from importlib.resources import files
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.checks._findings import Finding
 from fba.face.feature_points import MIRRORED, row_of
-
-Float64 = npt.NDArray[np.float64]
 
 AXES = {"x": 0, "y": 1, "z": 2}
 _DIRECTIONS = {"x": ("left of", "right of"), "y": ("above", "below"), "z": ("before", "behind")}

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
 from fba.face.points import OPEN_JAW
-
-Float64 = npt.NDArray[np.float64]
 
 PAIRS = ((4, 5), (8, 10), (9, 11))
 """Inner lip FAPs one above the other."""

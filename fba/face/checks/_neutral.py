@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.checks._findings import Finding
 from fba.face.checks._locations import check_locations
 from fba.face.checks._sizes import check_sizes
@@ -25,7 +25,6 @@ from fba.face.feature_points import MIRRORED, row_of
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
 
-Float64 = npt.NDArray[np.float64]
 Limits = tuple[float, float]
 """Above the first a deviation is a warning, above the second an error."""
 

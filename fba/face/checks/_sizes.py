@@ -13,8 +13,8 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.checks._findings import Finding
 from fba.face.checks._locations import AXES
 from fba.face.feature_points import row_of
@@ -51,7 +51,7 @@ def human_sizes() -> tuple[Size, ...]:
         )
 
 
-def check_sizes(points: npt.NDArray[np.float64]) -> Iterator[Finding]:
+def check_sizes(points: Float64) -> Iterator[Finding]:
     """Sizes outside the limits, for feature points (84, 3) in metres; unknown ones are not checked."""
     for size in human_sizes():
         ends = points[[row_of()[size.first], row_of()[size.second]], AXES[size.axis]]

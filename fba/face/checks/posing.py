@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float64, Intp
 from fba.face.authoring.regions.eyes import Eye, eyes
 from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
 from fba.face.authoring.surface.surface import Surface
@@ -15,9 +16,6 @@ from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
 
 KIND_ORDER = ("scale", "rotation", "translation")
 """In which order the transforms of a part act, as in a Transform node."""
@@ -79,11 +77,11 @@ class Poser:
         return place
 
     @cached_property
-    def _surface(self) -> tuple[Surface, Int]:
+    def _surface(self) -> tuple[Surface, Intp]:
         return surface_of(self.model.parts, self.model.points, self.model.bound)
 
     @property
-    def pool(self) -> Int:
+    def pool(self) -> Intp:
         """Vertices of skin and inner mouth, counted through all parts."""
         return self._surface[1]
 

@@ -6,19 +6,14 @@ triangles of the parts that changed, and each part is then turned and placed tog
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Float32, Float64, Int64
 from fba.compiled import compiled
 from fba.face.deform.flat_tables import Shifts, Transforms
 from fba.face.deform.normals import Surface
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-Floats = npt.NDArray[Any]
 
 SHORTEST = np.float32(1e-30)
 """Squared length of a sum of normals below which it has no direction."""
@@ -27,7 +22,7 @@ ZERO, ONE = np.float32(0), np.float32(1)
 
 
 @compiled
-def copy(source: Floats, target: Floats) -> None:
+def copy(source: Array, target: Array) -> None:
     """Faster than `target[:] = source`, which counts in rows and columns; and sooner compiled: that has words
     for shapes that do not fit."""
     flat, place = source.reshape(-1), target.reshape(-1)
@@ -36,7 +31,7 @@ def copy(source: Floats, target: Floats) -> None:
 
 
 @compiled
-def add_shifts(values: Float64, shifts: Shifts, moved: Floats, touched: Int64) -> None:
+def add_shifts(values: Float64, shifts: Shifts, moved: Array, touched: Int64) -> None:
     """Add to `moved` (V, 3) what the FAPs (68,) do; touched[part] becomes 1 where they do something."""
     for track in range(len(shifts.column)):
         value = values[shifts.column[track]]
@@ -197,7 +192,7 @@ def place_normals(
 
 
 @compiled
-def place(pose: Floats, moved: Floats, out: Floats) -> None:
+def place(pose: Array, moved: Array, out: Array) -> None:
     """out (N, 3) = pose (3, 4) applied to moved (N, 3)."""
     xx, xy, xz, x0 = pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3]
     yx, yy, yz, y0 = pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3]

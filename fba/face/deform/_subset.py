@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Floating, Int64, Intp
 from fba.face.deform.flat_tables import Shifts, Transforms, chosen_shifts
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-Rows = npt.NDArray[np.intp]
 
 
 class ChosenVertices:
@@ -20,7 +15,7 @@ class ChosenVertices:
     """
 
     def __init__(
-        self, vertices: Float32, part_start: Int64, shifts: Shifts, transforms: Transforms, rows: Rows
+        self, vertices: Float32, part_start: Int64, shifts: Shifts, transforms: Transforms, rows: Intp
     ) -> None:
         from fba.face.deform import _subset_loops as subset_loops
         from fba.face.deform._loops import Scratch
@@ -41,7 +36,7 @@ class ChosenVertices:
             turn=np.empty((3, 3), dtype=np.float32),
         )
 
-    def local(self, faps: npt.NDArray[np.floating], out: Float32) -> None:
+    def local(self, faps: Floating, out: Float32) -> None:
         """Writes their places for FAPs (68,) into their rows of out, float32 (V, 3), and leaves the others:
         what `Deformer.local` gives there, number for number."""
         with np.errstate(all="ignore"):

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int64
 from fba.compiled import compiled
 from fba.face.deform._loops import Scratch, add_shifts, cofactors, compose, copy, place
 from fba.face.deform.flat_tables import Shifts, Transforms
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 
 @compiled

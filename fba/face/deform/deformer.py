@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int64, Intp
 from fba.errors import RangeError
 from fba.face.deform._subset import ChosenVertices
 from fba.face.deform.flat_tables import (
@@ -26,10 +27,6 @@ from fba.face.feature_points import names
 from fba.face.model import FaceModel
 from fba.mesh.meshes import result_array
 from fba.parameters import FAP_COUNT, faps
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 BLOCK = 64
 """Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
@@ -120,7 +117,7 @@ class Deformer:
         """Like calling, but in the frame of the head: the transforms of `HEAD` left out."""
         return self._run(faps, out, normals, with_head=False)
 
-    def chosen(self, rows: npt.NDArray[np.intp]) -> ChosenVertices:
+    def chosen(self, rows: Intp) -> ChosenVertices:
         """Some vertices of the face, rows (N,), rising: moved alone, in a fraction of the time."""
         return ChosenVertices(
             self.model.vertices, self._part_start, self._shifts, self._transforms, np.asarray(rows)

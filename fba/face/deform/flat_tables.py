@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Bool, Float64, Int64, Intp, UInt32
 from fba.errors import ModelError
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD, FaceDefMesh
@@ -27,46 +27,46 @@ class Shifts(NamedTuple):
     by `bases` from row base[s] on: where they are when the value is anchor[s], the border nearer to 0.
     """
 
-    column: npt.NDArray[np.int64]
+    column: Int64
     """(M,) FAP - 1."""
-    part: npt.NDArray[np.int64]
+    part: Int64
     """(M,) the part that moves."""
-    first: npt.NDArray[np.int64]
+    first: Int64
     """(M + 1,) first interval."""
-    upper: npt.NDArray[np.float64]
+    upper: Float64
     """(S,) value at the interval's upper end; the last one of a track is infinite."""
-    anchor: npt.NDArray[np.float64]
+    anchor: Float64
     """(S,) value at the end that is nearer to 0."""
-    start: npt.NDArray[np.int64]
+    start: Int64
     """(S + 1,) first row."""
-    base: npt.NDArray[np.int64]
+    base: Int64
     """(S,) first row in `bases`, -1 for none."""
-    rows: npt.NDArray[np.uint32]
+    rows: UInt32
     """(N,) vertices of the whole face, rising within an interval. Unsigned: no check for negative ones."""
-    slopes: npt.NDArray[Any]
+    slopes: Array
     """(N, 3) metres per step."""
-    bases: npt.NDArray[Any]
+    bases: Array
     """(B, 3) metres."""
-    amount: npt.NDArray[Any]
+    amount: Array
     """(1,) scratch: brings a value to the tables' own precision."""
 
 
 class Transforms(NamedTuple):
     """All FaceDefTransform of a face, those of a part together, outermost first; the head's come last."""
 
-    start: npt.NDArray[np.int64]
+    start: Int64
     """(P + 2,) first transform of each part, then of the head."""
-    column: npt.NDArray[np.int64]
+    column: Int64
     """(K,) FAP - 1."""
-    kind: npt.NDArray[np.int64]
+    kind: Int64
     """(K,) place in `KIND_ORDER`."""
-    amount: npt.NDArray[np.float64]
+    amount: Float64
     """(K, 3) for one step: metres, radians about each axis, or growth."""
-    centre: npt.NDArray[np.float64]
+    centre: Float64
     """(K, 3) metres."""
 
 
-Members = list[tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]]
+Members = list[tuple[Intp, Intp]]
 """For each part: the vertices of interest, in the part's own count, and the rows that they are moved in."""
 
 
@@ -145,7 +145,7 @@ def _most_rows(model: FaceModel, members: Members, number: dict[str, int]) -> in
     return most
 
 
-def chosen_shifts(shifts: Shifts, rows: npt.NDArray[np.intp], count: int) -> Shifts:
+def chosen_shifts(shifts: Shifts, rows: Intp, count: int) -> Shifts:
     """What they do to some of all `count` vertices, rows (N,), rising; numbered 0 to N - 1."""
     place = np.full(count, -1, dtype=np.int64)
     place[rows] = np.arange(len(rows))
@@ -167,12 +167,10 @@ def chosen_shifts(shifts: Shifts, rows: npt.NDArray[np.intp], count: int) -> Shi
     )
 
 
-_Interval = tuple[float, float, npt.NDArray[np.intp], npt.NDArray[np.float64], npt.NDArray[np.float64]]
+_Interval = tuple[float, float, Intp, Float64, Float64]
 
 
-def _intervals(
-    mesh: FaceDefMesh, own: npt.NDArray[np.intp], rows: npt.NDArray[np.intp], size: int, unit: float
-) -> list[_Interval]:
+def _intervals(mesh: FaceDefMesh, own: Intp, rows: Intp, size: int, unit: float) -> list[_Interval]:
     """(upper end, anchor, rows, metres per step, metres at the anchor) of each interval."""
     place = np.full(size, -1)
     place[mesh.vertices] = np.arange(len(mesh.vertices))
@@ -196,16 +194,16 @@ def _intervals(
     return cuts
 
 
-def _moves(shifts: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+def _moves(shifts: Float64) -> Bool:
     """(N,) whether any of three components is not 0; any(axis=1) takes several times as long."""
     nonzero = shifts != 0
-    moves: npt.NDArray[np.bool_] = nonzero[:, 0] | nonzero[:, 1] | nonzero[:, 2]
+    moves: Bool = nonzero[:, 0] | nonzero[:, 1] | nonzero[:, 2]
     return moves
 
 
 def _check(
-    per_step: npt.NDArray[np.float64],
-    at_anchor: npt.NDArray[np.float64],
+    per_step: Float64,
+    at_anchor: Float64,
     dtype: type[np.floating[Any]],
     where: str,
 ) -> None:

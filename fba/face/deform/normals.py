@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64, Int32, Int64, Intp, UInt32
 from fba.face.model import FaceModel
 from fba.parameters import faps
 
@@ -30,28 +30,28 @@ class Surface(NamedTuple):
     corners of triangles that belong to such. Part p's triangles lie from triangles_start[p] on.
     """
 
-    triangles: npt.NDArray[np.uint32]
+    triangles: UInt32
     """(F, 3) vertices."""
-    corners: npt.NDArray[np.uint32]
+    corners: UInt32
     """(F, 3) the sums that they add to."""
-    triangles_start: npt.NDArray[np.int64]
+    triangles_start: Int64
     """(P + 1,)"""
-    changing_start: npt.NDArray[np.int64]
+    changing_start: Int64
     """(P + 1,)"""
-    still_start: npt.NDArray[np.int64]
+    still_start: Int64
     """(P + 1,)"""
-    sum_of: npt.NDArray[np.uint32]
+    sum_of: UInt32
     """(V,) the sum that a vertex takes its normal from."""
-    neutral: npt.NDArray[np.float32]
+    neutral: Float32
     """(3, C + 1) unit normals of the neutral face. Coordinates apart, as in the next two: a loop over
     them takes eight at a time."""
-    sums: npt.NDArray[np.float32]
+    sums: Float32
     """(3, C + 1) scratch."""
-    units: npt.NDArray[np.float32]
+    units: Float32
     """(3, C + 1) scratch: turned, and made unit vectors."""
 
 
-def surface(model: FaceModel, moved: npt.NDArray[np.bool_]) -> Surface:
+def surface(model: FaceModel, moved: Bool) -> Surface:
     """moved: (V,), the vertices that some FaceDefMesh moves."""
     group = _seams(model)
     triangles = model.triangles
@@ -92,11 +92,11 @@ def surface(model: FaceModel, moved: npt.NDArray[np.bool_]) -> Surface:
 
 
 def _sums(
-    vertices: npt.NDArray[np.float64],
-    triangles: npt.NDArray[np.int32],
-    corners: npt.NDArray[np.int64],
+    vertices: Float64,
+    triangles: Int32,
+    corners: Int64,
     count: int,
-) -> npt.NDArray[np.float64]:
+) -> Float64:
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     across = np.cross(b - a, c - a)
     summed = np.empty((count, 3))
@@ -105,7 +105,7 @@ def _sums(
     return summed
 
 
-def _seams(model: FaceModel) -> npt.NDArray[np.int64]:
+def _seams(model: FaceModel) -> Int64:
     """(V,): a number for each vertex, the same for those that are one point of one smooth surface."""
     part = np.repeat(np.arange(len(model.parts)), [len(p.vertices) for p in model.parts])
     vertices = model.vertices + np.float32(0)  # -0 is 0
@@ -137,7 +137,7 @@ class _Alike:
         self._normals = model.normals
         self._probes = [_probe(model, sign) for sign in (1.0, -1.0)]
 
-    def __call__(self, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+    def __call__(self, one: Intp, other: Intp) -> Bool:
         normals = self._normals
         agree = np.einsum("ij,ij->i", normals[one], normals[other]) > SEAM_COSINE
         for probe in self._probes:
@@ -146,7 +146,7 @@ class _Alike:
         return np.asarray(agree | (one == other))
 
 
-def _probe(model: FaceModel, sign: float) -> npt.NDArray[np.float64]:
+def _probe(model: FaceModel, sign: float) -> Float64:
     """(V, 3) how the vertices move when all FAPs have some value, no two the same."""
     moved = np.zeros(model.vertices.shape)
     for table in model.tables:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES
 from fba.face.feature_points import names
@@ -98,7 +98,7 @@ def _transform(transform: FaceDefTransform, place: dict[str, int]) -> dict[str, 
     }
 
 
-def _definitions(table: npt.NDArray[np.float32], words: tuple[str, ...]) -> list[dict[str, Any]]:
+def _definitions(table: Float32, words: tuple[str, ...]) -> list[dict[str, Any]]:
     """FAPs of select 1, 2, ...; those at 0 are left out."""
     return [
         {"name": word, "faps": {_fap(int(n) + 1): float(row[n]) for n in np.flatnonzero(row)}}

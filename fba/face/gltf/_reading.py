@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from fba.arrays import Float32, Float64, Int32
 from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.feature_points import names, row_of
 from fba.face.gltf._extension import NAME, VERSION
 from fba.face.gltf._tables import read_tables
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.model import PART_KINDS, FaceModel, Float32, Float64, Int32, Part
+from fba.face.model import PART_KINDS, FaceModel, Part
 from fba.gltf.document import Document
 from fba.gltf.part_materials import material_of
 from fba.gltf.reader import read_document

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba.arrays import Float32, Int32
 from fba.errors import ModelError
 from fba.face.model import Part
-from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform, Float32, Int32
+from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.gltf.document import Document
 from fba.gltf.packed import unpack
 from fba.gltf.values import Value

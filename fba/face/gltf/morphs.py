@@ -13,14 +13,12 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel
 from fba.parameters import FAP_COUNT, fap_numbers, faps
-
-Float32 = npt.NDArray[np.float32]
 
 
 @cache

@@ -6,7 +6,6 @@ import os
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.errors import ModelError
 from fba.face.gltf._extension import NAME, extension
@@ -19,8 +18,6 @@ from fba.gltf.part_materials import Looks
 from fba.gltf.writer import Builder
 from fba.parameters import faps
 from fba.source import Path
-
-Float32 = npt.NDArray[np.float32]
 
 
 def load(path: Path) -> FaceModel:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names
 from fba.face.importers.assembly.model import finished, turned
@@ -16,8 +16,6 @@ from fba.face.importers.assembly.pieces import Piece, assembled
 from fba.face.importers.points.points_file import GivenPoints, given_points
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.text_files import MAX_VERTICES
-
-Float64 = npt.NDArray[np.float64]
 
 EXTENSION = "FBA_face"
 POINT_FILES = (".points.csv", ".points.json", ".fdp")
@@ -117,7 +115,7 @@ def _free(name: str, taken: set[str]) -> str:
     return chosen
 
 
-def _glossy(colours: npt.NDArray[np.float32], material: Material) -> npt.NDArray[np.float32]:
+def _glossy(colours: Float32, material: Material) -> Float32:
     """Vertex colours times the material's; the fourth, opacity in glTF, is gloss here."""
     result = colours.copy()
     result[:, :3] *= np.array(material.colour, dtype=np.float32)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError, Remedy
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import finished
@@ -24,8 +24,6 @@ from fba.mesh.ply import read_ply
 from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import lines
 from fba.mesh.wfm import read_wfm
-
-Float64 = npt.NDArray[np.float64]
 
 READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
     "obj": read_obj,

@@ -8,13 +8,10 @@ from functools import partial, reduce
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int16, Intp
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.interpolation.terms import HIGH_LEVEL_NUMBERS, Function, Term
 from fba.parameters import INTENSITY_MAX, fap_numbers, faps
-
-Bool = npt.NDArray[np.bool_]
-Int16 = npt.NDArray[np.int16]
-Float64 = npt.NDArray[np.float64]
 
 VALUE_MAX = float(2**31 - 1)
 """A result beyond this is no FAP value: FAPs are 32-bit integers."""
@@ -42,7 +39,7 @@ def evaluate(
         for place, name in enumerate(HIGH_LEVEL_NUMBERS[high])
     }
 
-    def number(rows: npt.NDArray[np.intp] | slice, name: str) -> Float64:
+    def number(rows: Intp | slice, name: str) -> Float64:
         column: Float64 = fields[name] if name in fields else given[:, fap_numbers()[name] - 1]
         return column[rows]
 

@@ -14,9 +14,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError
@@ -217,11 +217,11 @@ def _motion_header(lines: list[str], at: int, path: str | Path | None) -> tuple[
 
 def _numbers(
     lines: list[str], first: int, channels: int, claimed: int | None, path: str | Path | None
-) -> npt.NDArray[np.float64]:
+) -> Float64:
     """float64 (T, channels). Only what is there is read: the claimed count allocates nothing."""
     if not channels:
         raise FormatError("no joint has channels, so nothing can move", path=path)
-    read: list[npt.NDArray[np.float64]] = []
+    read: list[Float64] = []
     at: list[int] = []  # the line of each row, and how many numbers it has
     counts: list[int] = []
     batch: list[str] = []
@@ -281,9 +281,7 @@ def _numbers(
     return values.reshape(frames, channels)
 
 
-def _floats(
-    batch: list[str], lines: list[str], at: list[int], path: str | Path | None
-) -> npt.NDArray[np.float64]:
+def _floats(batch: list[str], lines: list[str], at: list[int], path: str | Path | None) -> Float64:
     """Numbers of the last rows; FormatError with the line of a word that is none."""
     try:
         return np.array([float(word) for word in batch], dtype=np.float64)
@@ -327,7 +325,7 @@ def _rate(frame_time: str) -> Fraction:
 
 
 def _motion(
-    tree: _Hierarchy, numbers: npt.NDArray[np.float64], rate: Fraction, name: str, path: str | Path | None
+    tree: _Hierarchy, numbers: Float64, rate: Fraction, name: str, path: str | Path | None
 ) -> SkeletonMotion:
     from fba import rotations
 

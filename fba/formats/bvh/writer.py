@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Bool, Float64, Int32, Int64
 from fba.atomic import atomic
 from fba.errors import FormatError, OptionError, Remedy
 from fba.formats.body_frames import shown_baps
@@ -82,12 +82,12 @@ def write(
             file.write("".join([row % tuple(frame) for frame in numbers.tolist()]).encode())
 
 
-def _kept(solver: BapSolver, values: npt.NDArray[np.int32], moving: bool) -> list[int]:
+def _kept(solver: BapSolver, values: Int32, moving: bool) -> list[int]:
     """Numbers of the joints to write, parents first."""
     names = solver.skeleton.names
     if not moving:
         return list(range(len(names)))
-    moved: npt.NDArray[np.bool_] = np.asarray(values.any(axis=0))
+    moved: Bool = np.asarray(values.any(axis=0))
     return [
         number
         for number, name in enumerate(names)
@@ -95,9 +95,7 @@ def _kept(solver: BapSolver, values: npt.NDArray[np.int32], moving: bool) -> lis
     ]
 
 
-def _hierarchy(
-    solver: BapSolver, kept: list[int], unit: float
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64], npt.NDArray[np.float64], str]:
+def _hierarchy(solver: BapSolver, kept: list[int], unit: float) -> tuple[Int64, Float64, Float64, str]:
     """For every channel the BAP column (-1 for none), the factor and what is added; and the text."""
     skeleton, rules = solver.skeleton, solver.convention
     parents, place = _parents(skeleton, kept), {number: row for row, number in enumerate(kept)}
@@ -165,5 +163,5 @@ def _turns(solver: BapSolver, name: str) -> tuple[list[int], list[int], list[flo
     return rules.bap[row].tolist(), rules.axis[row].tolist(), rules.sign[row].tolist()
 
 
-def _three(vector: npt.NDArray[np.float64]) -> str:
+def _three(vector: Float64) -> str:
     return " ".join(f"{float(v) + 0.0:.{DIGITS}g}" for v in np.where(np.abs(vector) < 1e-9, 0.0, vector))

@@ -14,17 +14,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fba.arrays import Bool, UInt8
 from fba.codec.settings import (
     QUANT_MAX,
     RANGE_CODE_MAX,
     RANGE_UNIT,
-    Bool,
     FrameRate,
     PartSettings,
     PlaneSettings,
     RangeLists,
     TimeCode,
-    UInt8,
 )
 from fba.errors import FbaWarning
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.deform.flat_tables import KIND_ORDER, flat_transforms
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
 from fba.gltf.values import Value
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
-Float64 = npt.NDArray[np.float64]
 Steps = tuple[tuple[int, Float64], ...]
 
 SQUARE = 1e-6

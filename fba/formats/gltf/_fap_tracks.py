@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import FaceTrack
+from fba.arrays import Bool, Float32, Float64
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel
 from fba.face.resolve import resolve
@@ -25,10 +25,6 @@ from fba.gltf import Gltf
 from fba.gltf.values import Value
 from fba.gltf.writer import Builder
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 CLOSE = 0.25
 """Steps by which a FAP, told by motion, may miss the one shown, to be rounded to the same."""

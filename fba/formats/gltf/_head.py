@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Float32, Float64
 from fba.body.head_attachment import HeadOnBody
 from fba.body.model import BodyModel
 from fba.face.deform.deformer import Deformer
@@ -19,10 +19,6 @@ from fba.formats.gltf._morph_targets import Targets, targets
 from fba.formats.gltf._pose import nearest_rotation
 from fba.gltf.part_materials import Looks
 from fba.gltf.writer import Builder
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 HEAD_NODE = "head"
 """The joint that FAPs 48 to 50 turn; what BAPs turn is the skull base that it hangs on."""
@@ -163,7 +159,7 @@ class HeadParts:
             return None
         return replace(part, vertices=places.astype(np.float32), triangles=triangles)
 
-    def _weights(self, part: Part, rows: slice, slots: dict[str, int]) -> tuple[npt.NDArray[Any], Float32]:
+    def _weights(self, part: Part, rows: slice, slots: dict[str, int]) -> tuple[Array, Float32]:
         assert self.on is not None
         joints, weights = self.on.joints[rows].copy(), self.on.weights[rows].copy()
         if part.name in slots:

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int64
 from fba.errors import FormatError
 from fba.formats.gltf._pose import quaternions
 from fba.gltf.writer import Builder
 from fba.source import Path
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 STILL = 1e-7
 """Numbers that change by no more do not move: less than 32-bit floats tell."""
@@ -76,7 +73,7 @@ def smooth(turned: Float64) -> Float64:
     return result
 
 
-def nest(builder: Builder, names: tuple[str, ...], parents: npt.NDArray[np.int64]) -> list[int]:
+def nest(builder: Builder, names: tuple[str, ...], parents: Int64) -> list[int]:
     """Nodes of joints, children under their parents; their numbers."""
     nodes = [builder.add("nodes", {"name": name}) for name in names]
     for joint, parent in enumerate(parents.tolist()):

@@ -7,16 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.face.deform.deformer import Deformer
 from fba.face.gltf.morphs import morph_values
 from fba.face.model import FaceModel
 from fba.face.tables import FaceDefTables
 from fba.parameters import FAP_COUNT, faps
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 TOLERANCE = 1e-4
 """Metres by which a target may miss a vertex's path between two of its values, for a face of natural size."""

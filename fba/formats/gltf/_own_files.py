@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation, BodyTrack
+from fba.arrays import Float64
 from fba.body import BapSolver, Skeleton, wrapped
 from fba.body.solve.conventions import convention_names
 from fba.errors import FormatError
@@ -23,8 +23,6 @@ from fba.gltf import Animation as Clip
 from fba.gltf import Channel, Gltf
 from fba.gltf.values import Value, optional
 from fba.parameters import BAP_COUNT, baps
-
-Float64 = npt.NDArray[np.float64]
 
 VERSION = 1
 MOST_INDEX = 1 << 62

@@ -7,13 +7,11 @@ from contextlib import suppress
 from itertools import permutations, product
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
+from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.gltf import Channel, Gltf
-
-Float = npt.NDArray[np.float64]
 
 ALIKE = 0.05
 """Radians within which joints agree on how the bind pose stands in the scene."""
@@ -26,7 +24,7 @@ class BindPose:
     """
 
     def __init__(self, gltf: Gltf, nodes: Sequence[int], parents: Sequence[int]) -> None:
-        inverse: dict[int, Float] = {}
+        inverse: dict[int, Float64] = {}
         for skin in gltf.skins:
             for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
                 if joint in set(nodes):
@@ -55,7 +53,7 @@ class BindPose:
                 self._turns[number] = self._turns[parent] @ nearest_rotation(local[:3, :3])
                 self.places[number] = self.places[parent] + scale * (self._turns[parent] @ local[:3, 3])
 
-    def offsets(self) -> Float:
+    def offsets(self) -> Float64:
         """float64 (J, 3): from the parent in the bind pose; the root's own place."""
         result = self.places.copy()
         for number, parent in enumerate(self._parents):
@@ -63,7 +61,7 @@ class BindPose:
                 result[number] -= self.places[parent]
         return result
 
-    def turned(self, number: int, linear: Float) -> Float:
+    def turned(self, number: int, linear: Float64) -> Float64:
         """Quaternions (T, 4), w first: how far a joint is turned from the bind pose, from its (T, 3, 3)."""
         return quaternions(nearest_rotation(linear) @ self._turns[number].T)
 
@@ -71,18 +69,18 @@ class BindPose:
 class Sampler:
     """Local transforms of nodes at given times (T,), seconds."""
 
-    def __init__(self, gltf: Gltf, channels: Sequence[Channel], times: Float) -> None:
+    def __init__(self, gltf: Gltf, channels: Sequence[Channel], times: Float64) -> None:
         self._gltf, self._times = gltf, times
         self._channels = {(channel.node, channel.path): channel for channel in channels}
 
-    def translation(self, node: int) -> Float:
+    def translation(self, node: int) -> Float64:
         """float64 (T, 3)."""
         channel = self._channels.get((node, "translation"))
         if channel is not None:
             return sample(channel, self._times)
         return np.broadcast_to(self._gltf.nodes[node].local[:3, 3], (len(self._times), 3))
 
-    def linear(self, node: int) -> Float:
+    def linear(self, node: int) -> Float64:
         """float64 (T, 3, 3): rotation times scale."""
         own = self._gltf.nodes[node]
         turn, scale = (self._channels.get((node, path)) for path in ("rotation", "scale"))
@@ -98,11 +96,11 @@ class Sampler:
         else:
             matrices = rotations.matrices(np.roll(sample(turn, self._times), 1, axis=-1))
         sizes = lengths if scale is None else sample(scale, self._times)[:, None, :]
-        result: Float = matrices * sizes
+        result: Float64 = matrices * sizes
         return result
 
 
-def key_times(channels: Sequence[Channel]) -> Float:
+def key_times(channels: Sequence[Channel]) -> Float64:
     """All times of keys, rising. ModelError where there are none."""
     times = [np.asarray(channel.times, dtype=np.float64) for channel in channels if len(channel.times)]
     if not times:
@@ -110,7 +108,7 @@ def key_times(channels: Sequence[Channel]) -> Float:
     return np.unique(np.concatenate(times))
 
 
-def sample(channel: Channel, times: Float) -> Float:
+def sample(channel: Channel, times: Float64) -> Float64:
     """Values (T, width) of a channel at times (T,); before the first key and after the last they stand
     still."""
     keys = np.asarray(channel.times, dtype=np.float64)
@@ -139,18 +137,18 @@ def sample(channel: Channel, times: Float) -> Float:
     return _unit(result) if turns else result
 
 
-def nearest_rotation(matrices: Float) -> Float:
+def nearest_rotation(matrices: Float64) -> Float64:
     """The rotations (..., 3, 3) closest to matrices that also scale; ModelError where they flatten."""
     u, s, v = np.linalg.svd(matrices)
     if (s[..., -1] <= 1e-9 * np.maximum(s[..., 0], 1e-300)).any():
         raise ModelError("a joint is scaled to nothing; its rotation is unknown")
     sign = np.sign(np.linalg.det(u @ v))
     u[..., :, -1] *= sign[..., None]
-    result: Float = u @ v
+    result: Float64 = u @ v
     return result
 
 
-def quaternions(matrices: Float) -> Float:
+def quaternions(matrices: Float64) -> Float64:
     """Unit quaternions (..., 4), w first, of rotations (..., 3, 3)."""
     m = matrices
     trace = np.trace(m, axis1=-2, axis2=-1)
@@ -181,15 +179,15 @@ def quaternions(matrices: Float) -> Float:
     return _unit(result)
 
 
-def _unit(values: Float) -> Float:
+def _unit(values: Float64) -> Float64:
     length = np.linalg.norm(values, axis=-1, keepdims=True)
     if (length < 1e-6).any():
         raise ModelError("an animation has a rotation that is no rotation: a quaternion of length 0")
-    result: Float = values / length
+    result: Float64 = values / length
     return result
 
 
-def _inverted(gltf: Gltf, joint: int, matrix: Float) -> Float:
+def _inverted(gltf: Gltf, joint: int, matrix: Float64) -> Float64:
     result = np.full((4, 4), np.nan)
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
         result[:] = np.linalg.inv(matrix)
@@ -198,7 +196,7 @@ def _inverted(gltf: Gltf, joint: int, matrix: Float) -> Float:
     return result
 
 
-def _to_scene(gltf: Gltf, bound: dict[int, Float]) -> tuple[Float, float]:
+def _to_scene(gltf: Gltf, bound: dict[int, Float64]) -> tuple[Float64, float]:
     """Rotation and scale from the frame in which the skin was bound to the scene's.
 
     Where the nodes stand in the bind pose, they say it exactly. Where they stand otherwise, it is taken for
@@ -221,7 +219,7 @@ def _to_scene(gltf: Gltf, bound: dict[int, Float]) -> tuple[Float, float]:
     return best, size
 
 
-def _axis_turns() -> list[Float]:
+def _axis_turns() -> list[Float64]:
     result = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
 from fba import rotations
 from fba.animation import Animation
+from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton, matching
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
@@ -23,8 +23,6 @@ from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
 from fba.source import Path
-
-Float = npt.NDArray[np.float64]
 
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
@@ -116,7 +114,7 @@ def motion_of(
     # every node of the skeleton in the scene's frame, over time
     turned = np.zeros((count, len(nodes), 4))
     places = np.zeros((count, len(nodes), 3))
-    linear: list[Float] = []
+    linear: list[Float64] = []
     for number, node in enumerate(nodes):
         local = sampler.linear(node)
         parent = parents[number]
@@ -233,7 +231,7 @@ def _clip(gltf: Gltf, clip: str | int | None, nodes: set[int]) -> Clip:
     return found
 
 
-def _rate(times: Float) -> Fraction:
+def _rate(times: Float64) -> Fraction:
     """Frames a second of regular keys: the usual rate that fits most of their distances."""
     steps = np.diff(times)
     steps = steps[steps > 1e-4]
@@ -247,7 +245,7 @@ def _rate(times: Float) -> Fraction:
     return DEFAULT_RATE
 
 
-def _say_stretched(motion: SkeletonMotion, places: Float) -> None:
+def _say_stretched(motion: SkeletonMotion, places: Float64) -> None:
     """Joints that move against their parents are held where they are in the bind pose."""
     size = float(np.ptp(motion.rest(), axis=0).max()) or 1.0
     kept = motion.world()[1]

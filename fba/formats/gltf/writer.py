@@ -12,9 +12,9 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning, FormatError
 from fba.formats.body_frames import held_baps
 from fba.formats.gltf._joints import Clip, move, nest
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
     from fba.formats.gltf._head import HeadParts
 
-Float64 = npt.NDArray[np.float64]
 
 MOST_FRAMES = 100_000
 """Near an hour at 30 frames/s; a frame of a body takes up to 1.4 kB."""
@@ -210,7 +209,7 @@ def _note_face(
         note["face"] = face_note(builder, animation.face, shown, face, head.targets, head.fap_joints)
 
 
-def _shown(animation: Animation, model: FaceModel) -> npt.NDArray[np.float32]:
+def _shown(animation: Animation, model: FaceModel) -> Float32:
     from fba.face.resolve import resolve
     from fba.parameters import FAP_COUNT
 
@@ -219,7 +218,7 @@ def _shown(animation: Animation, model: FaceModel) -> npt.NDArray[np.float32]:
     return resolve(animation.face, model)
 
 
-def _local(solver: BapSolver, baps: npt.NDArray[np.int32]) -> tuple[Float64, Float64]:
+def _local(solver: BapSolver, baps: Int32) -> tuple[Float64, Float64]:
     """(J, T, 3, 3) turns of the joints relative to their parents, (T, 3) places of the root."""
     count, parents = len(solver.skeleton), solver.skeleton.parents
     turns = np.empty((count, len(baps), 3, 3))

@@ -12,11 +12,12 @@ from fractions import Fraction
 
 import numpy as np
 
+from fba.arrays import Bool, Int32, Int64
 from fba.errors import FbaWarning, FormatError, Remedy
 from fba.formats.text._layout import Layout
 from fba.formats.text.frame_rates import parse_rate
 from fba.formats.text.lines import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
-from fba.formats.text.values import Bool, Int32, Int64, Row, ValueParser
+from fba.formats.text.values import Row, ValueParser
 from fba.source import Path, open_source
 
 BATCH_LINES = 2048

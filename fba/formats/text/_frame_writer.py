@@ -8,11 +8,12 @@ from itertools import accumulate
 import numpy as np
 
 from fba.animation import Animation
+from fba.arrays import Bool, Int32
 from fba.atomic import atomic
 from fba.errors import FormatError
 from fba.formats.text._layout import Layout
 from fba.formats.text.frame_rates import format_rate, parse_rate
-from fba.formats.text.values import FRAME_NUMBER_MAX, Bool, Int32
+from fba.formats.text.values import FRAME_NUMBER_MAX
 from fba.source import Path
 
 BATCH_FRAMES = 2048

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Intp
 from fba.parameters import (
     BAP_COUNT,
     BAP_STANDARD_COUNT,
@@ -36,10 +36,10 @@ class Layout:
     columns: int
     widths: tuple[int, ...]
     names: tuple[str, ...]
-    low: npt.NDArray[np.float64]
-    high: npt.NDArray[np.float64]
-    parameter: npt.NDArray[np.intp]
-    angle: npt.NDArray[np.bool_]
+    low: Float64
+    high: Float64
+    parameter: Intp
+    angle: Bool
 
     @property
     def slots(self) -> int:

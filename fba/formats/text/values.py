@@ -7,14 +7,9 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int32, Int64
 from fba.formats.text._layout import Layout
-
-Bool = npt.NDArray[np.bool_]
-Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
-Float = npt.NDArray[np.float64]
 
 FRAME_NUMBER_MAX = 2**31 - 1
 
@@ -51,7 +46,7 @@ class ValueParser:
         flat = _numbers(b" ".join([row.line for row in rows]))
         if flat is None or len(flat) != int(brought.sum()) or not np.isfinite(flat).all():
             return None
-        table: Float = np.zeros(brought.shape)
+        table: Float64 = np.zeros(brought.shape)
         table[brought] = flat
         index, slots = table[:, 0], table[:, 1:]
         if (np.abs(index) > FRAME_NUMBER_MAX).any() or (index != np.trunc(index)).any():
@@ -94,7 +89,7 @@ class ValueParser:
         return None
 
 
-def _numbers(text: bytes) -> Float | None:
+def _numbers(text: bytes) -> Float64 | None:
     """All numbers of a text, or None where something in it is none."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
@@ -104,7 +99,7 @@ def _numbers(text: bytes) -> Float | None:
             return None
 
 
-def _rounded(values: Float) -> Float:
+def _rounded(values: Float64) -> Float64:
     """Integers, half away from zero; infinities stay what they are."""
     whole = np.trunc(values)
     with np.errstate(invalid="ignore"):

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import UInt8
 from fba.atomic_path import PathLike, cannot, written
 from fba_player.sound.pyav import import_av
-
-UInt8 = npt.NDArray[np.uint8]
 
 SMOOTH = Fraction(25)
 """Frames a second that are enough where none are asked for; some browsers slow down above 50."""

@@ -9,9 +9,9 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Float32, Float64, UInt8
 from fba.face.model import FaceModel, point_row
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
 from fba.tracks import FaceTrack
@@ -19,10 +19,6 @@ from fba_player.export.offscreen import Offscreen
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.font import label_font, shortened
-
-UInt8 = npt.NDArray[np.uint8]
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 SHEETS = ("faps", "visemes", "expressions", "all")
 """What there are sheets of."""

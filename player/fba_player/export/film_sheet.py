@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import UInt8
 from fba.errors import RangeError
 from fba_player.export.offscreen import Offscreen
 from fba_player.export.render import as_scene, check_inside
@@ -18,7 +18,6 @@ from fba_player.view.font import label_font, shortened
 from fba_player.view.protocols import Showable
 
 Progress = Callable[[int, int], None]
-UInt8 = npt.NDArray[np.uint8]
 
 TILE = (320, 240)
 """Width and height of one picture in pixels, where none are given."""

@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import UInt8
 from fba.atomic import atomic
 from fba.atomic_path import PathLike
 from fba.errors import UnsupportedError
-
-UInt8 = npt.NDArray[np.uint8]
 
 PICTURES = (".png", ".jpg", ".jpeg")
 JPEG_QUALITY = 90

@@ -6,15 +6,11 @@ import os
 import re
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import UInt8
 from fba.atomic_path import PathLike, cannot
 from fba.errors import FormatError, Remedy, UnsupportedError
 from fba_player.export.image_files import check_picture, write_picture
 from fba_player.export.recorder import FILMS
-
-UInt8 = npt.NDArray[np.uint8]
 
 NUMBER = re.compile(r"%(0?\d{0,2})d")
 NAMES = "%05d.png"

@@ -8,15 +8,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import UInt8
 from fba.atomic_path import PathLike, cannot, written
 from fba.errors import DisplayError
 from fba_player.sound.pyav import av_version, import_av
 from fba_player.sound.soundtrack import FilmedSound, Soundtrack
-
-UInt8 = npt.NDArray[np.uint8]
 
 ENCODERS = ("libx264", "libopenh264", "h264")
 QUALITY, PRESET = "18", "veryfast"

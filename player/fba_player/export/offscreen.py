@@ -10,17 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import UInt8
 from fba.parameters import FAP_COUNT
 from fba_player.gl.context import offscreen_context
 from fba_player.gl.framebuffer import Target
-from fba_player.gl.gpu.choice import checked
 from fba_player.gl.renderer import Renderer
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 from fba_player.view.view import View
-
-UInt8 = npt.NDArray[np.uint8]
 
 SAMPLES = 0
 """Samples a pixel; 0: one, and edges smoothed afterwards."""
@@ -33,12 +31,11 @@ class Offscreen:
 
     subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a
     `Camera`, the name of a preset, or None for the one that suits the content. samples: samples a pixel
-    against jagged edges, 0 for one and a pass that smooths edges. deform: who moves the vertices of figures,
-    "cpu", "gpu", or "auto" for what the environment variable FBA_DEFORM says, else for what is faster; the
-    picture is the same. Use it as a context manager, or `close` it. One thread only.
+    against jagged edges, 0 for one and a pass that smooths edges. Use it as a context manager, or `close` it.
+    One thread only.
 
     Raises DisplayError where OpenGL is missing or cannot draw this size; the text says what to install.
-    ValueError for a size below 1, an unknown preset, or another word for deform.
+    ValueError for a size below 1 or an unknown preset.
     """
 
     def __init__(
@@ -48,9 +45,7 @@ class Offscreen:
         camera: Camera | str | None = None,
         *,
         samples: int = SAMPLES,
-        deform: str = "auto",
     ) -> None:
-        checked(deform)
         width, height = (int(v) for v in size)
         if width < 1 or height < 1:
             raise ValueError(f"a picture must have at least 1x1 pixels, not {width}x{height}")
@@ -66,7 +61,7 @@ class Offscreen:
         try:
             with self._gl:  # current only while it is used: other contexts of this thread go on working
                 self._target = Target(self._gl, self.size, samples)
-                self._renderer = Renderer(self._gl, deform)
+                self._renderer = Renderer(self._gl)
         except Exception:
             self.close()
             raise
@@ -123,14 +118,6 @@ class Offscreen:
         if view.extras is not None:
             pixels[..., 3] = 255  # extras leave a mark there for the target
         return pixels[::-1]
-
-    @property
-    def deformed(self) -> tuple[str, str]:
-        """Who moved the vertices of the last picture's figures, "cpu" or "gpu", and why."""
-        if self._renderer is None:
-            raise ValueError("this Offscreen is closed")
-        way = self._renderer.way
-        return "gpu" if way.on_gpu else "cpu", way.reason
 
     def close(self) -> None:
         """Give everything back; safe to call twice."""

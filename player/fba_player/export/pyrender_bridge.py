@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Float32, Float64, Int32
 from fba.errors import DisplayError
 from fba_player.export.offscreen import following
 from fba_player.gl.system_libraries import missing_libraries, missing_text
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     from fba.body.model import BodyModel
     from fba.face.model import FaceModel
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 NUMPY_1 = {"infty": np.inf, "Inf": np.inf, "NaN": np.nan, "float_": np.float64}
 """Names that NumPy 2 has dropped and pyrender, or trimesh below it, may ask for."""
@@ -160,7 +159,7 @@ def _placed(
     positions: Float32 | Float64,
     normals: Float32 | Float64,
     matrix: Float64,
-    triangles: npt.NDArray[np.int32],
+    triangles: Int32,
     colours: Float32,
 ) -> dict[str, Any]:
     """Attributes of a primitive, in the world."""

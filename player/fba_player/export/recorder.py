@@ -13,14 +13,12 @@ from types import TracebackType
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import UInt8
 from fba.atomic_path import PathLike
 from fba.errors import UnsupportedError
 from fba_player.sound.soundtrack import FilmedSound
 from fba_player.sound.switch_interval import PROMPT_THREADS
-
-UInt8 = npt.NDArray[np.uint8]
 
 WAITING = 6
 """Pictures that may wait for the encoder,"""

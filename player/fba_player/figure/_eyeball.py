@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Intp
 from fba.compiled import compiled
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.view.view import Eye
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 ROUND = 0.03
 """A part whose vertices are further than this from a sphere, as a share of its radius, is drawn as it is."""
@@ -37,7 +34,7 @@ class Eyeball:
     side: int
     centre: Float64
     radius: float
-    rows: npt.NDArray[np.intp]
+    rows: Intp
     neutral: Float64
     lids: tuple[int, ...]
     iris: float

@@ -1,23 +1,18 @@
-"""The loops of `fba_player.figure.face_light`: how much light reaches vertices, from what was worked out
-once."""
+"""Compiled loops of `fba_player.figure.face_light`: light at vertices from their precomputed visibility."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Intp
 from fba.compiled import compiled
-
-Float32 = npt.NDArray[np.float32]
-Rows = npt.NDArray[np.intp]
 
 
 class Table(NamedTuple):
-    """Visibility of N vertices, see `fba_player.figure.occlusion`: with the mouth shut, and of some of them,
-    near
-    (M,), wide open. Harmonics stand side by side: their columns are what goes through the processor fastest.
+    """Visibility of N vertices (see `fba_player.figure.occlusion`) with the mouth shut, and, of the M
+    vertices near it, with the mouth wide open. One row a harmonic: loops over vertices then run fastest.
     """
 
     light: Float32
@@ -32,13 +27,15 @@ class Table(NamedTuple):
     """(16, M)"""
     wide_open: Float32
     """(M,)"""
-    near: Rows
+    near: Intp
 
 
 @compiled
-def lit(table: Table, basis: Float32, share: float, more: float, found: Float32) -> None:
-    """found (N, 4): key light, sky, through, rim light. basis (2, 16): what weighs the harmonics for key and
-    rim light. share: how far the mouth is wide open. more: what share of the light that is missing falls in.
+def light_vertices(table: Table, basis: Float32, share: float, more: float, found: Float32) -> None:
+    """Write found (N, 4): key light, sky, through, rim light.
+
+    basis: (2, 16), weights of the harmonics for key and rim light. share: how far the mouth is wide open.
+    more: the share of the missing light that is added.
     """
     count = len(table.open)
     share, more = np.float32(share), np.float32(more)  # type: ignore[assignment]
@@ -60,8 +57,9 @@ def lit(table: Table, basis: Float32, share: float, more: float, found: Float32)
 
 
 @compiled
-def sway(found: Float32, still: Float32, rows: Rows, share: Float32) -> None:
-    """Rows of found (N, 4), which go with the head by a share, drawn towards those that stand still."""
+def blend_swaying(found: Float32, still: Float32, rows: Intp, share: Float32) -> None:
+    """Blend rows of found (N, 4) with `still` (M, 4), the same vertices standing still. share: (M,), how far
+    each goes with the head."""
     for k in range(len(rows)):
         for column in range(4):
             found[rows[k], column] = still[k, column] + share[k] * (found[rows[k], column] - still[k, column])
@@ -71,10 +69,10 @@ def sway(found: Float32, still: Float32, rows: Rows, share: Float32) -> None:
 def _products(
     light: Float32, through: Float32, basis: Float32, count: int
 ) -> tuple[Float32, Float32, Float32]:
-    """Key light, rim light and what comes through of it, each (count,)."""
+    """Key light, rim light, and rim light through the skin, each (count,)."""
     key = np.zeros(count, dtype=np.float32)
     rim, back = np.zeros_like(key), np.zeros_like(key)
-    for k in range(0, basis.shape[1], 4):  # several at a time: sums are read and written less often
+    for k in range(0, basis.shape[1], 4):  # four at a time: the sums are read and written less often
         a, b, c, d = basis[0, k], basis[0, k + 1], basis[0, k + 2], basis[0, k + 3]
         e, f, g, h = basis[1, k], basis[1, k + 1], basis[1, k + 2], basis[1, k + 3]
         one, two, three, four = light[k], light[k + 1], light[k + 2], light[k + 3]

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32, Intp
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.figure.texture_images import breadth
@@ -21,8 +21,6 @@ from fba_player.view.view import FaceShape
 if TYPE_CHECKING:
     from fba.body.model import BodyPart
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
 TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
@@ -103,7 +101,7 @@ def coarser_part(part: Part | BodyPart, poses: Sequence[Float32], more: Float32 
     return Coarser(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
 
 
-def with_triangles(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> FaceShape:
+def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:
     """The same with some of its triangles only."""
     left = np.ascontiguousarray(triangles, dtype=np.int32)
     coarser = None if shape.coarser is None else replace(shape.coarser, triangles=left)
@@ -145,7 +143,7 @@ def hairs(part: Part) -> Float32 | None:
     return found
 
 
-def _pieces(edges: npt.NDArray[np.intp], count: int) -> npt.NDArray[np.intp]:
+def _pieces(edges: Intp, count: int) -> Intp:
     """(V,) the lowest vertex that each is joined to. edges (E, 2), both ways."""
     lowest = np.arange(count)
     while True:  # each round halves the way that is left to go

@@ -7,24 +7,18 @@ vertices, and spread over the others.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Float32, Float64, Int32, Integer
 from fba.body.model import BodyModel
 from fba.cache import kept, key_of
 from fba.compiled import compiled, is_compiled
 from fba_player.figure.face_light import KEY_DIRECTION, kept_visibility
 from fba_player.mesh.simplify import Coarser
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Rows = npt.NDArray[np.integer[Any]]
 Prepared = tuple[Int32, Int32, Float32, Float32]
 
 REACH = (1.0, 0.95, 0.0, 0.25)
@@ -48,50 +42,18 @@ LARGE = 4000
 """Which vertices are near to which is kept on disk for bodies of so many and more."""
 MAKING = 1
 """Counts up with every change of that: what was kept before is then made anew."""
-MOST_KEPT = 64
-"""Choices of vertices remembered."""
 FOLDS = 0.75
 """How much of what folds hide is shown: cloth lets some light through, and the posture changes."""
 
 
-class LitBody:
-    """The light on a body in one pose, worked out where it is asked for.
+class BodyLight:
+    """Light on a body.
 
-    capsules: float32 (K, 11), what is in its way, see `_capsules`; None where nothing is.
+    coarser: levels of detail by the name of each part that is drawn, None for a part without any. Occlusion
+    is computed on first use, in about a second, and stored in the disk cache.
     """
 
-    def __init__(
-        self, some: Callable[[slice, Rows | None], Float32], capsules: Float32 | None = None
-    ) -> None:
-        self._some = some
-        self.capsules = capsules
-
-    def __call__(self, part: slice, rows: Rows | None) -> Float32:
-        """float32 (N, 4) at some vertices (N,) of a part, or at all."""
-        return self._some(part, rows)
-
-    def of(self, part: slice) -> LitPart:
-        """The same for one part."""
-        return LitPart(self, part)
-
-
-@dataclass(frozen=True, eq=False)
-class LitPart:
-    """The light on a part of a body in one pose."""
-
-    body: LitBody
-    part: slice
-
-    def __call__(self, rows: Rows | None) -> Float32:
-        """float32 (N, 4) at some vertices (N,), or at all."""
-        return self.body(self.part, rows)
-
-
-class BodyLight:
-    """Light on a body. coarser: its parts' levels of detail, in the order of the model, None where a part
-    has none. What hides what is worked out on first use, in about a second, and kept on disk."""
-
-    def __init__(self, body: BodyModel, coarser: list[Coarser | None]) -> None:
+    def __init__(self, body: BodyModel, coarser: Mapping[str, Coarser | None]) -> None:
         self._body = body
         self._coarser = coarser
         names = body.skeleton.names
@@ -100,58 +62,35 @@ class BodyLight:
         tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else TALL
         head = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or the neck
         self._radii = np.array([row[2] for row in known]) * (tall / head / TALL if tall > 0 else 1.0)
-        self._kept: dict[tuple[int, int, int], tuple[Rows | None, Prepared]] = {}
 
-    def reaching(self, places: Float32, normals: Float32, joints: Float64) -> Float32:
-        """float32 (V, 4), see `fba_player.view.view.FaceMesh.light`, for the body's vertices and normals (V,
-        3) in the world and its joint matrices (J, 4, 4)."""
-        return self.lit(places, normals, joints)(slice(0, len(places)), None)
+    def shade(self, positions: Float32, normals: Float32, joints: Float64) -> Float32:
+        """float32 (V, 4), as in `FaceMesh.light`; meaningless at parts that are not drawn.
 
-    def lit(self, places: Float32, normals: Float32, joints: Float64) -> LitBody:
-        """The same, worked out where it is asked for."""
-        return self.lit_at(lambda rows: (places, normals), joints)
-
-    def lit_at(self, reached: Callable[[Rows], tuple[Float32, Float32]], joints: Float64) -> LitBody:
-        """The same. reached: gives places and normals (V, 3) that are right at rows (N,)."""
-        if self.is_free:
-            return LitBody(_free)
-        capsules = _capsules(joints[self._ends.ravel(), :3, 3].reshape(-1, 2, 3), self._radii)
-
-        def some(part: slice, rows: Rows | None) -> Float32:
-            at, near, shares, folds = self._some(part, rows)
-            past = np.empty((len(at), 2), dtype=np.float32)
-            _past(*reached(at), at, capsules, past)
-            light = np.empty((len(near), len(REACH)), dtype=np.float32)
-            _spread(past, near, shares, folds, light)
+        positions, normals: (V, 3) of the body in the world. joints: (J, 4, 4), its joint matrices. Without
+        numba, nothing is in the light's way.
+        """
+        light = np.empty((len(positions), len(REACH)), dtype=np.float32)
+        if not is_compiled() or not len(self._ends):
+            light[:] = REACH
             return light
-
-        return LitBody(some, capsules)
-
-    def _some(self, part: slice, rows: Rows | None) -> Prepared:
-        """As `prepared` for some of a part's vertices; kept for as long as these are."""
-        key = (part.start, part.stop, id(rows))
-        if key not in self._kept:
-            while len(self._kept) >= MOST_KEPT:
-                del self._kept[next(iter(self._kept))]
-            at, near, shares, folds = self.prepared
-            chosen = np.arange(part.start, part.stop) if rows is None else rows + part.start
-            used, places = np.unique(near[chosen], return_inverse=True)
-            near = places.reshape(len(chosen), -1).astype(np.int32)
-            self._kept[key] = (rows, (at[used], near, shares[chosen], folds[chosen]))
-        return self._kept[key][1]
-
-    @property
-    def is_free(self) -> bool:
-        """Whether nothing can be in its way."""
-        return not is_compiled() or not len(self._ends)
+        sampled, near, shares, folds = self._prepared
+        capsules = _capsules(joints[self._ends.ravel(), :3, 3].reshape(-1, 2, 3), self._radii)
+        past = np.empty((len(sampled), 2), dtype=np.float32)
+        _shade_by_capsules(positions, normals, sampled, capsules, past)
+        _spread(past, near, shares, folds, light)
+        return light
 
     @cached_property
-    def prepared(self) -> Prepared:
-        """Vertices at which light is worked out; for each vertex (V, NEAREST) the places among these that it
-        takes it from and their shares; and how much of the sky its folds leave it."""
+    def _prepared(self) -> Prepared:
+        """(N,) vertices at which light is computed; (V, NEAREST) indices into these from which each vertex is
+        interpolated, and (V, NEAREST) their weights; (V,) how much of the sky folds leave each vertex."""
         body = self._body
-        rows: list[Rows] = []
-        for part, coarser in zip(body.parts, self._coarser, strict=True):
+        rows: list[Integer] = []
+        for part in body.parts:
+            if part.name not in self._coarser:
+                rows.append(np.arange(min(len(part.vertices), 1)))  # not drawn
+                continue
+            coarser = self._coarser[part.name]
             left = None if coarser is None else coarser.within(COARSE)
             rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
         near, shares = _near([part.vertices for part in body.parts], rows)
@@ -166,11 +105,11 @@ class BodyLight:
         )
 
 
-def _near(parts: list[Float32], rows: list[Rows]) -> tuple[Int32, Float32]:
+def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
     """For each vertex of all parts, (V, 3) each, the places of the nearest of its part's rows among the rows
     of all: (V, NEAREST), and their shares."""
 
-    def make() -> list[npt.NDArray[Any]]:
+    def make() -> list[Array]:
         from scipy.spatial import cKDTree
 
         near, shares = [], []
@@ -199,13 +138,6 @@ def _near(parts: list[Float32], rows: list[Rows]) -> tuple[Int32, Float32]:
     return near, shares
 
 
-def _free(part: slice, rows: Rows | None) -> Float32:
-    """(N, 4) the light where nothing is in its way."""
-    free = np.empty((part.stop - part.start if rows is None else len(rows), len(REACH)), dtype=np.float32)
-    free[:] = REACH
-    return free
-
-
 def _capsules(ends: Float64, radii: Float64) -> Float32:
     """(K, 11) for ends (K, 2, 3) and radii (K,): one end, the way to the other, its inverse squared length,
     how far it goes towards the key light, the inverse squared length of what is left of it, the radius and
@@ -221,10 +153,12 @@ def _capsules(ends: Float64, radii: Float64) -> Float32:
 
 
 @compiled
-def _past(places: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32) -> None:
-    """past (N, 2): how much of the key light and of the sky comes past the capsules to some vertices.
+def _shade_by_capsules(
+    places: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32
+) -> None:
+    """Write past (N, 2): the shares of the key light and of the sky that come past the capsules to rows (N,).
 
-    A capsule after another, without branches: the processor then takes several vertices at a time."""
+    One capsule after another and without branches, so that the loops over vertices are vectorised."""
     one, zero = np.float32(1.0), np.float32(0.0)
     kx, ky, kz = np.float32(KEY[0]), np.float32(KEY[1]), np.float32(KEY[2])
     count = len(rows)

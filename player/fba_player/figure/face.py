@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from fba.parameters import FAP_COUNT
 from fba_player.figure._eyeball import Eyeball, find_eyeball
 from fba_player.figure._face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
-from fba_player.figure.face_light import MOUTH_OPEN, FaceLight, LitFace
-from fba_player.mesh.lazy_vertices import Places, Probe, Whole
+from fba_player.figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player.view.camera import Subject
 from fba_player.view.view import Eye, FaceMesh, FaceShape, rotation_vector
-
-if TYPE_CHECKING:
-    from fba_player.gl.gpu.tables import FaceLightTables, FaceTables, MovedFace
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Rows = npt.NDArray[np.intp]
 
 CUT = 0.45
 """On a body, what sways less than this is left out: the body has a neck of its own."""
@@ -39,21 +30,13 @@ EYES_APART = 0.062
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face for one set of FAPs (68,): its vertices (V, 3), without the head's turn (4, 4)."""
+    """The face for one set of FAPs (68,): positions and normals, float32 (V, 3), without the head's turn
+    (4, 4)."""
 
     faps: Float32
-    whole: Whole
+    positions: Float32
+    normals: Float32
     turn: Float64
-
-    @property
-    def positions(self) -> Float32:
-        """float32 (V, 3)."""
-        return self.whole.arrays[0]
-
-    @property
-    def normals(self) -> Float32:
-        """float32 (V, 3)."""
-        return self.whole.arrays[1]
 
 
 class FaceFigure:
@@ -86,10 +69,6 @@ class FaceFigure:
         self.sway = sways
         self.centre = _head_centre(model)
         self._light = FaceLight(model, self.deformer, sways)
-        self._probe = Probe(len(model.vertices), self._prepared)
-        looking = [self._ranges[part.name].start + ball.rows for part, ball in self._eyeballs]
-        lids = np.array([row for _, ball in self._eyeballs for row in ball.lids if row >= 0], dtype=np.intp)
-        self._looking = np.concatenate([lids, *looking])
 
     def _shape(self, part: Part, sways: Float32) -> FaceShape:
         shape = part_shape(part, sways)
@@ -143,36 +122,9 @@ class FaceFigure:
         return self._pose
 
     def _posed(self, faps: Float32) -> Pose:
-        def make() -> tuple[Float32, Float32]:
-            positions = np.empty((len(self.model.vertices), 3), dtype=np.float32)
-            normals = np.empty_like(positions)
-            return self.deformer.local(faps, out=positions, normals=normals), normals
-
-        def motion() -> MovedFace:
-            from fba_player.gl.gpu.tables import MovedFace
-
-            return MovedFace(self._tables, self.deformer.motion(faps), self._light_tables)
-
-        whole = Whole(len(self.model.vertices), make, lambda rows: self._probe.at(faps, rows)[0], motion)
-        return Pose(faps, whole, self.deformer.head_matrices(faps))
-
-    @cached_property
-    def _tables(self) -> FaceTables:
-        """For a graphics card that deforms it."""
-        from fba_player.gl.gpu.tables import FaceTables
-
-        return FaceTables(self.deformer)
-
-    @cached_property
-    def _light_tables(self) -> FaceLightTables:
-        """The same of the light on it."""
-        from fba_player.gl.gpu.tables import FaceLightTables
-
-        return FaceLightTables(self._light)
-
-    def _prepared(self, rows: Rows) -> Callable[[Float32, Float32], None]:
-        """What writes the places of some vertices (N,), for FAPs (68,)."""
-        return self.deformer.chosen(rows).local
+        normals = np.empty((len(self.model.vertices), 3), dtype=np.float32)
+        positions = self.deformer.local(faps, out=np.empty_like(normals), normals=normals)
+        return Pose(faps, positions, normals, self.deformer.head_matrices(faps))
 
     def meshes(
         self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()
@@ -182,15 +134,15 @@ class FaceFigure:
         on_body: without the lower neck and shoulders. without: kinds of parts that are left out.
         """
         pose = self.pose(faps)
-        light = self._light.reaching(pose.whole.at, pose.turn[:3, :3], matrix[:3, :3])
+        light = self._light.shade(pose.positions, pose.turn[:3, :3], matrix[:3, :3])
         axis = rotation_vector(pose.turn[:3, :3])
         found = []
         for name, shape in (self._on_body() if on_body else self._shapes).items():
             if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
             rows = self._ranges[name]
-            places = Places(pose.whole, rows.start, rows.stop - rows.start)
-            found.append(FaceMesh(shape, places, light.of(rows), matrix, axis, self.centre))
+            positions, normals = pose.positions[rows], pose.normals[rows]
+            found.append(FaceMesh(shape, positions, normals, light[rows], matrix, axis, self.centre))
         return found
 
     @property
@@ -202,9 +154,12 @@ class FaceFigure:
         """Where a part's vertices are among those of the model."""
         return self._ranges[name]
 
-    def light(self, faps: Float32, frame: Float64) -> LitFace:
-        """What light reaches its vertices. frame: (4, 4), the turned head's into the world."""
-        return self._light.reaching(self.pose(faps).whole.at, np.eye(3), frame[:3, :3])
+    def shade(self, faps: Float32, frame: Float64) -> Float32:
+        """float32 (V, 4), the light that reaches the model's vertices, as in `FaceMesh.light`.
+
+        frame: (4, 4), the turned head's frame into the world.
+        """
+        return self._light.shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
         """The eyeballs for FAPs (68,), put into the world by matrix (4, 4).
@@ -213,9 +168,8 @@ class FaceFigure:
         """
         pose = self.pose(faps)
         placed = matrix if turned else matrix @ pose.turn
-        positions = pose.whole.at(self._looking)
         return [
-            ball.posed(positions[self._ranges[part.name]], positions, faps, placed)
+            ball.posed(pose.positions[self._ranges[part.name]], pose.positions, faps, placed)
             for part, ball in self._eyeballs
         ]
 

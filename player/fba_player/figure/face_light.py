@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
 from fba.cache import kept
 from fba.compiled import is_compiled
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
-from fba_player.figure._face_light_loops import Table, lit, sway
+from fba_player.figure._face_light_loops import Table, blend_swaying, light_vertices
 from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Bool = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
 
 KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
 """As in shaders/lighting.glsl."""
@@ -36,8 +29,6 @@ ON_TEETH = 0.3
 """How much more light falls on teeth than finds its way between the lips."""
 STEP = 2
 """Digits to which the head's rotation is taken: its light changes by less than is seen."""
-MOST_KEPT = 96
-"""Choices of vertices remembered."""
 MOVES = 0.05
 """What sways less than this is lit without care."""
 
@@ -53,110 +44,56 @@ class Baked:
     gaps: tuple[float, float]
 
 
-class LitFace:
-    """The light on a face in one pose, worked out where it is asked for."""
-
-    def __init__(
-        self, light: FaceLight, share: float, lights: Float32, tongues: list[tuple[slice, Float32]]
-    ) -> None:
-        self._light = light
-        self._args = (share, lights)
-        self._tongues = tongues
-        self._parts: dict[tuple[int, int], LitFacePart] = {}
-
-    def of(self, part: slice) -> LitFacePart:
-        """The same for one part; the same object each time."""
-        key = (part.start, part.stop)
-        if key not in self._parts:
-            outside = next((out for tongue, out in self._tongues if tongue == part and out.any()), None)
-            self._parts[key] = LitFacePart(self._light, part, *self._args, outside)
-        return self._parts[key]
-
-
-@dataclass(frozen=True, eq=False)
-class LitFacePart:
-    """The light on a part of a face in one pose.
-
-    share: how far the mouth is wide open. lights: (2, 16) what weighs the harmonics for key and rim light,
-    for what goes with the head, then for what stands where that differs. outside (N,): how far each vertex of
-    a tongue is out between the lips, None where none is.
-    """
-
-    light: FaceLight
-    part: slice
-    share: float
-    lights: Float32
-    outside: Float32 | None
-
-    @property
-    def more(self) -> float:
-        """What share of the light that is missing falls in, as a photographer would have it."""
-        return ON_TEETH * self.share if self.light.is_of_teeth(self.part) else 0.0
-
-    def __call__(self, rows: Rows | None) -> Float32:
-        """float32 (N, 4), 0..1, for the part's vertices, or those of its rows (N,) that are asked for: what
-        reaches them of the key light, of the open sky, through the skin from behind, and of the rim light."""
-        found = self.light.some(self.part, rows).reaching(self.share, self.lights, self.more)
-        if self.outside is not None:
-            free = self.outside if rows is None else self.outside[rows]
-            found += (np.array(FREE, dtype=np.float32) - found) * free[:, None]
-        return found
-
-
 class FaceLight:
     """Light on a face model.
 
-    sway (V,): how far each vertex goes with the head. What hides what is worked out on first use, for the
-    mouth shut and open, in about a second, and kept on disk.
+    sway (V,): how far each vertex goes with the head. Occlusion is computed on first use, for the mouth shut
+    and open, in about a second, and stored in the disk cache.
     """
 
     def __init__(self, model: FaceModel, deformer: Deformer, sway: Float32) -> None:
         self._model = model
         self._deformer = deformer
-        self.sway = sway
-        self._lit: tuple[tuple[object, ...], LitFace] | None = None
-        self._kept: dict[tuple[int, int, int], tuple[Rows | None, _Some]] = {}
+        self._sway = sway
+        self._last: tuple[tuple[object, ...], Float32] | None = None
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
-        self._teeth = [self._rows(part) for part in model.of_kind("teeth")]
         self._tongues = [self._rows(part) for part in model.of_kind("tongue")]
-        looked = [np.arange(rows.start, rows.stop) for rows in self._tongues]
-        self._looked = np.concatenate([np.array(self._lips or (), dtype=np.intp), *looked])
-        """Vertices by which it is known how far the mouth is open, and the tongue out."""
 
     def _rows(self, part: Part) -> slice:
         start = self._model.starts[part.name]
         return slice(start, start + len(part.vertices))
 
-    def reaching(self, at: Callable[[Rows], Float32], turn: Float64, matrix: Float64) -> LitFace:
-        """The light for a face whose positions without the head's turn (3, 3), (V, 3), `at` gives, right at
-        rows (N,) at least; matrix: (3, 3) of the whole in the world. The same object while nothing changes.
+    def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
+        """float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
+
+        positions: (V, 3), without the head's turn (3, 3). matrix: (3, 3), the face's rotation in the world.
+        Returns the same array until something changes.
         """
-        positions = at(self._looked)
         share = round(self._mouth_open(positions, self.baked.gaps), 2)
         out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
-        # In steps that nobody sees, the same whatever was shown before.
+        # In steps too small to be seen, so that a pose looks the same whatever was shown before it.
         turned, still = np.round((matrix @ turn).T, STEP), np.round(matrix.T, STEP)
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
-        if self._lit is None or self._lit[0] != key:
-            tongues = list(zip(self._tongues, out, strict=True))
+        if self._last is None or self._last[0] != key:
             lights = _basis(turned) if np.array_equal(turned, still) else _basis(turned, still)
-            self._lit = (key, LitFace(self, share, lights, tongues))
-        return self._lit[1]
+            self._last = (key, self._shaded(share, lights, out))
+        return self._last[1]
 
-    def is_of_teeth(self, part: slice) -> bool:
-        """Whether a part is of teeth."""
-        return part in self._teeth
+    def _shaded(self, share: float, lights: Float32, out: list[Float32]) -> Float32:
+        """float32 (V, 4) for a mouth open by `share`. out: (N,) for each tongue, how far it is out."""
+        light = np.empty((len(self._sway), 4), dtype=np.float32)
+        for part, baked in zip(self._model.parts, self._part_lights, strict=True):
+            # Teeth get more light than falls in, as a photographer would have it.
+            baked.shade(share, lights, ON_TEETH * share if part.kind == "teeth" else 0.0, light[baked.rows])
+        for rows, outside in zip(self._tongues, out, strict=True):
+            if outside.any():
+                light[rows] += (np.array(FREE, dtype=np.float32) - light[rows]) * outside[:, None]
+        return light
 
-    def some(self, part: slice, rows: Rows | None) -> _Some:
-        """What light at some of a part's vertices is worked out from; kept for as long as they are."""
-        key = (part.start, part.stop, id(rows))
-        if key not in self._kept:
-            while len(self._kept) >= MOST_KEPT:
-                del self._kept[next(iter(self._kept))]
-            chosen = np.arange(part.start, part.stop) if rows is None else rows + part.start
-            self._kept[key] = (rows, _Some(self.baked, chosen, self.sway))
-        return self._kept[key][1]
+    @cached_property
+    def _part_lights(self) -> list[_PartLight]:
+        return [_PartLight(self.baked, self._rows(part), self._sway) for part in self._model.parts]
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -182,13 +119,13 @@ class FaceLight:
 
     @cached_property
     def baked(self) -> Baked:
-        """What hides what."""
+        """Visibility of every vertex past the rest of the face."""
         solid = [part for part in self._model.parts if part.kind not in ("brow", "lash")]
         joined = [part.triangles + self._model.starts[part.name] for part in solid]
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
         faps = np.zeros(68, dtype=np.float32)
         still, normals = self._posed(faps)
-        shut = kept_visibility(still, normals, triangles, self.sway > MOVES)
+        shut = kept_visibility(still, normals, triangles, self._sway > MOVES)
         if self._lips is None:
             return Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():
@@ -203,7 +140,7 @@ class FaceLight:
         return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
 
     def _posed(self, faps: Float32) -> tuple[Float32, Float32]:
-        positions = np.empty((len(self.sway), 3), dtype=np.float32)
+        positions = np.empty((len(self._sway), 3), dtype=np.float32)
         normals = np.empty_like(positions)
         return self._deformer.local(faps, out=positions, normals=normals), normals
 
@@ -216,7 +153,7 @@ class FaceLight:
 def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
     """`bake`, but done once and kept on disk: it is half a second of every start."""
 
-    def make() -> list[npt.NDArray[np.float16]]:
+    def make() -> list[Float16]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
 
     digest = hashlib.sha256(BAKING.encode())
@@ -228,29 +165,32 @@ def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, with
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 
-class _Some:
-    """What the light at some vertices of the model is worked out from."""
+class _PartLight:
+    """What the light at the vertices of one part is computed from."""
 
-    def __init__(self, baked: Baked, chosen: Rows, sway: Float32) -> None:
-        self._all = _table(baked, chosen)
-        swaying = np.flatnonzero(sway[chosen] < 1)
-        self._still = _table(baked, chosen[swaying])
-        self._swaying = swaying
-        self._sway = sway[chosen[swaying]]
+    def __init__(self, baked: Baked, rows: slice, sway: Float32) -> None:
+        self.rows = rows
+        chosen = np.arange(rows.start, rows.stop)
+        self._table = _table(baked, chosen)
+        self._swaying = np.flatnonzero(sway[chosen] < 1)
+        self._still = _table(baked, chosen[self._swaying])
+        self._sway = sway[chosen[self._swaying]]
 
-    def reaching(self, share: float, lights: Float32, on_teeth: float) -> Float32:
-        """(N, 4) key light, sky, through, rim light. share: how far the mouth is wide open. on_teeth: how
-        much more of it falls in."""
-        found = np.empty((len(self._all.open), 4), dtype=np.float32)
-        lit(self._all, lights[:2], share, on_teeth, found)
+    def shade(self, share: float, lights: Float32, on_teeth: float, light: Float32) -> None:
+        """Write light (N, 4): key light, sky, through, rim light.
+
+        share: how far the mouth is wide open. lights: (2, 16), weights of the harmonics for key and rim light
+        for what goes with the head, then, where they differ, two more rows for what stands still. on_teeth:
+        the share of the missing light that is added.
+        """
+        light_vertices(self._table, lights[:2], share, on_teeth, light)
         if len(lights) > 2 and len(self._swaying):
             still = np.empty((len(self._swaying), 4), dtype=np.float32)
-            lit(self._still, lights[2:], share, on_teeth, still)
-            sway(found, still, self._swaying, self._sway)
-        return found
+            light_vertices(self._still, lights[2:], share, on_teeth, still)
+            blend_swaying(light, still, self._swaying, self._sway)
 
 
-def _table(baked: Baked, chosen: Rows) -> Table:
+def _table(baked: Baked, chosen: Intp) -> Table:
     near = np.flatnonzero(baked.near[chosen])
     shut, wide = (
         [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]

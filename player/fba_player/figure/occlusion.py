@@ -12,10 +12,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64, Int32, Intp
 from fba.compiled import compiled, is_compiled
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 DIRECTIONS = 72
 """From so many sides the mesh is looked at."""
@@ -57,8 +55,8 @@ class Visibility:
 def bake(
     vertices: Float32,
     normals: Float32,
-    triangles: npt.NDArray[np.int32],
-    within: npt.NDArray[np.bool_] | None = None,
+    triangles: Int32,
+    within: Bool | None = None,
 ) -> Visibility:
     """The visibility of every vertex (V, 3) in a mesh; about half a second for 20,000 of them.
 
@@ -170,7 +168,7 @@ def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
 
 
 @compiled
-def _draw(seen: Float32, triangles: npt.NDArray[np.int32], depth: Float32) -> None:
+def _draw(seen: Float32, triangles: Int32, depth: Float32) -> None:
     """Draw the depth of what faces the looker of a mesh seen from one side (V, 3): x, y in -1..1, z
     towards the looker."""
     size = depth.shape[0]
@@ -206,7 +204,7 @@ def _draw(seen: Float32, triangles: npt.NDArray[np.int32], depth: Float32) -> No
 def _look(
     seen: Float32,
     facing: Float32,
-    rows: npt.NDArray[np.intp],
+    rows: Intp,
     depth: Float32,
     reach: float,
     visible: Float32,

@@ -10,11 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Int32
 from fba_player.view.view import FaceShape
-
-Float32 = npt.NDArray[np.float32]
 
 SHARPEST = 0.8
 """Pixels of the screen that a texel is wide, at least."""
@@ -66,7 +64,7 @@ def halved(texel: float, pixel: float, size: int) -> int:
     return min(math.ceil(math.log2(ratio)), most) if ratio < math.inf else most
 
 
-def breadth(positions: Float32, texcoords: Float32, triangles: npt.NDArray[np.int32]) -> float:
+def breadth(positions: Float32, texcoords: Float32, triangles: Int32) -> float:
     """Metres across the whole of a picture that lies on triangles; 0 where none does."""
     if not len(triangles):
         return 0.0

@@ -7,8 +7,8 @@ from collections.abc import Callable, Hashable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Array, Float32, Float64, UInt8
 from fba_player.gl._labels import (
     MOST_NAMES,
     SMALLEST,
@@ -22,8 +22,6 @@ from fba_player.view.annotations import Dots, Extras, Grid, Legend, Lines
 from fba_player.view.camera import Camera
 from fba_player.view.view import FaceMesh, FaceShape
 from fba_player.view.world_positions import directions, places
-
-Float64 = npt.NDArray[np.float64]
 
 REFERENCE_HEIGHT, LEAST_SCALE = 720, 0.35
 CROWDED = 7.0
@@ -75,7 +73,7 @@ class ExtrasRenderer:
         self._square: Any = None
         self._buffers: dict[str, Any] = {}
         self._textures: dict[Hashable, tuple[Any, Any]] = {}
-        self._depths: npt.NDArray[np.float32] | None = None
+        self._depths: Float32 | None = None
         self._indices: dict[int, tuple[FaceShape, Any]] = {}
 
     def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
@@ -128,7 +126,7 @@ class ExtrasRenderer:
         self._buffers.clear()
         self._programs.clear()
 
-    def _filled(self, name: str, data: npt.NDArray[Any]) -> Any:
+    def _filled(self, name: str, data: Array) -> Any:
         """A buffer kept under a name, with this in it."""
         held = self._buffers.get(name)
         if held is None or held.size < data.nbytes:
@@ -247,7 +245,7 @@ class ExtrasRenderer:
         if wide + 2 * edge <= size[0]:
             self._draw_labels(words, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
 
-    def _depths_of(self, size: tuple[int, int]) -> npt.NDArray[np.float32]:
+    def _depths_of(self, size: tuple[int, int]) -> Float32:
         """(H, W) depths of what is drawn, 0..1, bottom row first; read once a picture."""
         if self._depths is not None:
             return self._depths
@@ -263,7 +261,7 @@ class ExtrasRenderer:
         self._depths = np.frombuffer(data, dtype=np.float32).reshape(size[1], size[0])
         return self._depths
 
-    def _words(self, key: Hashable, make: Callable[[], tuple[npt.NDArray[np.uint8], Any]]) -> tuple[Any, Any]:
+    def _words(self, key: Hashable, make: Callable[[], tuple[UInt8, Any]]) -> tuple[Any, Any]:
         """A texture of words and what `make` gave with it; the last few are kept."""
         held = self._textures.pop(key, None)
         if held is None:

@@ -6,13 +6,11 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Floating
 from fba.compiled import is_compiled
 from fba_player.gl._silhouette import Outliner
 from fba_player.view.view import FaceMesh, View
-
-Float64 = npt.NDArray[np.float64]
 
 MARGIN = 0.03
 """Added on every side, as a share of what is filled."""
@@ -34,7 +32,7 @@ class Steps:
     """
 
     rectangles: list[Rectangle]
-    bands: npt.NDArray[np.float32]
+    bands: Float32
 
 
 def steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner) -> Steps:
@@ -108,7 +106,7 @@ def _within(one: Rectangle, other: Rectangle) -> bool:
     )
 
 
-def _corners(positions: npt.NDArray[np.float32]) -> Float64:
+def _corners(positions: Float32) -> Float64:
     if not len(positions):
         return np.zeros((0, 3))
     # Long rows are looked through faster than short ones.
@@ -119,7 +117,7 @@ def _corners(positions: npt.NDArray[np.float32]) -> Float64:
     return _box(low.min(axis=0), high.max(axis=0))
 
 
-def _box(low: npt.NDArray[np.floating], high: npt.NDArray[np.floating]) -> Float64:
+def _box(low: Floating, high: Floating) -> Float64:
     return np.array(list(itertools.product(*zip(low, high, strict=True))), dtype=np.float64)
 
 

@@ -12,16 +12,11 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.compiled import compiled, is_compiled
 from fba_player.figure.face_light import KEY_DIRECTION
 from fba_player.view.view import FaceMesh, FaceShape
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-UInt8 = npt.NDArray[np.uint8]
-Int32 = npt.NDArray[np.int32]
 
 CELLS, CELL = 96, 0.05
 """The grid: so many squares each way, of this size (m)."""
@@ -53,10 +48,8 @@ class CastShadow:
 
 
 class Points(NamedTuple):
-    """corners int32 (N, 3), shares float32 (N, 3): where on which triangles; area float32 (N,), m².
-    rows int32 (M,): all corners, each once."""
+    """corners int32 (N, 3), shares float32 (N, 3): where on which triangles; area float32 (N,), m²."""
 
-    rows: Int32
     corners: Int32
     shares: Float32
     area: Float32
@@ -88,8 +81,7 @@ class ShadowCaster:
             if count + len(points.area) > len(self._thrown):
                 more = np.empty((2 * len(points.area), 6), dtype=np.float32)
                 self._thrown = np.concatenate([self._thrown, more])
-            places = mesh.places.reached(points.rows)
-            count = _place(places, mesh.matrix, points, low[0], low[1], self._thrown, count)
+            count = _place(mesh.positions, mesh.matrix, points, low[0], low[1], self._thrown, count)
         left, bottom, right, top = _throw(self._thrown[:count], _rays(), self._darkness)
         if right <= left:
             return None
@@ -124,7 +116,6 @@ def _spread(shape: FaceShape) -> Points | None:
     over = u + v > 1
     u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
     return Points(
-        np.unique(triangles[owner]).astype(np.int32),
         np.ascontiguousarray(triangles[owner], dtype=np.int32),
         np.stack([1 - u - v, u, v], axis=1).astype(np.float32),
         np.full(count, ends[-1] / count, dtype=np.float32),
@@ -166,7 +157,7 @@ def _place(
 
     How many there are then.
     """
-    _, corners, shares, area = points
+    corners, shares, area = points
     p = np.empty((3, 3))
     for i in range(len(corners)):
         for k in range(3):

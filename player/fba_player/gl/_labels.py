@@ -6,16 +6,13 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Int64, Intp, UInt8
 from fba_player.view.annotations import Legend
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-Float64 = npt.NDArray[np.float64]
-UInt8 = npt.NDArray[np.uint8]
-Bool = npt.NDArray[np.bool_]
 
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
@@ -61,7 +58,7 @@ def legend_picture(legend: Legend, scale: float) -> UInt8:
     return np.asarray(picture)
 
 
-def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, npt.NDArray[np.int64]]:
+def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
     """(H, W, 4) all names one below the other, and (N, 4) left, top, width and height of each."""
     from PIL import Image, ImageDraw
 
@@ -78,9 +75,7 @@ def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, npt.NDArr
     return np.asarray(picture), np.array(boxes, dtype=np.int64).reshape(-1, 4)
 
 
-def placed_names(
-    dots: Float64, sizes: npt.NDArray[np.int64], radius: float, size: tuple[int, int]
-) -> tuple[npt.NDArray[np.intp], Float64]:
+def placed_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int]) -> tuple[Intp, Float64]:
     """Which names find room, and their upper left corners (M, 2), pixels.
 
     dots: (N, 2) pixels from the upper left, NaN where one cannot be seen. sizes: (N, 2) of the names.

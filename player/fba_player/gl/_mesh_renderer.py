@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, UInt8
 from fba_player.figure.texture_images import Pictures, halved
-from fba_player.gl.gpu.way import Way, release
-from fba_player.gl.lod import distance
+from fba_player.gl.lod import distance, same
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
 from fba_player.mesh.skin_relief import RELIEF, relief
 from fba_player.view.view import FaceMesh, FaceShape
-
-Float64 = npt.NDArray[np.float64]
 
 MOST_SHAPES = 64
 """Parts remembered on the graphics card; the longest unused goes first."""
@@ -23,19 +20,14 @@ FAINTEST = 0.25
 
 
 class FaceRenderer:
-    """Draws face meshes. deform: one of `fba_player.gl.gpu.choice.DEFORM`.
+    """Draws face meshes. Owns what it allocates on the moderngl context; `close` frees it."""
 
-    Owns what it allocates on the context; `close` gives it back.
-    """
-
-    def __init__(self, context: Any, deform: str = "auto") -> None:
+    def __init__(self, context: Any) -> None:
         self._gl = context
-        self.way = Way(context, deform)
-        """How the vertices come into the buffers."""
         self._programs: dict[tuple[str, ...], Any] = {}
         self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
         self._reliefs: dict[int, Any] = {}
-        self._pixels: npt.NDArray[np.uint8] | None = None
+        self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
@@ -73,7 +65,6 @@ class FaceRenderer:
         for part in (*self._reliefs.values(), *self._programs.values()):
             part.release()
         self._reliefs.clear()
-        self.way.close()
         self._programs.clear()
 
     def _program(self, words: tuple[str, ...]) -> Any:
@@ -109,7 +100,7 @@ class FaceRenderer:
 
     def _draw(self, mesh: FaceMesh) -> None:
         parts, shape = self._parts(mesh), mesh.shape
-        self.way.write(mesh, parts)
+        _upload_vertices(mesh, parts)
         away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
         wide = self._camera[2] * away
         picture = parts["pictures"].suited(wide)
@@ -149,7 +140,7 @@ class FaceRenderer:
         return parts
 
     def _uploaded(self, mesh: FaceMesh) -> dict[str, Any]:
-        gl, shape, count = self._gl, mesh.shape, len(mesh.places)
+        gl, shape, count = self._gl, mesh.shape, len(mesh.positions)
         texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
         still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
         parts: dict[str, Any] = {
@@ -186,6 +177,20 @@ class FaceRenderer:
         return self._reliefs[halvings]
 
 
+def _upload_vertices(mesh: FaceMesh, parts: dict[str, Any]) -> None:
+    """Write positions and normals into a part's buffers, and its light unless that is there already."""
+    _write(parts["positions"], mesh.positions)
+    _write(parts["normals"], mesh.normals)
+    if parts["lit"] is None or not same(parts["lit"], mesh.light):
+        parts["lit"] = mesh.light
+        _write(parts["light"], mesh.light)
+
+
+def _write(buffer: Any, array: Float32) -> None:
+    buffer.orphan()
+    buffer.write(np.ascontiguousarray(array, dtype="f4"))
+
+
 def _set_shape(program: Any, shape: FaceShape) -> None:
     """What a program takes of a shape, unless it has just had it."""
     if program.extra.get("shape") is shape:
@@ -210,7 +215,6 @@ def _set_placing(program: Any, mesh: FaceMesh) -> None:
 
 
 def _release(parts: dict[str, Any]) -> None:
-    release(parts)
     for array in parts["arrays"].values():
         array.release()
     for name in ("positions", "normals", "light", "still", "triangles", "across"):

@@ -6,14 +6,10 @@ Software OpenGL spends as long on looking for steps in a whole picture as on dra
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int8, Int32, UInt8
 from fba.compiled import compiled
 from fba_player.view.view import FaceMesh
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 TILE = 8
 """Pixels: the picture is smoothed in tiles of this size that an outline runs through."""
@@ -122,8 +118,8 @@ def _add(
     triangles: Int32,
     ends: Int32,
     sides: Int32,
-    facing: npt.NDArray[np.int8],
-    marked: npt.NDArray[np.uint8],
+    facing: Int8,
+    marked: UInt8,
 ) -> None:
     """Both in one: what is called from Python costs most."""
     _project(positions, sway, turn, centre, clip, size, seen)
@@ -177,8 +173,8 @@ def _outline(
     ends: Int32,
     sides: Int32,
     size: tuple[int, int],
-    facing: npt.NDArray[np.int8],
-    marked: npt.NDArray[np.uint8],
+    facing: Int8,
+    marked: UInt8,
 ) -> None:
     """Mark the tiles along every edge between what faces the camera and what does not, and along borders."""
     for t in range(len(triangles)):
@@ -223,7 +219,7 @@ def _outline(
 
 
 @compiled
-def _runs(marked: npt.NDArray[np.uint8], size: tuple[int, int], corners: Float32) -> int:
+def _runs(marked: UInt8, size: tuple[int, int], corners: Float32) -> int:
     """Write two triangles for each row of marked tiles side by side, where there is room; how many rows."""
     count = 0
     for row in range(marked.shape[0]):

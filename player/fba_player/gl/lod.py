@@ -9,12 +9,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32, Intp
 from fba.compiled import compiled
 from fba_player.mesh.simplify import TOLERANCES
-from fba_player.view.view import ChosenLight, FaceMesh, FaceShape
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
+from fba_player.view.view import FaceMesh, FaceShape
 
 PIXELS = 1.3
 """How far the coarser mesh may be off, in pixels."""
@@ -27,8 +25,8 @@ class _Level:
     """A coarser shape, the vertices (V,) that it has left, and their light as it was last seen."""
 
     shape: FaceShape
-    rows: npt.NDArray[np.intp]
-    light: tuple[object, Float32 | ChosenLight] | None = None
+    rows: Intp
+    light: tuple[Float32, Float32] | None = None
 
 
 class Details:
@@ -45,18 +43,22 @@ class Details:
 
     def _suited(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
         coarser = mesh.shape.coarser
-        if coarser is None or not len(mesh.places):
+        if coarser is None or not len(mesh.positions):
             return mesh
         away = distance(mesh, eye)
         level = self._level(mesh.shape, bisect_right(TOLERANCES, PIXELS * pixel * away))
         if level is None:
             return mesh
-        if level.light is None or not _same_light(level.light[0], mesh.reaching):
-            reaching = mesh.reaching
-            chosen = ChosenLight(reaching, level.rows) if callable(reaching) else mesh.light_at(level.rows)
-            level.light = (reaching, chosen)
-        places = mesh.places.some(level.rows)
-        return FaceMesh(level.shape, places, level.light[1], mesh.matrix, mesh.turn, mesh.centre, away)
+        if level.light is None or not same(level.light[0], mesh.light):
+            level.light = (mesh.light, mesh.light.take(level.rows, axis=0))
+        return replace(
+            mesh,
+            shape=level.shape,
+            positions=mesh.positions.take(level.rows, axis=0),
+            normals=mesh.normals.take(level.rows, axis=0),
+            light=level.light[1],
+            away=away,
+        )
 
     def _level(self, shape: FaceShape, number: int) -> _Level | None:
         levels = self._levels.setdefault(shape, {})
@@ -67,7 +69,7 @@ class Details:
         return levels[number]
 
 
-def _left(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> _Level:
+def _left(shape: FaceShape, triangles: Int32) -> _Level:
     rows, corners = np.unique(triangles, return_inverse=True)
     kept = replace(
         shape,
@@ -82,8 +84,8 @@ def _left(shape: FaceShape, triangles: npt.NDArray[np.int32]) -> _Level:
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """From an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
-    places = mesh.places.sampled(max(len(mesh.places) // SAMPLED, 1))
-    return float(_nearest(places, mesh.matrix, eye))
+    sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED, 1)]
+    return float(_nearest(sample, mesh.matrix, eye))
 
 
 @compiled
@@ -103,13 +105,7 @@ def _nearest(positions: Float32, matrix: Float64, eye: Float64) -> float:
     return np.sqrt(least / scale) if least < np.inf and scale > 0.0 else 0.0
 
 
-def _same_light(one: object, other: object) -> bool:
-    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        return same(one, other)
-    return one is other
-
-
-def same(one: npt.NDArray[np.float32], other: npt.NDArray[np.float32]) -> bool:
+def same(one: Float32, other: Float32) -> bool:
     """Whether two arrays, both of them kept alive, are the same numbers in the same place."""
     if one is other:
         return True

@@ -6,7 +6,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+
+from fba.arrays import Array
 
 
 def load_program(context: Any, name: str, *defined: str) -> Any:
@@ -42,6 +43,6 @@ def set_uniform(program: Any, name: str, value: Any) -> None:
         member.value = value
 
 
-def matrix_bytes(matrix: npt.NDArray[Any]) -> bytes:
+def matrix_bytes(matrix: Array) -> bytes:
     """A matrix as OpenGL stores it: float32, column by column."""
     return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()

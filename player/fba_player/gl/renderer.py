@@ -7,19 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
 from fba_player.gl._annotation_renderer import ExtrasRenderer
 from fba_player.gl._antialias_region import Steps, steps
 from fba_player.gl._ground_shadow import ShadowCaster
 from fba_player.gl._mesh_renderer import FaceRenderer
 from fba_player.gl._silhouette import Outliner
-from fba_player.gl.gpu.way import Way
 from fba_player.gl.lod import Details
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
 from fba_player.mesh.primitives import capsule_mesh, sphere_mesh
 from fba_player.view.camera import Camera
-from fba_player.view.view import CAPSULE_FLOATS, Eye, FaceMesh, Mesh, MeshShape, View
+from fba_player.view.view import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
 
 MOST_BLOBS = 8
 THROUGH = 0.16
@@ -35,18 +34,17 @@ MOST_SHAPES = 32
 class Renderer:
     """Draws views into whatever framebuffer is bound.
 
-    context: a moderngl context (OpenGL 3.3 or later). deform: who moves the vertices of figures, one of
-    `fba_player.gl.gpu.choice.DEFORM`. The renderer owns what it allocates there; `close` gives it back. Not
-    thread-safe, as OpenGL is not.
+    context: a moderngl context (OpenGL 3.3 or later). The renderer owns what it allocates there; `close`
+    frees it. Not thread-safe, as OpenGL is not.
     """
 
-    def __init__(self, context: Any, deform: str = "auto") -> None:
+    def __init__(self, context: Any) -> None:
         self._gl = context
         self._programs = {
             name: load_program(context, name)
             for name in ("mesh", "capsule", "eye", "studio", "shadow", "cast")
         }
-        self._faces = FaceRenderer(context, deform)
+        self._faces = FaceRenderer(context)
         corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
         square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
         self._studio_buffer = context.buffer(corners.tobytes())
@@ -78,10 +76,10 @@ class Renderer:
         self._seen: tuple[object, ...] = ()
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
-    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps | None:
-        """Clear the bound framebuffer and draw the view; size: its width and height in pixels.
+    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps:
+        """Clear the bound framebuffer, draw the view, and return where its edges need smoothing.
 
-        Returns where its steps are, None for anywhere.
+        size: width and height of the framebuffer in pixels.
         """
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
@@ -89,19 +87,7 @@ class Renderer:
         matrix, place = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]
         pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
 
-        def draw_faces(faces: list[FaceMesh]) -> View:
-            drawn = replace(view, faces=self._details.suited(faces, place, pixel))
-            self._faces.begin(place, matrix, pixel)
-            self._faces.draw(drawn.faces)
-            return drawn
-
-        def trial(faces: list[FaceMesh]) -> None:
-            drawn = draw_faces(faces)
-            if not self._faces.way.on_gpu:
-                steps(drawn, matrix, size, self._outliner)
-
         gl.viewport = (0, 0, *size)
-        self._faces.way.prepare(view.faces, trial)
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
         self._see(tuple(place.tolist()), matrix_bytes(matrix), pixel)
         self._draw_studio(view, matrix, size, (float(camera.target[0]), float(camera.target[2])))
@@ -112,12 +98,12 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        drawn = draw_faces(view.faces)
+        drawn = replace(view, faces=self._details.suited(view.faces, place, pixel))
+        self._faces.begin(place, matrix, pixel)
+        self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
             drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
-        if self._faces.way.on_gpu and (view.extras is None or not view.extras.is_fine):
-            return None  # a graphics card smooths all of it in less time than outlines take to be found
         return steps(drawn, matrix, size, self._outliner)
 
     def _see(self, *seen: object) -> None:
@@ -128,11 +114,6 @@ class Renderer:
         for program in self._programs.values():
             for name, value in zip(("eye", "camera", "pixel"), seen, strict=True):
                 set_uniform(program, name, value)
-
-    @property
-    def way(self) -> Way:
-        """Where the last picture's figures were deformed, and why."""
-        return self._faces.way
 
     def close(self) -> None:
         """Free everything allocated on the graphics card."""
@@ -152,9 +133,7 @@ class Renderer:
         ):  # fmt: skip
             part.release()
 
-    def _uploaded(
-        self, vertices: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]
-    ) -> tuple[Any, Any]:
+    def _uploaded(self, vertices: Float32, triangles: Int32) -> tuple[Any, Any]:
         return self._gl.buffer(vertices.tobytes()), self._gl.buffer(triangles.tobytes())
 
     def _capsule_array(self) -> Any:
@@ -168,7 +147,7 @@ class Renderer:
         )
 
     def _draw_studio(
-        self, view: View, matrix: npt.NDArray[np.float64], size: tuple[int, int], centre: tuple[float, float]
+        self, view: View, matrix: Float64, size: tuple[int, int], centre: tuple[float, float]
     ) -> None:
         """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs. centre: x
         and z of where the ground is brightest."""
@@ -268,7 +247,7 @@ class Renderer:
         parts = self._shapes[key][1]
         return parts[0], parts[1], parts[2]
 
-    def _draw_capsules(self, capsules: npt.NDArray[np.float32]) -> None:
+    def _draw_capsules(self, capsules: Float32) -> None:
         if not len(capsules):
             return
         data = np.ascontiguousarray(capsules, dtype="f4")
@@ -281,7 +260,7 @@ class Renderer:
         self._instances.write(data)
         self._capsules.render(instances=len(data))
 
-    def _draw_marks(self, marks: npt.NDArray[np.float32]) -> None:
+    def _draw_marks(self, marks: Float32) -> None:
         """Marks as capsules; those behind something faintly through it."""
         if not len(marks):
             return

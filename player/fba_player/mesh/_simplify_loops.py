@@ -8,14 +8,9 @@ the vertices that were there.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int32, Int64
 from fba.compiled import compiled, inlined
-
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
-Bool = npt.NDArray[np.bool_]
 
 BORDER = 2.0
 """How much more a border counts than the surface."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Float32 = npt.NDArray[np.float32]
-Int32 = npt.NDArray[np.int32]
+from fba.arrays import Float32, Int32
 
 
 def _sheet(rows: int, columns: int) -> Int32:

@@ -8,14 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64, Int32
 from fba.cache import kept
 from fba.compiled import is_compiled
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
 """Metres by which a coarser mesh may be off, as a root of mean squares."""
@@ -118,9 +114,9 @@ def coarser(
     return onto, first
 
 
-def _shared_places(places: Float64) -> npt.NDArray[np.bool_]:
+def _shared_places(places: Float64) -> Bool:
     """(V,) vertices that stand where another one stands: a seam, which would gape."""
     rounded = np.ascontiguousarray(np.round(places * 1e6).astype(np.int64))
     _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
-    shared: npt.NDArray[np.bool_] = counts[inverse.ravel()] > 1
+    shared: Bool = counts[inverse.ravel()] > 1
     return shared

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import UInt8
 from fba.cache import kept, key_of
 
 SIZE = 256
@@ -18,14 +18,14 @@ MAKING = 1
 """Counts up with every change of how it is made: what was kept before is then made anew."""
 
 
-def relief() -> npt.NDArray[np.uint8]:
+def relief() -> UInt8:
     """(SIZE, SIZE, 3) three channels of noise about 128; the same every time, and so kept on disk."""
     key = key_of("relief", MAKING, SIZE, SPREAD, SHARES)
     (found,) = kept(key, ((SIZE, SIZE, 3),), lambda: [_relief()], np.uint8)
     return found
 
 
-def _relief() -> npt.NDArray[np.uint8]:
+def _relief() -> UInt8:
     random = np.random.default_rng(20)
     along = np.fft.fftfreq(SIZE, 1 / SIZE)
     distance = np.hypot(along[:, None], along[None])

@@ -9,11 +9,9 @@ import io
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int32, UInt8
 from fba.cache import kept, key_of
-
-UInt8 = npt.NDArray[np.uint8]
 
 LARGEST = 4096
 """Pictures of more pixels across are made smaller."""
@@ -66,7 +64,7 @@ class FacePicture:
         (found,) = kept(key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8)
         return found
 
-    def _measured(self) -> list[npt.NDArray[np.int32]]:
+    def _measured(self) -> list[Int32]:
         pixels = self.pixels
         height, width = pixels.shape[:2]
         return [np.array([width, height, (pixels[..., 3] == 255).all()], dtype=np.int32)]

@@ -8,14 +8,14 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import BodyTrack, FaceTrack
+from fba.arrays import Array, Bool, Int64
 from fba.codec.block import Block
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.tracks import trusted
 
-Rows = dict[str, npt.NDArray[Any]]
+Rows = dict[str, Array]
 
 FACE: dict[str, tuple[int, type]] = {
     "values": (FAP_COUNT, np.int32),
@@ -39,11 +39,11 @@ class Arrived:
     """
 
     rate: Fraction
-    index: npt.NDArray[np.int64]
+    index: Int64
     face: FaceTrack | None
     body: BodyTrack | None
-    plane_bits: npt.NDArray[np.int64]
-    plane_intra: npt.NDArray[np.bool_]
+    plane_bits: Int64
+    plane_intra: Bool
 
 
 class GrowingFrames:
@@ -59,9 +59,9 @@ class GrowingFrames:
         self._count = 0
         self._room = FIRST_ROOM
         self._rate: Fraction | None = None
-        self._index: npt.NDArray[np.int64] = np.zeros(self._room, dtype=np.int64)
-        self._bits: npt.NDArray[np.int64] = np.zeros(self._room, dtype=np.int64)
-        self._intra: npt.NDArray[np.bool_] = np.zeros(self._room, dtype=np.bool_)
+        self._index: Int64 = np.zeros(self._room, dtype=np.int64)
+        self._bits: Int64 = np.zeros(self._room, dtype=np.int64)
+        self._intra: Bool = np.zeros(self._room, dtype=np.bool_)
         self._face: Rows | None = None
         self._body: Rows | None = None
         self._settled = False
@@ -125,7 +125,7 @@ class GrowingFrames:
                 for name, rows in part.items():
                     part[name] = _larger(rows, self._room)
 
-    def _indices(self, block: Block) -> npt.NDArray[np.int64]:
+    def _indices(self, block: Block) -> Int64:
         """A block's indices at the rate of all, which becomes finer where the stream changes its own."""
         if self._rate is None:
             self._rate = block.rate
@@ -143,9 +143,7 @@ class GrowingFrames:
             following = int(self._index[self._count - 1]) + 1
         step = self._rate / block.rate
         first = max(math.floor(block.start * self._rate + Fraction(1, 2)), following)
-        found: npt.NDArray[np.int64] = (
-            first + (block.index - block.index[0]) * step.numerator // step.denominator
-        )
+        found: Int64 = first + (block.index - block.index[0]) * step.numerator // step.denominator
         if step < 1:  # too fine to be told apart: one after the other
             found = np.maximum(found, first + np.arange(len(found)))
         return found
@@ -155,13 +153,13 @@ def _rows(fields: dict[str, tuple[int, type]], room: int) -> Rows:
     return {name: np.zeros((room, columns), dtype=kind) for name, (columns, kind) in fields.items()}
 
 
-def _larger(rows: npt.NDArray[Any], room: int) -> npt.NDArray[Any]:
+def _larger(rows: Array, room: int) -> Array:
     grown = np.zeros((room, *rows.shape[1:]), dtype=rows.dtype)
     grown[: len(rows)] = rows
     return grown
 
 
-def _seen(rows: npt.NDArray[Any], count: int) -> npt.NDArray[Any]:
+def _seen(rows: Array, count: int) -> Array:
     view = rows[:count]
     view.flags.writeable = False
     return view

@@ -13,10 +13,8 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, Protocol
 
-import numpy as np
-import numpy.typing as npt
-
 from fba.animation import Animation, BodyTrack, FaceTrack
+from fba.arrays import Int64
 from fba.codec import Decoder, StreamInfo
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
@@ -87,7 +85,7 @@ class LiveAnimation:
         return self._frames.now.rate
 
     @property
-    def index(self) -> npt.NDArray[np.int64]:
+    def index(self) -> Int64:
         """int64 (T,) of what has arrived."""
         return self._frames.now.index
 

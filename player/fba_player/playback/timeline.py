@@ -11,16 +11,14 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Array, Float32, Float64, Int32, Intp
 from fba.face.resolve import Resolver, hold
 from fba.parameters import BAP_COUNT, FAP_COUNT
-
-Float64 = npt.NDArray[np.float64]
 
 TURN = 2 * math.pi / 1e-5
 """A whole turn in units of a BAP."""
@@ -51,9 +49,9 @@ class Timeline:
         self.animation = animation
         self.interpolate = True
         self._resolvers: list[Resolver] = [Resolver(model)]
-        self._bodies: list[npt.NDArray[np.int32]] = [np.zeros(BAP_COUNT, dtype=np.int32)]
-        self._faces_shown: OrderedDict[int, npt.NDArray[np.float32]] = OrderedDict()
-        self._bodies_shown: OrderedDict[int, npt.NDArray[np.int32]] = OrderedDict()
+        self._bodies: list[Int32] = [np.zeros(BAP_COUNT, dtype=np.int32)]
+        self._faces_shown: OrderedDict[int, Float32] = OrderedDict()
+        self._bodies_shown: OrderedDict[int, Int32] = OrderedDict()
 
     @property
     def rate(self) -> Fraction:
@@ -104,7 +102,7 @@ class Timeline:
         """Exact time of a frame, by its position in the animation."""
         return Fraction(int(self.animation.index[frame])) / self.rate
 
-    def faps(self, time: float) -> npt.NDArray[np.float32]:
+    def faps(self, time: float) -> Float32:
         """(68,) FAPs shown; zeros where the animation has no face."""
         if self.animation.face is None:
             return np.zeros(68, dtype=np.float32)
@@ -112,7 +110,7 @@ class Timeline:
         first = self._face(before)
         if share == 0.0 or not self.interpolate:
             return first
-        shown: npt.NDArray[np.float32] = first + (self._face(after) - first) * np.float32(share)
+        shown: Float32 = first + (self._face(after) - first) * np.float32(share)
         return shown
 
     def baps(self, time: float) -> Float64:
@@ -132,7 +130,7 @@ class Timeline:
         shown: Float64 = first + _shorter(self._body(after) - first) * share
         return shown
 
-    def many(self, times: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], Float64]:
+    def many(self, times: npt.ArrayLike) -> tuple[Float32, Float64]:
         """`faps` (T, 68) and `baps` (T, 296) at many times (T,), seconds, much faster than one by one."""
         at = np.asarray(times, dtype=np.float64) * self.rate.numerator / self.rate.denominator
         if not self.frames or not np.isfinite(at).all():
@@ -156,10 +154,10 @@ class Timeline:
 
     def _gathered(
         self,
-        frames: npt.NDArray[np.intp],
-        look: Callable[[int], npt.NDArray[Any]],
-        shown: OrderedDict[int, npt.NDArray[Any]],
-    ) -> npt.NDArray[Any]:
+        frames: Intp,
+        look: Callable[[int], Array],
+        shown: OrderedDict[int, Array],
+    ) -> Array:
         """Rows of many frames; look: works out one frame, with its block, which is then in shown."""
         blocks = frames // self.block
         parts = {}
@@ -173,7 +171,7 @@ class Timeline:
             gathered[chosen] = rows
         return gathered
 
-    def _face(self, frame: int) -> npt.NDArray[np.float32]:
+    def _face(self, frame: int) -> Float32:
         block, row = divmod(frame, self.block)
         shown = self._faces_shown.get(block)
         if shown is None or row >= len(shown):
@@ -185,10 +183,10 @@ class Timeline:
                 self._resolvers.append(resolver)
             shown = self._resolvers[block].copy().push(track[self._rows(block)])
             _keep(self._faces_shown, block, shown)
-        face: npt.NDArray[np.float32] = shown[row]
+        face: Float32 = shown[row]
         return face
 
-    def _body(self, frame: int) -> npt.NDArray[np.int32]:
+    def _body(self, frame: int) -> Int32:
         block, row = divmod(frame, self.block)
         shown = self._bodies_shown.get(block)
         if shown is None or row >= len(shown):
@@ -196,16 +194,16 @@ class Timeline:
                 self._bodies.append(self._held_body(len(self._bodies) - 1)[-1].copy())
             shown = self._held_body(block)
             _keep(self._bodies_shown, block, shown)
-        body: npt.NDArray[np.int32] = shown[row]
+        body: Int32 = shown[row]
         return body
 
-    def _held_body(self, block: int) -> npt.NDArray[np.int32]:
+    def _held_body(self, block: int) -> Int32:
         track = self.animation.body
         assert track is not None
         part = track[self._rows(block)]
         if part.mask.all():
             return part.values
-        held: npt.NDArray[np.int32] = hold(part.values, part.mask, self._bodies[block])
+        held: Int32 = hold(part.values, part.mask, self._bodies[block])
         return held
 
     def _rows(self, block: int) -> slice:
@@ -221,7 +219,7 @@ def _shorter(way: Float64) -> Float64:
     return shorter
 
 
-def _keep(shown: OrderedDict[int, npt.NDArray[Any]], block: int, values: npt.NDArray[Any]) -> None:
+def _keep(shown: OrderedDict[int, Array], block: int, values: Array) -> None:
     shown[block] = values
     while len(shown) > KEPT_BLOCKS:
         shown.popitem(last=False)

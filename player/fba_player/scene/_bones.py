@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.body import Skeleton
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
 from fba_player.view.view import CAPSULE_FLOATS, spheres, srgb
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 BONE = (*srgb("#c3c8cf"), 0.12)
 JOINT = (*srgb("#e08a3c"), 0.25)

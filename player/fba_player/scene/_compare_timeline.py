@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int64
 from fba_player.playback.timeline import FRAME_ROUNDING, Timeline
 
 FINEST = 1_000_000
@@ -29,7 +29,7 @@ class CompareTimeline:
         self.timelines = tuple(timelines)
         self.later = _later(self.timelines)
         """Seconds by which each is shown later than its own times say, exact."""
-        self._merged: tuple[int, Fraction, npt.NDArray[np.int64]] | None = None
+        self._merged: tuple[int, Fraction, Int64] | None = None
 
     @property
     def rate(self) -> Fraction:
@@ -99,15 +99,15 @@ class CompareTimeline:
         gap = int(index[after]) - int(index[before])
         return before, after, min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
 
-    def faps(self, time: float) -> npt.NDArray[np.float32]:
+    def faps(self, time: float) -> Float32:
         """(68,) of the first."""
         return self.timelines[0].faps(self.own_time(0, time))
 
-    def baps(self, time: float) -> npt.NDArray[np.float64]:
+    def baps(self, time: float) -> Float64:
         """(296,) of the first."""
         return self.timelines[0].baps(self.own_time(0, time))
 
-    def times(self) -> npt.NDArray[np.float64]:
+    def times(self) -> Float64:
         """(T,) seconds of all frames."""
         rate, index = self._frames()
         return index * rate.denominator / rate.numerator
@@ -115,7 +115,7 @@ class CompareTimeline:
     def _shown(self) -> zip[tuple[Timeline, Fraction]]:
         return zip(self.timelines, self.later, strict=True)
 
-    def _frames(self) -> tuple[Fraction, npt.NDArray[np.int64]]:
+    def _frames(self) -> tuple[Fraction, Int64]:
         """A rate at which every frame has a whole number, and those numbers, ascending."""
         arrived = self.arrived
         if self._merged is None or self._merged[0] != arrived:

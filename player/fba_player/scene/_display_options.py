@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64
 from fba.face.feature_points import names
 from fba_player.figure.face import FaceFigure
 from fba_player.scene._bones import Bones, face_pivots
@@ -17,9 +17,6 @@ from fba_player.scene._wireframe import Wireframe
 from fba_player.view.annotations import Colour, Dots, Extras, Grid
 from fba_player.view.switches import Switches
 from fba_player.view.view import FaceMesh, FaceShape, View
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 LEFT_OUT = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
 """Kinds of parts that a switch takes out."""
@@ -57,7 +54,7 @@ class Dressing:
         self._full: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
         self._pivots = face_pivots(figure.model, figure.scale)
         model = figure.model
-        self._known: npt.NDArray[np.bool_] = np.asarray(np.isfinite(model.points).all(axis=1))
+        self._known: Bool = np.asarray(np.isfinite(model.points).all(axis=1))
         self._names = tuple(name for name, known in zip(names(), self._known, strict=True) if known)
         self._scale = figure.scale
 
@@ -106,8 +103,8 @@ class Dressing:
             view = replace(view, eyes=[])
         if not switches["shadows"]:
             free = np.array(UNSHADED, dtype=np.float32)
-            lit = [np.broadcast_to(free, (len(mesh.places), len(free))) for mesh in view.faces]
-            faces = [replace(mesh, reaching=light) for mesh, light in zip(view.faces, lit, strict=True)]
+            lit = [np.broadcast_to(free, (len(mesh.positions), len(free))) for mesh in view.faces]
+            faces = [replace(mesh, light=light) for mesh, light in zip(view.faces, lit, strict=True)]
             view = replace(view, faces=faces, blobs=no_shadows())
         return view
 

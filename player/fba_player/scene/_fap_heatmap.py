@@ -9,17 +9,14 @@ from importlib.resources import files
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Floating
 from fba.parameters import FAP_COUNT, faps
 from fba_player.figure.face import FaceFigure
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.view.annotations import Legend
 from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape, rotation_vector
 from fba_player.view.world_positions import swayed
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 STEPS, ANGLE = 100, 10_000
 """The value of the FAP that is looked at: of distances, about a tenth of the unit; of angles, 0.1 rad."""
@@ -108,7 +105,7 @@ class Influence:
         return _linear(shown(share))
 
 
-def shown(shares: npt.NDArray[np.floating]) -> Float64:
+def shown(shares: Floating) -> Float64:
     """(N, 3) colours as they are shown (sRGB, 0..1) for shares 0..1 of the largest movement."""
     table = _table()
     columns = [np.interp(shares, table[:, 0], table[:, column]) for column in (1, 2, 3)]

@@ -8,16 +8,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.face.feature_points import row_of
 from fba_player.figure.face import FaceFigure
 from fba_player.mesh.primitives import tube_mesh
 from fba_player.scene._skin_lines import skin_lines
 from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 POINT = (*srgb("#f0a04b"), 0.3)
 POINT_RADIUS = 0.00125

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba_player.view.camera import Subject
-
-Float64 = npt.NDArray[np.float64]
 
 BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
 """Somebody who stands at the origin."""

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba_player.view.annotations import Grid
 from fba_player.view.camera import Subject
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 SHADOWS = (
     ("HumanoidRoot", 0.55, 0.42, 0.97),

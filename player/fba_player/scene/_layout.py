@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba_player.view.annotations import Dots, Extras, Lines
 from fba_player.view.view import MeshShape, View, translation
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 Colour = tuple[float, float, float]
 
 JOINT = 1e-3

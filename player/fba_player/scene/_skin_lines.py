@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Intp
 from fba.face.model import FaceModel, point_row
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
+Indices = Intp
 
 FINER = 8
 """Steps between two points."""

@@ -5,15 +5,12 @@ from __future__ import annotations
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32, Intp
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.view.annotations import Colour, Lines
 from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape
 from fba_player.view.world_positions import directions, places
-
-Float32 = npt.NDArray[np.float32]
-Int32 = npt.NDArray[np.int32]
 
 WIRE: Colour = (0.03, 0.05, 0.08, 0.8)
 WIRE_LIFT = 0.0012
@@ -32,7 +29,7 @@ class Wireframe:
 
     def __init__(self) -> None:
         self._edges: WeakKeyDictionary[FaceShape | MeshShape, Int32] = WeakKeyDictionary()
-        self._thinned: WeakKeyDictionary[FaceShape, npt.NDArray[np.intp]] = WeakKeyDictionary()
+        self._thinned: WeakKeyDictionary[FaceShape, Intp] = WeakKeyDictionary()
         vertices, triangles = sphere_mesh(*RINGS)
         self._ball = vertices[unique_edges(triangles)]
 
@@ -72,14 +69,14 @@ def unique_edges(triangles: Int32) -> Int32:
     return found
 
 
-def _thinned(mesh: FaceMesh, cell: float) -> npt.NDArray[np.intp]:
+def _thinned(mesh: FaceMesh, cell: float) -> Intp:
     """The first vertex that triangles use in every cell of that many metres."""
     used = np.unique(mesh.shape.triangles)
     cells = np.floor(mesh.positions[used] / max(cell, 1e-9)).astype(np.int64)
-    first: npt.NDArray[np.intp] = np.unique(cells, axis=0, return_index=True)[1]
+    first: Intp = np.unique(cells, axis=0, return_index=True)[1]
     return used[np.sort(first)].astype(np.intp)
 
 
-def _moved(positions: Float32, matrix: npt.NDArray[np.float64]) -> Float32:
+def _moved(positions: Float32, matrix: Float64) -> Float32:
     moved: Float32 = (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
     return moved

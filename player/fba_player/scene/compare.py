@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba_player.scene._compare_timeline import CompareTimeline
 from fba_player.scene._layout import Drawing, caption, joined, moved
 from fba_player.scene.differences import Differences, differences
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
     from fba_player.figure.face import FaceFigure
 
-Float64 = npt.NDArray[np.float64]
 
 ARRANGEMENTS = ("side", "over")
 """Beside each other, or each over the first as a drawing of feature points and bones in a colour."""
@@ -182,7 +181,7 @@ class CompareScene(InTime[CompareTimeline]):
             views.append(view)
         return joined(views)
 
-    def still(self, faps: npt.NDArray[np.float32]) -> View:
+    def still(self, faps: Float32) -> View:
         """The first one alone for FAPs (68,)."""
         return self.scenes[0].still(faps)
 

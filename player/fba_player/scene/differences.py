@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.parameters import baps, faps
 from fba_player.scene._compare_timeline import CompareTimeline
 
@@ -38,9 +38,9 @@ class Differences:
     kept where nothing was sent, between frames interpolated. Zeros where one has no face, or no body.
     """
 
-    times: npt.NDArray[np.float64]
-    faps: npt.NDArray[np.float32]
-    baps: npt.NDArray[np.float64]
+    times: Float64
+    faps: Float32
+    baps: Float64
 
     @cached_property
     def fap_units(self) -> list[str]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Float32, Float64
 from fba_player.playback.timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
 from fba_player.scene._ground import no_shadows, shadows
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LOOKS", "SWITCHES", "Scene", "default_camera"]
 
-Float64 = npt.NDArray[np.float64]
 
 SAMPLES = 48
 """Moments at which the extent of a moving body is looked up to fit the camera."""
@@ -161,14 +160,14 @@ class Scene(InTime[Timeline]):
         whole = self.has_body and preset == "body"
         return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
 
-    def of(self, faps: npt.NDArray[np.float32], baps: Float64) -> View:
+    def of(self, faps: Float32, baps: Float64) -> View:
         """What is drawn for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), whatever is played.
 
         baps count only where the animation has a body.
         """
         return self._shown(faps, self._solver.pose(baps) if self.has_body else None)
 
-    def still(self, faps: npt.NDArray[np.float32]) -> View:
+    def still(self, faps: Float32) -> View:
         """The face for FAPs (68,) as they are shown, in the body's posture at the start."""
         return self._shown(faps, self._posed(float(self.start))[1])
 
@@ -179,7 +178,7 @@ class Scene(InTime[Timeline]):
         """
         return self._shown(*self._posed(time))
 
-    def _shown(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+    def _shown(self, faps: Float32, joints: Float64 | None) -> View:
         view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
         if not self.switches.changed:
             return view
@@ -189,7 +188,7 @@ class Scene(InTime[Timeline]):
             self._dressing = Dressing(self.figure, self._bones if self.has_body else None)
         return self._dressing.dressed(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
 
-    def _person_or_head(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+    def _person_or_head(self, faps: Float32, joints: Float64 | None) -> View:
         """The view as a figure."""
         if joints is None:
             world = np.eye(4)
@@ -202,7 +201,7 @@ class Scene(InTime[Timeline]):
             ground=True,
         )
 
-    def _points(self, faps: npt.NDArray[np.float32], joints: Float64 | None) -> View:
+    def _points(self, faps: Float32, joints: Float64 | None) -> View:
         """The view as feature points and bones."""
         if self._point_view is None:
             from fba_player.scene._feature_points_view import PointView
@@ -230,7 +229,7 @@ class Scene(InTime[Timeline]):
         centre = self.subject.centre
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
 
-    def _posed(self, time: float) -> tuple[npt.NDArray[np.float32], Float64 | None]:
+    def _posed(self, time: float) -> tuple[Float32, Float64 | None]:
         faps = self.timeline.faps(time)
         if not self.has_body:
             return faps, None

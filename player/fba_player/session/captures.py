@@ -7,16 +7,12 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import UInt8
 from fba.errors import FbaError
 from fba_player.export.image_files import write_picture
 from fba_player.export.recorder import Recorder
 from fba_player.session.session import Session
 from fba_player.sound.recorded_sound import FilmSound
-
-UInt8 = npt.NDArray[np.uint8]
 
 RATE = 30
 """Frames a second of a film of the window."""

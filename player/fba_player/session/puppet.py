@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.face.expressions import Definitions
 from fba.parameters import (
     BAP_COUNT,
@@ -17,8 +17,8 @@ from fba.parameters import (
     VISEME_SELECT_MAX,
 )
 
-Faps = npt.NDArray[np.float32]
-Baps = npt.NDArray[np.float64]
+Faps = Float32
+Baps = Float64
 
 
 @dataclass(frozen=True, slots=True)

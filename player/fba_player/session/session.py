@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba_player.playback.transport import Transport
 from fba_player.session._camera_controller import Viewpoint
 from fba_player.session.keys import by_name
@@ -30,8 +30,8 @@ from fba_player.view.view import View
 if TYPE_CHECKING:
     from fba_player.sound.player import Audio
 
-Faps = npt.NDArray[np.float32]
-Baps = npt.NDArray[np.float64]
+Faps = Float32
+Baps = Float64
 PathLike = str | os.PathLike[str]
 Hook = Callable[[Faps, Baps], None]
 

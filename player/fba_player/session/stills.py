@@ -6,14 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import UInt8
 from fba_player.export.offscreen import cut_out
 from fba_player.gl.framebuffer import Target
 from fba_player.gl.renderer import Renderer
 from fba_player.session.session import Session
-
-UInt8 = npt.NDArray[np.uint8]
 
 SAMPLES = 4
 

@@ -7,15 +7,15 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Float32, Float64
 from fba.errors import FormatError, RangeError
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP
 from fba.tracks import BodyTrack, FaceTrack
 
-Faps = npt.NDArray[np.float32]
-Baps = npt.NDArray[np.float64]
+Faps = Float32
+Baps = Float64
 
 RATE = Fraction(25)
 """Frames a second where what is played has no usable rate."""

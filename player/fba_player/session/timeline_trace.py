@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Array, Bool, Float64, UInt8
 from fba.codec import StreamInfo
-
-Float64 = npt.NDArray[np.float64]
-UInt8 = npt.NDArray[np.uint8]
 
 PREDICTED = (120, 160, 190)
 INTRA = (238, 178, 84)
@@ -32,7 +28,7 @@ class Trace:
     """
 
     amounts: Float64
-    intra: npt.NDArray[np.bool_]
+    intra: Bool
     times: Float64
     bits: bool
 
@@ -52,7 +48,7 @@ def trace_of_motion(animation: Animation) -> Trace | None:
     """
     moved = np.zeros(len(animation))
     face, body = animation.face, animation.body
-    tables: list[npt.NDArray[Any]] = [] if face is None else [face.values, face.viseme, face.expression]
+    tables: list[Array] = [] if face is None else [face.values, face.viseme, face.expression]
     tables += [] if body is None else [body.values]
     for values in tables if len(animation) else []:
         spread = values.max(axis=0).astype(np.float64) - values.min(axis=0)

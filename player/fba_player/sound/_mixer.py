@@ -6,12 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Int16
 from fba_player.playback.playhead import Motion
-
-Int16 = npt.NDArray[np.int16]
-Float32 = npt.NDArray[np.float32]
 
 FADE = 0.004
 """Seconds in which sound begins, ends, and goes over into another place: without them it would click."""

@@ -8,12 +8,10 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int16
 from fba.errors import FbaError
 from fba_player.sound.audio_file import CHANNELS, SoundFile
-
-Int16 = npt.NDArray[np.int16]
 
 SECONDS = 0.5
 """Length of a block."""

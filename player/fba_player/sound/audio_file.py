@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int16
 from fba.atomic_path import PathLike
 from fba.errors import FbaWarning, FormatError
 from fba_player.sound.pyav import av_version, import_av
-
-Int16 = npt.NDArray[np.int16]
 
 CHANNELS = 2
 RATES = (8000, 192_000)

@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Int16
 from fba.atomic_path import PathLike
 from fba_player.playback.transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.pyav import import_av
 from fba_player.sound.soundtrack import AAC_RATES, BLOCK
-
-Int16 = npt.NDArray[np.int16]
 
 PIECE = 1.0
 """Seconds mixed at once, at most."""

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32
 from fba.atomic_path import PathLike
 from fba.errors import FormatError
 from fba_player.sound.audio_file import open_sound
 from fba_player.sound.pyav import import_av
-
-Float32 = npt.NDArray[np.float32]
 
 AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
 BLOCK = 1024

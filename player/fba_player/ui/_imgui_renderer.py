@@ -11,8 +11,9 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from imgui_bundle import imgui
+
+from fba.arrays import Array, UInt8
 
 VERTEX_BYTES = 20
 """A vertex as Dear ImGui lays it out: place and place in the texture, two float32 each, and four bytes."""
@@ -80,7 +81,7 @@ class ImguiRenderer:
         gl.scissor = None
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA
 
-    def keep(self, name: str, pixels: npt.NDArray[np.uint8]) -> imgui.ImTextureRef:
+    def keep(self, name: str, pixels: UInt8) -> imgui.ImTextureRef:
         """A picture, uint8 (H, W, 4), for imgui to draw; it takes the place of the last of that name."""
         height, width = pixels.shape[:2]
         made = self._gl.texture((width, height), 4, np.ascontiguousarray(pixels).tobytes())
@@ -184,7 +185,7 @@ class ImguiRenderer:
             texture.set_status(status.destroyed)
 
 
-def _view(vector: Any, count: int, dtype: np.dtype[Any]) -> npt.NDArray[Any]:
+def _view(vector: Any, count: int, dtype: np.dtype[Any]) -> Array:
     """An imgui vector's memory as so many numbers, without a copy; valid until the next frame."""
     memory = (ctypes.c_char * (count * dtype.itemsize)).from_address(vector.data_address())
     return np.frombuffer(memoryview(memory).cast("B"), dtype)

@@ -9,14 +9,12 @@ import sys
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import UInt8
 from fba_player.gl.context import offscreen_context
 from fba_player.gl.framebuffer import Target
 from fba_player.gl.renderer import Renderer
 from fba_player.session.session import Session
-
-UInt8 = npt.NDArray[np.uint8]
 
 SETTLES = 4
 """Pictures until panels have found their size and place."""

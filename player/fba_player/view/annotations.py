@@ -9,12 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import Float32
 from fba_player.view.view import FaceMesh
 
-Float32 = npt.NDArray[np.float32]
 Colour = tuple[float, float, float, float]
 
 
@@ -82,8 +79,3 @@ class Extras:
     shells: tuple[FaceMesh, ...] = field(default=())
     grid: Grid | None = None
     legend: Legend | None = None
-
-    @property
-    def is_fine(self) -> bool:
-        """Whether there are lines or dots in it, which would not become better by being smoothed."""
-        return bool(self.lines or self.dots) or self.grid is not None

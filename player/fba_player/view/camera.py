@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-Float64 = npt.NDArray[np.float64]
+from fba.arrays import Float64
 
 PRESETS = {
     "front": (0.0, 0.0),

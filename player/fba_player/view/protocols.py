@@ -8,9 +8,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Generic, Protocol, TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
+from fba.arrays import Float32, Float64
 from fba_player.view.camera import Camera
 from fba_player.view.switches import Switches
 from fba_player.view.view import View
@@ -49,10 +47,10 @@ class Times(Protocol):
 class Course(Times, Protocol):
     """What parameters a performance shows at any time."""
 
-    def faps(self, time: float) -> npt.NDArray[np.float32]:
+    def faps(self, time: float) -> Float32:
         """(68,) as `fba.face.resolve` gives them; zeros where there is no face."""
 
-    def baps(self, time: float) -> npt.NDArray[np.float64]:
+    def baps(self, time: float) -> Float64:
         """(296,); zeros where there is no body."""
 
 

@@ -6,23 +6,19 @@ more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres;
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Int32
+
 if TYPE_CHECKING:
-    from fba_player.mesh.lazy_vertices import Places, Whole
     from fba_player.mesh.simplify import Coarser
     from fba_player.mesh.texture_image import FacePicture
     from fba_player.view.annotations import Extras
 
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Rows = npt.NDArray[np.intp]
 
 CAPSULE_FLOATS = 16
 """A capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
@@ -38,7 +34,7 @@ class MeshShape:
     thinner than about a pixel.
     """
 
-    triangles: npt.NDArray[np.int32]
+    triangles: Int32
     colours: Float32
     two_sided: bool = False
     raised: float = 0.0
@@ -71,7 +67,7 @@ class FaceShape:
     its triangles are so large that their light changes visibly within them.
     """
 
-    triangles: npt.NDArray[np.int32]
+    triangles: Int32
     colours: Float32
     sway: Float32
     texcoords: Float32 | None = None
@@ -96,59 +92,22 @@ class FaceShape:
 class FaceMesh:
     """A part of a face in one pose.
 
-    places: positions and normals, float32 (V, 3), without the head's rotation. reaching: float32 (V, 4),
-    0..1, what reaches each vertex past the rest of the face: of the key light, of the open sky, through
-    the skin from behind, of the rim light; or what gives that for chosen vertices (N,), or for None, all.
-    matrix: (4, 4) into the world. turn: (3,) axis of the head's rotation times its angle, about centre (3,),
-    in the frame of the positions. away: from the camera that it is drawn for, in its own unit; None where
-    that is not known. Arrays are not written to any more: renderers know what they have by its identity.
+    positions, normals: float32 (V, 3), without the head's rotation. light: float32 (V, 4), 0..1, the share of
+    light that reaches each vertex past the rest of the figure: key light, open sky, light through the skin
+    from behind, rim light. matrix: (4, 4), into the world. turn: (3,), the axis of the head's rotation times
+    its angle, about `centre` (3,), in the frame of the positions. away: distance from the camera that the
+    mesh is drawn for, in the mesh's own unit; None if not known. Do not write to the arrays: renderers
+    recognise by their identity what they have uploaded.
     """
 
     shape: FaceShape
-    places: Places
-    reaching: Float32 | Callable[[Rows | None], Float32]
+    positions: Float32
+    normals: Float32
+    light: Float32
     matrix: Float64
     turn: Float64
     centre: Float64
     away: float | None = None
-
-    @property
-    def positions(self) -> Float32:
-        """float32 (V, 3), worked out for all of the figure with the first that is asked for."""
-        return self.places.positions
-
-    @property
-    def normals(self) -> Float32:
-        """float32 (V, 3), likewise."""
-        return self.places.normals
-
-    def afresh(self, wholes: dict[int, Whole]) -> FaceMesh:
-        """The same, with nothing worked out yet; wholes: see `Places.afresh`."""
-        return replace(self, places=self.places.afresh(wholes))
-
-    @cached_property
-    def light(self) -> Float32:
-        """What reaches each vertex: float32 (V, 4)."""
-        return self.reaching(None) if callable(self.reaching) else self.reaching
-
-    def light_at(self, rows: Rows) -> Float32:
-        """The same for chosen vertices: float32 (N, 4)."""
-        return self.reaching(rows) if callable(self.reaching) else self.reaching.take(rows, axis=0)
-
-
-class ChosenLight:
-    """What reaches chosen vertices (N,), worked out where it is asked for; of: what gives it."""
-
-    def __init__(self, of: Callable[[Rows | None], Float32], rows: Rows) -> None:
-        self.of = of
-        self._rows = rows
-        self._found: Float32 | None = None
-
-    def __call__(self, rows: Rows | None) -> Float32:
-        """float32 (M, 4) at some of them, (M,), or at all; of all the same array each time."""
-        if self._found is None:
-            self._found = self.of(self._rows)
-        return self._found if rows is None else self._found.take(rows, axis=0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,13 @@ from fba_player.figure.body_light import REACH, BodyLight
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 
 
-def lit(joints: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+def shade(joints: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
     body = BodyModel.default()
     places, normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
     body.skin(joints, places, normals)
-    return BodyLight(body, [None] * len(body.parts)).reaching(places, normals, joints), places
+    return BodyLight(body, dict.fromkeys(part.name for part in body.parts)).shade(
+        places, normals, joints
+    ), places
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +29,7 @@ def standing() -> npt.NDArray[np.float64]:
 
 
 def test_no_more_light_than_there_is_and_little_lost_in_the_open(standing: npt.NDArray[np.float64]) -> None:
-    light, places = lit(standing)
+    light, places = shade(standing)
     assert (light >= 0).all()
     assert (light <= np.array(REACH, dtype=np.float32) + 1e-6).all()
     shin = (np.abs(places[:, 1] - 0.25) < 0.05) & (places[:, 2] > np.quantile(places[:, 2], 0.6))
@@ -38,7 +40,7 @@ def test_no_more_light_than_there_is_and_little_lost_in_the_open(standing: npt.N
 def test_an_arm_before_the_chest_takes_its_key_light(standing: npt.NDArray[np.float64]) -> None:
     """The left forearm is put 25 cm from the chest, on the way from its middle to the key light."""
     body = BodyModel.default()
-    light, places = lit(standing)
+    light, places = shade(standing)
     names = list(body.skeleton.names)
     rows = slice(body.starts["shirt"], body.starts["shirt"] + len(body.part("shirt").vertices))
     chest = np.array([0.0, 1.3, places[rows][np.abs(places[rows, 1] - 1.3) < 0.03, 2].max()])
@@ -46,10 +48,10 @@ def test_an_arm_before_the_chest_takes_its_key_light(standing: npt.NDArray[np.fl
     moved = standing.copy()
     for name, aside in (("l_elbow", 0.15), ("l_wrist", -0.15)):
         moved[names.index(name), :3, 3] = chest + 0.25 * key + (aside, 0, 0)
-    before = BodyLight(body, [None] * len(body.parts))
+    before = BodyLight(body, dict.fromkeys(part.name for part in body.parts))
     normals = np.empty_like(places)
     body.skin(standing, np.empty_like(places), normals)
-    shaded = before.reaching(places, normals, moved)
+    shaded = before.shade(places, normals, moved)
     near = np.flatnonzero(np.linalg.norm(places - chest, axis=1) < 0.03)
     assert len(near) > 2
     assert shaded[near, 0].max() < 0.35

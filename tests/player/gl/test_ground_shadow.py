@@ -7,7 +7,6 @@ import pytest
 
 from fba.compiled import is_compiled
 from fba_player.gl._ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
-from fba_player.mesh.lazy_vertices import Places
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.mesh.simplify import Coarser
 from fba_player.view.view import FaceMesh, FaceShape
@@ -32,9 +31,7 @@ def ball(radius: float, centre: tuple[float, float, float]) -> FaceMesh:
     matrix = np.eye(4)
     matrix[:3, 3] = centre
     light = np.ones((count, 4), dtype=np.float32)
-    return FaceMesh(
-        shape, Places.of(places, vertices.astype(np.float32)), light, matrix, np.zeros(3), np.zeros(3)
-    )
+    return FaceMesh(shape, places, vertices.astype(np.float32), light, matrix, np.zeros(3), np.zeros(3))
 
 
 def at(shadow: CastShadow, x: float, z: float) -> float:

@@ -11,7 +11,6 @@ import pytest
 from fba.cache import kept
 from fba.compiled import is_compiled
 from fba_player.gl.lod import Details, distance, same
-from fba_player.mesh.lazy_vertices import Places
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.mesh.simplify import TOLERANCES, Coarser, coarser
 from fba_player.view.view import FaceMesh, FaceShape
@@ -50,7 +49,8 @@ def mesh_of(vertices: npt.NDArray[np.float32], triangles: Int32) -> FaceMesh:
     )
     return FaceMesh(
         shape,
-        Places.of(vertices, vertices),
+        vertices,
+        vertices,
         np.ones((count, 4), np.float32),
         np.eye(4),
         np.zeros(3),

@@ -14,7 +14,6 @@ from fba_player.figure._eyeball import find_eyeball
 from fba_player.figure._face_parts import hairs
 from fba_player.gl._antialias_region import filled
 from fba_player.gl._silhouette import TILE, Outliner
-from fba_player.mesh.lazy_vertices import Places
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.view.camera import Camera
 from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
@@ -120,7 +119,7 @@ def test_the_outline_of_a_ball_is_a_circle() -> None:
     vertices, triangles = sphere_mesh(24, 48)
     shape = FaceShape(triangles, np.zeros((len(vertices), 4), np.float32), np.ones(len(vertices), np.float32))
     light = np.ones((len(vertices), 4), dtype=np.float32)
-    mesh = FaceMesh(shape, Places.of(vertices * 0.1, vertices), light, np.eye(4), np.zeros(3), np.zeros(3))
+    mesh = FaceMesh(shape, vertices * 0.1, vertices, light, np.eye(4), np.zeros(3), np.zeros(3))
     camera, size = Camera(distance=2.0), (200, 200)
     matrix = camera.projection_matrix(1.0) @ camera.view_matrix()
     outliner = Outliner()

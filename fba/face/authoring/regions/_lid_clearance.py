@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.regions.mouth_opening import CLOSED
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.weights import smooth_step
 from fba.face.model import Part
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
-Bool = npt.NDArray[np.bool_]
 
 CLEARANCE = 0.012
 """Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
@@ -95,7 +91,7 @@ class Profile:
         return result
 
 
-def edge_length(marks: Landmarks, own: Int, other: Int) -> float:
+def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
     """The longer ones of the edges at the margins of an eye."""
     surface = marks.surface
     at_margin = np.zeros(len(surface), dtype=bool)
@@ -113,7 +109,7 @@ def freed(profile: Profile, points: Float64, shifts: Float64, values: Float64) -
 
 
 def bridged(
-    profile: Profile, surface: Surface, vertices: Int, shifts: Float64, margins: Bool, values: Float64
+    profile: Profile, surface: Surface, vertices: Intp, shifts: Float64, margins: Bool, values: Float64
 ) -> Float64:
     """Shifts (K, N, 3) with vertices brought forwards where the edges from them would cut the eyeball."""
     place = np.full(len(surface), -1)

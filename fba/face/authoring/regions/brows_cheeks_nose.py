@@ -12,8 +12,8 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
@@ -22,9 +22,6 @@ from fba.face.authoring.surface.weights import region, smoothed, spread, through
 from fba.face.feature_points import MIRRORED
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 SMOOTHINGS = 5
 HEM = 0.006

@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Intp
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
@@ -14,8 +14,6 @@ from fba.face.authoring.surface.motion_limits import linear
 from fba.face.authoring.surface.weights import smooth_step, smoothed, without_hem
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
 
 EARS = {
     "left": {"top": "10.1", "back": "10.3", "lobe": "10.5", "below": "10.7", "above": "10.9"},
@@ -76,7 +74,7 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
     return without_hem(share / max(share[own], 1e-9), HEM)
 
 
-def _rim(marks: Landmarks, names: dict[str, str]) -> npt.NDArray[np.intp]:
+def _rim(marks: Landmarks, names: dict[str, str]) -> Intp:
     """Vertices around the ear, from its upper end at the face over the back to the lobe."""
     known = [marks.vertex[names[key]] for key in ("top", "back", "lobe") if marks.has(names[key])]
     walk = [np.array(known, dtype=np.intp)]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
@@ -16,8 +16,6 @@ from fba.face.eyeball import sphere
 from fba.face.model import Part
 from fba.face.points import EYEBALL_PER_IRIS
 from fba.face.tables import FaceDefTransform
-
-Float64 = npt.NDArray[np.float64]
 
 PUPIL_OF_IRIS = 1 / 3
 """Of a neutral face."""

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Intp
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import limits
 from fba.face.authoring.surface.weights import region, smooth_step, spread, without_hem
 from fba.face.model import Part
 from fba.face.points import OPEN_JAW
-
-Float64 = npt.NDArray[np.float64]
 
 CHIN = ("2.1", "2.10", "2.11", "2.12")
 EARS = ("10.7", "10.8", "10.9", "10.10")
@@ -211,7 +209,7 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
     return without_hem(np.clip(field[:, 0], 0.0, 1.0), HEM)
 
 
-def _along_jaw(marks: Landmarks, line: npt.NDArray[np.intp]) -> Float64:
+def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
     """Shares along the jaw line: 1 between the corners of the chin, less towards the corners of the jaw."""
     chin = [k for k, v in enumerate(line) if v in {marks.vertex.get(name) for name in CHIN}]
     steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
@@ -244,7 +242,7 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     return without_hem(np.clip(field, 0.0, 1.0), HEM)
 
 
-def _from_corners(marks: Landmarks, vertices: npt.NDArray[np.intp]) -> Float64:
+def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:
     """(M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
     x = marks.surface.vertices[vertices, 0]
     left, right = marks.guess("2.4")[0], marks.guess("2.5")[0]

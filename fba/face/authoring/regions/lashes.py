@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, measure, slid
 from fba.face.authoring.surface.attached_parts import roots
@@ -12,8 +12,6 @@ from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.surface import Surface
 from fba.face.model import Part
-
-Float64 = npt.NDArray[np.float64]
 
 
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -> Motion:

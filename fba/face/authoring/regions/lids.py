@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Intp
 from fba.face.authoring.regions._lid_clearance import Profile, bridged, edge_length, freed
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, Opening, measure, slid
@@ -21,9 +21,6 @@ from fba.face.authoring.surface.motion_limits import guarded
 from fba.face.authoring.surface.unfold import relaxed
 from fba.face.authoring.surface.weights import smooth_step, smoothed, without_hem
 from fba.face.model import Part
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
 
 STEP = 128
 """Values between two borders of the tables: an eighth of the way."""
@@ -103,7 +100,7 @@ def _other(lid: str) -> str:
     return "lower" if lid == "upper" else "upper"
 
 
-def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Int, other: Int) -> Float64:
+def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, other: Intp) -> Float64:
     """(N,) how much each vertex goes with the margin of its column.
 
     All of it on the lid's edge, a quarter at the crease, nothing well before the brow; towards the corners,

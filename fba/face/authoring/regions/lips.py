@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.authoring.surface.contours import shares
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
@@ -29,8 +29,6 @@ from fba.face.authoring.surface.unfold import eased_field
 from fba.face.authoring.surface.weights import region, smooth_step, spread, without_hem
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
 
 HANDLES = {
     "left corner": ("2.4", "8.3"),

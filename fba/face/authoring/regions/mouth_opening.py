@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.surface.landmarks import Landmarks
-
-Float64 = npt.NDArray[np.float64]
 
 LIDS = {19: ("left", "upper"), 20: ("right", "upper"), 21: ("left", "lower"), 22: ("right", "lower")}
 CLOSED = 1024

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
@@ -13,8 +13,6 @@ from fba.face.authoring.surface.weights import smooth_step
 from fba.face.model import Part
 from fba.face.points import DIRECTIONS, TONGUE_ROLL
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
 
 FAPS = (43, 44, 45, 46, 47)
 POINTS = {43: ("6.1",), 44: ("6.1",), 45: ("6.1",), 46: ("6.2",), 47: ("6.2", "6.3", "6.4")}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64
 from fba.face.authoring.shapes._shapes import Shapes
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, by_part, limits, tables
@@ -16,9 +16,6 @@ from fba.face.model import FaceModel
 from fba.face.points import DIRECTIONS
 from fba.face.tables import FaceDefTables
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 OWN, ELSEWHERE, ACROSS = 3.0, 1.0, 0.5
 """Weights of the points that are to move, of the other points, and of directions across the way."""

@@ -8,18 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float32, Float64, Floating
 from fba.errors import ModelError
 from fba.face.model import FaceModel, Part
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 BLEND = 0.12
 """Half the width over which a shape fades from one side to the other, as a share of ES0."""
 STILL = 1e-3
 """A half that moves less than this share of its shape is none."""
 
-Morphs = Mapping[str, Mapping[str, npt.NDArray[np.floating]]]
+Morphs = Mapping[str, Mapping[str, Floating]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +86,7 @@ class Shapes:
         ]
 
 
-def checked(
-    parts: Sequence[Part], shape: str, moved: Mapping[str, npt.NDArray[np.floating]]
-) -> dict[str, Float32]:
+def checked(parts: Sequence[Part], shape: str, moved: Mapping[str, Floating]) -> dict[str, Float32]:
     """The displacements of one shape, checked against the parts."""
     counts = {part.name: len(part.vertices) for part in parts}
     result = {}

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Intp
 from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.surface import Surface
 from fba.face.model import Part
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
 
 NEIGHBOURS = 8
 ROOT = 0.3
@@ -37,7 +34,7 @@ class Anchors:
         best, shares, away = _closest(corners, near.reshape(len(shape.vertices), -1), shape.vertices)
         root = roots(shape, away) if part.kind == "lash" else np.arange(len(shape.vertices))
         self.distance: Float64 = away[shape.number]
-        self._best: Int = best[root][shape.number]
+        self._best: Intp = best[root][shape.number]
         self._shares: Float64 = shares[root][shape.number]
 
     def carried(self, motion: Motion) -> Motion:
@@ -63,7 +60,7 @@ class Anchors:
         return Motion(motion.values, moving, shifts)
 
 
-def roots(shape: Surface, away: Float64) -> Int:
+def roots(shape: Surface, away: Float64) -> Intp:
     """(N,) for each vertex of hairs the one that they grow from, along the hair.
 
     away: (N,) distances from the skin; roots are where a connected piece is as near as anywhere.
@@ -75,11 +72,11 @@ def roots(shape: Surface, away: Float64) -> Int:
     span = float(np.median(np.linalg.norm(np.diff(shape.vertices[shape.edges], axis=1), axis=2)))
     start = np.flatnonzero(away <= nearest[shape.component] + ROOT * span)
     found = dijkstra(shape.graph, directed=False, indices=start, min_only=True, return_predecessors=True)[2]
-    result: Int = np.where(found >= 0, found, np.arange(len(found))).astype(np.intp)
+    result: Intp = np.where(found >= 0, found, np.arange(len(found))).astype(np.intp)
     return result
 
 
-def _closest(corners: Float64, near: Int, points: Float64) -> tuple[Int, Float64, Float64]:
+def _closest(corners: Float64, near: Intp, points: Float64) -> tuple[Intp, Float64, Float64]:
     """(triangle, barycentric shares, distance) of the nearest of some candidate triangles (N, K)."""
     best = near[:, 0].copy()
     shares = np.full((len(points), 3), 1 / 3)

@@ -9,13 +9,11 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Float64, Int32, Intp
 from fba.errors import ModelError
 from fba.face.authoring.surface.surface import Surface
 from fba.face.feature_points import names, row_of
 from fba.face.model import Part
-
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 FREE_POINTS = ("7.1", "11.5")
 """Points that lie inside the head or above the skin."""
@@ -137,7 +135,7 @@ def part_lips(
     return Binding(placed, found, binding.far)
 
 
-def _pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:
+def _pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
     """Connected piece of each vertex of the parts of some kinds."""
     found, count = [np.zeros(0, dtype=np.intp)], 0
     for part in parts:
@@ -148,7 +146,7 @@ def _pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.int
     return np.concatenate(found)
 
 
-def _in_jaw(vertices: Float64, piece: npt.NDArray[np.intp], away: Float64, jaw: int, slack: float) -> int:
+def _in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, slack: float) -> int:
     """Of the vertices that are nearest within some slack, the nearest of the highest or lowest piece.
 
     Teeth touch, so the nearest vertex may be in the wrong jaw. jaw: 1 upper, -1 lower.
@@ -159,9 +157,7 @@ def _in_jaw(vertices: Float64, piece: npt.NDArray[np.intp], away: Float64, jaw: 
     return int(right[away[right].argmin()])
 
 
-def lip_sides(
-    surface: Surface, parts: Sequence[Part], points: Float64, bound: Int32
-) -> npt.NDArray[np.intp] | None:
+def lip_sides(surface: Surface, parts: Sequence[Part], points: Float64, bound: Int32) -> Intp | None:
     """(V,) of the skin's vertices: 1 for those of the upper lip, 2 of the lower, 0 elsewhere.
 
     None but where the mouth is a slit whose two edges lie on each other, so that they were taken for a
@@ -200,7 +196,7 @@ def kinds_of(name: str) -> tuple[str, ...]:
     return KINDS_OF_GROUP.get(int(name.split(".", maxsplit=1)[0]), SURFACE_KINDS)
 
 
-def pool_of(parts: Sequence[Part], kinds: tuple[str, ...]) -> npt.NDArray[np.intp]:
+def pool_of(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
     """Vertices of the parts of some kinds, counted through all parts."""
     start, found = 0, [np.zeros(0, dtype=np.intp)]
     for part in parts:

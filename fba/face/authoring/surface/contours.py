@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
+from fba.arrays import Float64, Intp
 
 TANGENT = 1.0
 """1 makes straight lines through the points stay straight, 0 keeps the shares of far points from dipping
 below 0; between them lies what looks best."""
 
 
-def shares(vertices: Float64, walk: Int, nodes: Sequence[int | None]) -> Float64:
+def shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) -> Float64:
     """(M, K) for each vertex of a walk its shares of the K nodes along it.
 
     vertices: (N, 3). walk: (M,) vertices from the first to the last node. nodes: the vertex of each

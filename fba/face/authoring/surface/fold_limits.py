@@ -6,10 +6,8 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
+from fba.arrays import Bool, Float64, Intp
 
 LEAST_AREA = 0.12
 """A triangle seen along its neutral normal keeps this share of its area."""
@@ -29,14 +27,14 @@ DEGENERATE = 1e-5
 class Limiter:
     """Measures motions of a mesh. vertices: (N, 3) neutral. triangles: (F, 3)."""
 
-    def __init__(self, vertices: Float64, triangles: Int) -> None:
+    def __init__(self, vertices: Float64, triangles: Intp) -> None:
         self._vertices = vertices
         first, second = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
         areas = np.linalg.norm(np.cross(first, second), axis=1)
         typical = float(np.median(areas)) if len(areas) else 0.0
         self._triangles = triangles[areas > DEGENERATE * typical]
 
-    def without(self, vertices: Int) -> Limiter:
+    def without(self, vertices: Intp) -> Limiter:
         """The same, blind to the triangles about some vertices."""
         other = copy(self)
         other.__dict__.pop("_fans", None)
@@ -47,16 +45,16 @@ class Limiter:
         return len(self._vertices)
 
     @cached_property
-    def _fans(self) -> tuple[Int, Int]:
+    def _fans(self) -> tuple[Intp, Intp]:
         """(starts, triangles): for each vertex the triangles about it."""
         order = np.argsort(self._triangles.ravel(), kind="stable")
         count = np.bincount(self._triangles.ravel(), minlength=len(self._vertices))
         return np.concatenate([[0], np.cumsum(count)]), order // 3
 
-    def touched(self, vertices: Int) -> Int:
+    def touched(self, vertices: Intp) -> Intp:
         """(M, 3) triangles with a vertex among those given."""
         starts, fans = self._fans
-        touched: Int
+        touched: Intp
         if len(vertices) > FEW * len(self._vertices):
             moving = np.zeros(len(self._vertices), dtype=bool)
             moving[vertices] = True
@@ -67,7 +65,7 @@ class Limiter:
         touched = self._triangles[np.unique(fans[place])]
         return touched
 
-    def reach(self, field: Float64, triangles: Int) -> Float64:
+    def reach(self, field: Float64, triangles: Intp) -> Float64:
         """(M,) for each triangle the largest s up to which vertices + s * field (N, 3) keeps it sound."""
         p, d = self._vertices, field
         e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
@@ -86,7 +84,7 @@ class Limiter:
             result = np.minimum(result, stretch)
         return result
 
-    def sound(self, shifts: Float64, triangles: Int, *, turning: bool = False) -> bool:
+    def sound(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> bool:
         """Whether vertices + shifts (N, 3) keeps all these triangles sound.
 
         turning: as in `soundness`; then specks that fold in the corners of the eye or mouth may be.
@@ -98,7 +96,7 @@ class Limiter:
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         return float(areas[~fine].sum()) <= SPECK * float(areas.sum())
 
-    def soundness(self, shifts: Float64, triangles: Int, *, turning: bool = False) -> npt.NDArray[np.bool_]:
+    def soundness(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> Bool:
         """(M,) which triangles stay sound under shifts.
 
         turning: what moves may turn, as a lid does about the eyeball; then a triangle has folded where it
@@ -111,7 +109,7 @@ class Limiter:
         before, after = np.cross(e1, e2), np.cross(f1, f2)
         if turning:
             around = _Around(triangles)
-            fine: npt.NDArray[np.bool_] = (around.facing(after) >= FOLDED) | (around.facing(before) <= 0)
+            fine: Bool = (around.facing(after) >= FOLDED) | (around.facing(before) <= 0)
         else:
             fine = (before * after).sum(axis=1) >= 0.8 * LEAST_AREA * (before**2).sum(axis=1)
         lengths = np.linalg.norm(np.stack([e1, e2, e2 - e1]), axis=2)
@@ -124,7 +122,7 @@ class Limiter:
 class _Around:
     """Neighbours of triangles (M, 3): those that share a vertex."""
 
-    def __init__(self, triangles: Int) -> None:
+    def __init__(self, triangles: Intp) -> None:
         from scipy.sparse import csr_array
 
         vertices, local = np.unique(triangles, return_inverse=True)

@@ -8,17 +8,13 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int32, Intp
 from fba.face.authoring.surface.binding import SURFACE_KINDS, lip_sides, pool_of
 from fba.face.authoring.surface.surface import Surface
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, neutral_points, row_of
 from fba.face.model import Part
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
-Bool = npt.NDArray[np.bool_]
 
 CONTOURS = {
     "upper inner lip": ("2.4", "2.6", "2.2", "2.7", "2.5"),
@@ -48,7 +44,7 @@ class Landmarks:
     points: Float64
     vertex: dict[str, int]
     fapu: Fapu
-    _contours: dict[str, Int] = field(default_factory=dict)
+    _contours: dict[str, Intp] = field(default_factory=dict)
 
     def place(self, name: str) -> Float64:
         """Where a feature point is, NaN where unknown."""
@@ -59,13 +55,13 @@ class Landmarks:
         """Whether all these feature points stand on the surface."""
         return all(name in self.vertex for name in wanted)
 
-    def contour(self, name: str) -> Int:
+    def contour(self, name: str) -> Intp:
         """Vertices along a contour, corner to corner; empty unless both ends and one point between exist."""
         if name not in self._contours:
             self._contours[name] = self._walk(CONTOURS[name], rim=name in OPENINGS)
         return self._contours[name]
 
-    def _walk(self, through: tuple[str, ...], *, rim: bool) -> Int:
+    def _walk(self, through: tuple[str, ...], *, rim: bool) -> Intp:
         known = [self.vertex[name] for name in through if name in self.vertex]
         if len(known) < 3 or not self.has(through[0], through[-1]):
             return np.zeros(0, dtype=np.intp)
@@ -139,7 +135,7 @@ class Landmarks:
         return place
 
 
-def landmarks(surface: Surface, points: Float64, bound: npt.NDArray[np.int32], pool: Int) -> Landmarks:
+def landmarks(surface: Surface, points: Float64, bound: Int32, pool: Intp) -> Landmarks:
     """pool: for each vertex that the surface was made of, its number counted through all parts."""
     number = np.full(int(max(pool.max(initial=-1), bound.max(initial=-1))) + 1, -1, dtype=np.intp)
     number[pool] = surface.number
@@ -151,7 +147,7 @@ def landmarks(surface: Surface, points: Float64, bound: npt.NDArray[np.int32], p
     return Landmarks(surface, points, vertex, Fapu.measure(points))
 
 
-def surface_of(parts: Sequence[Part], points: Float64, bound: npt.NDArray[np.int32]) -> tuple[Surface, Int]:
+def surface_of(parts: Sequence[Part], points: Float64, bound: Int32) -> tuple[Surface, Intp]:
     """(surface, pool): skin and inner mouth as one surface, and its vertices counted through all parts.
 
     A mouth that is a slit, its edges on each other, stays open.

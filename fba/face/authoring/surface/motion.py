@@ -6,14 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Intp
 from fba.face.authoring.surface.surface import Surface
 from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
 
 STILL = 2e-6
 """Metres: vertices that never move further are left out."""
@@ -28,7 +25,7 @@ class Motion:
     """
 
     values: Float64
-    vertices: Int
+    vertices: Intp
     shifts: Float64
 
     def at(self, value: float) -> Float64:

@@ -7,16 +7,12 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, limits
 from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.unfold import eased_field
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
-Bool = npt.NDArray[np.bool_]
 
 EASE = (0.75, 1.25)
 """A motion slows down to half at this share of what the mesh can take, and stops at that one."""
@@ -62,7 +58,7 @@ def caps(fap: int) -> tuple[float, float]:
 
 
 def linear(
-    surface: Surface, limiter: Limiter, vertices: Int, field: Float64, fap: int, pinned: Bool
+    surface: Surface, limiter: Limiter, vertices: Intp, field: Float64, fap: int, pinned: Bool
 ) -> Motion:
     """A straight motion of a FAP by value x field (N, 3) metres, held back where triangles would fold.
 
@@ -82,7 +78,7 @@ def goals(fap: int) -> list[float]:
 
 def straight(
     limiter: Limiter,
-    vertices: Int,
+    vertices: Intp,
     field: Float64,
     low: float,
     high: float,
@@ -102,7 +98,7 @@ def straight(
     return guarded(limiter, Motion(values, vertices, held[:, None, None] * field))
 
 
-def _most(limiter: Limiter, field: Float64, triangles: Int, limit: float) -> float:
+def _most(limiter: Limiter, field: Float64, triangles: Intp, limit: float) -> float:
     reach = float(limiter.reach(field, triangles).min(initial=np.inf))
     return np.inf if FULL * reach >= limit else max(reach, 1.0)
 
@@ -118,7 +114,7 @@ def guarded(limiter: Limiter, motion: Motion, *, turning: bool = False) -> Motio
 
 
 def _stopped(
-    limiter: Limiter, motion: Motion, side: range, triangles: Int, turning: bool
+    limiter: Limiter, motion: Motion, side: range, triangles: Intp, turning: bool
 ) -> list[tuple[float, Float64]]:
     """(value, shifts) going out from 0, up to where a triangle folds, and from there at rest."""
     steps: list[tuple[float, Float64]] = []
@@ -141,14 +137,14 @@ def _stopped(
     return steps
 
 
-def _sound(limiter: Limiter, motion: Motion, shifts: Float64, triangles: Int, turning: bool) -> bool:
+def _sound(limiter: Limiter, motion: Motion, shifts: Float64, triangles: Intp, turning: bool) -> bool:
     whole = np.zeros((len(limiter), 3))
     whole[motion.vertices] = shifts
     return limiter.sound(whole, triangles, turning=turning)
 
 
 def _last_sound(
-    limiter: Limiter, motion: Motion, start: Float64, end: Float64, triangles: Int, turning: bool
+    limiter: Limiter, motion: Motion, start: Float64, end: Float64, triangles: Intp, turning: bool
 ) -> float:
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Intp
 from fba.face.model import Part
 from fba.mesh.meshes import vertex_normals
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
-Bool = npt.NDArray[np.bool_]
 
 WELD = 1e-6
 """Vertices on open edges this close together, as a share of the surface's extent, are one: a seam."""
@@ -31,7 +28,7 @@ class Surface:
     the vertex of the surface.
     """
 
-    def __init__(self, parts: Sequence[Part], sides: Int | None = None) -> None:
+    def __init__(self, parts: Sequence[Part], sides: Intp | None = None) -> None:
         """sides: (V,) of the vertices counted through the parts: those of different sides stay unjoined."""
         vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
         starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
@@ -43,22 +40,22 @@ class Surface:
         self.vertices: Float64 = vertices[first]
         whole = number[triangles]
         a, b, c = whole.T
-        self.triangles: Int = whole[(a != b) & (b != c) & (c != a)]
+        self.triangles: Intp = whole[(a != b) & (b != c) & (c != a)]
         self.members = [
             (part.name, number[start : start + len(part.vertices)])
             for part, start in zip(parts, starts, strict=False)
         ]
-        self.number: Int = number
+        self.number: Intp = number
 
     def __len__(self) -> int:
         return len(self.vertices)
 
     @cached_property
-    def _counted(self) -> tuple[Int, Int]:
+    def _counted(self) -> tuple[Intp, Intp]:
         return _edges(self.triangles)
 
     @property
-    def edges(self) -> Int:
+    def edges(self) -> Intp:
         """(E, 2) each edge once."""
         return self._counted[0]
 
@@ -84,11 +81,11 @@ class Surface:
         return csr_array((np.tile(length, 2), (np.r_[a, b], np.r_[b, a])), shape=(len(self), len(self)))
 
     @cached_property
-    def component(self) -> Int:
+    def component(self) -> Intp:
         """(N,) number of the connected piece that each vertex belongs to."""
         from scipy.sparse.csgraph import connected_components
 
-        labels: Int = connected_components(self.graph, directed=False)[1]
+        labels: Intp = connected_components(self.graph, directed=False)[1]
         return labels
 
     @cached_property
@@ -114,7 +111,7 @@ class Surface:
         found: Float64 = dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True)
         return found
 
-    def path(self, start: int, end: int, *, rim: bool = False) -> Int:
+    def path(self, start: int, end: int, *, rim: bool = False) -> Intp:
         """The vertices of the shortest walk along edges, both ends included; empty where there is none.
 
         rim: keep to open edges where there are such: of a mouth that is a slit, of eyes that are holes.
@@ -139,7 +136,7 @@ class Surface:
             walk.append(int(before[walk[-1]]))
         return np.array(walk[::-1], dtype=np.intp)
 
-    def pieces_without(self, removed: Int) -> Int:
+    def pieces_without(self, removed: Intp) -> Intp:
         """(N,) connected pieces of what remains without some vertices; -1 for those."""
         from scipy.sparse.csgraph import connected_components
 
@@ -177,7 +174,7 @@ class Surface:
         return diags_array(between.sum(axis=1)) - between, np.maximum(areas, 1e-3 * typical)
 
 
-def _edges(triangles: Int) -> tuple[Int, Int]:
+def _edges(triangles: Intp) -> tuple[Intp, Intp]:
     """(E, 2) each edge once, the lower vertex first, in rising order; (E,) how many triangles have it."""
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     size = int(sides.max(initial=0)) + 1
@@ -186,7 +183,7 @@ def _edges(triangles: Int) -> tuple[Int, Int]:
     return np.stack(np.divmod(keys, size), axis=1).astype(np.intp), count
 
 
-def _welded(vertices: Float64, triangles: Int, sides: Int | None) -> Int:
+def _welded(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
     """(N,) for each vertex the first of those at the same place that it is joined with."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.surface import Surface
-
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
-Bool = npt.NDArray[np.bool_]
 
 RINGS = 3
 """So many edges around folded triangles may be eased."""
@@ -80,7 +76,7 @@ def _reached(limiter: Limiter, field: Float64, goal: float) -> float:
     return min(float(limiter.reach(field * goal, triangles).min(initial=np.inf)), 1.0)
 
 
-def _clusters(bad: Int) -> list[Int]:
+def _clusters(bad: Intp) -> list[Intp]:
     """Triangles (M, 3) in groups that hang together."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
@@ -96,7 +92,7 @@ def _clusters(bad: Int) -> list[Int]:
 
 
 def _eased(
-    surface: Surface, limiter: Limiter, shifts: Float64, bad: Int, pinned: Bool, turning: bool
+    surface: Surface, limiter: Limiter, shifts: Float64, bad: Intp, pinned: Bool, turning: bool
 ) -> Float64:
     """Shifts (N, 3) after easing around some triangles as little as is enough, or as helps most."""
     best, fewest = shifts, len(bad)
@@ -122,7 +118,7 @@ def _eased(
     return best
 
 
-def _harmonic(surface: Surface, shifts: Float64, free: Int) -> Float64:
+def _harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
     """Shifts with those of some vertices replaced by what a stretched cloth would do."""
     from scipy.sparse.linalg import splu
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Intp
 from fba.errors import ModelError
 from fba.face.authoring.surface.surface import Surface
 
-Float64 = npt.NDArray[np.float64]
-Int = npt.NDArray[np.intp]
-Bool = npt.NDArray[np.bool_]
-
 
 def spread(
-    surface: Surface, free: Bool, fixed: Int, values: Float64, *, slack: float, harmonic: bool = False
+    surface: Surface, free: Bool, fixed: Intp, values: Float64, *, slack: float, harmonic: bool = False
 ) -> Float64:
     """Fields that are as smooth as a bent plate between what is given: (N, K).
 
@@ -87,7 +83,7 @@ def smoothed(surface: Surface, field: Float64, rounds: int) -> Float64:
     return result
 
 
-def through(surface: Surface, field: Float64, targets: Int, length: float) -> Float64:
+def through(surface: Surface, field: Float64, targets: Intp, length: float) -> Float64:
     """A field (N,) that some vertices share with skin near them as the crow flies, up to `length` metres.
 
     What lies behind moving skin, such as the inside of a nostril, goes along with it.

@@ -6,12 +6,9 @@ import itertools
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64
 from fba.face.model import Part
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 STEPS = 400
 """Heights at which the profile is taken."""

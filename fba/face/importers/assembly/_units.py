@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
-
-Float64 = npt.NDArray[np.float64]
 
 PUPILS = 0.062
 """Metres between the pupils of an adult."""

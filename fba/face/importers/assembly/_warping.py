@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
 from fba.face.importers.assembly.pieces import Piece
-
-Float64 = npt.NDArray[np.float64]
 
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
 LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")

@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64, Int32
 from fba.face.importers.assembly.pieces import Piece
-
-Int32 = npt.NDArray[np.int32]
-Bool = npt.NDArray[np.bool_]
-Float64 = npt.NDArray[np.float64]
 
 
 def outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece], int]:

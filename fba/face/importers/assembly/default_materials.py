@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.face.eyeball import sphere
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.pieces import Piece
 from fba.face.model import Material, Part
-
-Float64 = npt.NDArray[np.float64]
 
 LOOKS = {
     "skin": Material("skin", (0.71, 0.47, 0.36), 0.55),

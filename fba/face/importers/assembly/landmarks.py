@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float64
 from fba.errors import ModelError, Remedy
 from fba.face.authoring.shapes.shape_names import canonical, fap_of
 from fba.face.eyeball import sphere
@@ -20,9 +20,6 @@ from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warped
 from fba.face.importers.assembly.pieces import Piece
 from fba.parameters import faps
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
 """Shapes without which the points of the FAPU are not found."""

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly._units import metres_per_unit, pupil_distance
@@ -17,9 +17,6 @@ from fba.face.importers.assembly._winding import outward
 from fba.face.importers.assembly.default_materials import with_looks
 from fba.face.importers.assembly.pieces import Piece, assembled, moved
 from fba.face.model import FaceModel
-
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 """Which way is up in a file -> rows that bring it to +x left, +y up, +z forward. z-up faces look to -y."""

@@ -8,14 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError
 from fba.face.importers.assembly._kinds import DROPPED, checked_kinds, kind_of
 from fba.face.importers.assembly.polygon_parts import shell_labels
 from fba.face.model import Part
-
-Float32 = npt.NDArray[np.float32]
-Int32 = npt.NDArray[np.int32]
-Bool = npt.NDArray[np.bool_]
 
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
@@ -87,7 +84,7 @@ def _with_eyes(
         return []
     heights = np.concatenate([piece.part.vertices[:, 1] for piece in pieces])
     tall = max(float(np.ptp(heights)), 1e-9)
-    round_: list[tuple[int, int, npt.NDArray[np.float64], float]] = []
+    round_: list[tuple[int, int, Float64, float]] = []
     labels = [
         shell_labels(piece.part.triangles, len(piece.part.vertices), piece.part.vertices) for piece in pieces
     ]
@@ -154,7 +151,7 @@ def _joined_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple
     return tuple(found)
 
 
-def _side(pieces: Sequence[Piece], wanted: Callable[[npt.NDArray[np.float64]], bool]) -> list[Piece]:
+def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], bool]) -> list[Piece]:
     """Of each piece the shells whose middle lies on the wanted side."""
     result = []
     for piece in pieces:

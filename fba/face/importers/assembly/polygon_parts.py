@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Int32, Integer, Intp
 from fba.errors import ModelError
 from fba.face.model import Material, Part
 from fba.mesh.meshes import vertex_normals
 from fba.mesh.polygons import Polygons, triangulate
-
-Bool = npt.NDArray[np.bool_]
-Int = npt.NDArray[np.intp]
-Int32 = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +76,7 @@ def shells(polygons: Polygons) -> list[Bool]:
     return [of_face == shell for shell in np.unique(of_face)]
 
 
-def shell_labels(triangles: npt.NDArray[np.int32], count: int, vertices: npt.NDArray[np.float32]) -> Int:
+def shell_labels(triangles: Int32, count: int, vertices: Float32) -> Intp:
     """(count,) shell of each vertex, vertices at the same place taken as one (seams of textures)."""
     _, same = np.unique(vertices, axis=0, return_inverse=True)
     place = same.reshape(-1)
@@ -89,10 +85,10 @@ def shell_labels(triangles: npt.NDArray[np.int32], count: int, vertices: npt.NDA
     return np.asarray(label[place], dtype=np.intp)
 
 
-def _connected(a: npt.NDArray[np.integer], b: npt.NDArray[np.integer], count: int) -> Int:
+def _connected(a: Integer, b: Integer, count: int) -> Intp:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     links = (np.ones(len(a), dtype=np.int8), (a, b))
-    labels: Int = connected_components(coo_array(links, shape=(count, count)), directed=False)[1]
+    labels: Intp = connected_components(coo_array(links, shape=(count, count)), directed=False)[1]
     return labels

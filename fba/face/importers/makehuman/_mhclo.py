@@ -6,14 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import beside, number, whole_number, words
-
-Float64 = npt.NDArray[np.float64]
 
 
 def fitted(path: Path, base: Float64) -> Polygons:

@@ -7,14 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float32, Float64
 from fba.errors import ModelError
 from fba.face.importers.makehuman.makehuman import EYES, METRES, MakeHumanHead, eye_pieces
 from fba.mesh.text_files import number, whole_number, words
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
 
 FOLDERS = ("expression-units", "targets/expression/units/caucasian", "../targets/expression/units/caucasian")
 """Where MakeHuman's expression units lie, seen from the base mesh."""

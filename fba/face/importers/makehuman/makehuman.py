@@ -16,8 +16,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.default_materials import LOOKS
@@ -27,11 +27,6 @@ from fba.face.model import FaceModel, Material, Part
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import beside, whole
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
-Bool = npt.NDArray[np.bool_]
 
 METRES = 0.1
 """Metres per unit of the base mesh."""

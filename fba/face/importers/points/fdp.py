@@ -10,15 +10,13 @@ import os
 import warnings
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.points.fdp_data import Fdp, on_their_sides
 from fba.face.importers.points.xface import load_xface, xface_points
 from fba.mesh.text_files import number, whole, whole_number, words
-
-Float64 = npt.NDArray[np.float64]
 
 
 def read_fdp(path: str | os.PathLike[str]) -> Float64:

@@ -10,15 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.points.fdp import load_fdp
 from fba.face.importers.points.xface import xface_points
 from fba.mesh.text_files import lines, number, whole, whole_number
-
-Float64 = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.points.fdp_data import Fdp, Influence, XfaceMesh, on_their_sides
 from fba.mesh.text_files import beside, number, whole, whole_number
 from fba.mesh.vrml import read_vrml
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
-
-Float64 = npt.NDArray[np.float64]
 
 DISTANCES = ("ENS0", "ES0", "IRISD0", "MNS0", "MW0")
 NEUTRAL = "Rest"

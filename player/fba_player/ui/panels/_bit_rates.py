@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
+from fba.arrays import Bool, Float64
 from fba.codec import StreamInfo
 from fba.compiled import is_compiled
-
-Float64 = npt.NDArray[np.float64]
 
 WINDOW = 1.0
 """Seconds over which a rate is taken."""
@@ -40,7 +38,7 @@ class Rates:
 
     times: Float64
     bits: Float64
-    intra: npt.NDArray[np.bool_]
+    intra: Bool
     rate: Float64
     totals: tuple[Total, ...]
     mean: float
@@ -81,8 +79,8 @@ def encoded(animation: Animation) -> StreamInfo | None:
         return None
 
 
-def columns(times: Float64, bits: Float64, intra: npt.NDArray[np.bool_], low: float, high: float,
-            count: int) -> tuple[Float64, npt.NDArray[np.bool_]]:  # fmt: skip
+def columns(times: Float64, bits: Float64, intra: Bool, low: float, high: float,
+            count: int) -> tuple[Float64, Bool]:  # fmt: skip
     """(count,) the largest plane in each of so many equal parts of a time, 0 for none, and whether it has an
     I plane."""
     tall, key = np.zeros(count), np.zeros(count, bool)

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fba.arrays import Bool, Float32, Float64
 from fba.face.resolve import Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
 
 BLOCK = 512
 """Frames of a face worked out at once: about two milliseconds."""
@@ -48,7 +45,7 @@ class Columns:
         self._timeline = timeline
         self._later = later
         self._resolver = Resolver(model)
-        self._shown: npt.NDArray[np.float32] = np.zeros((0, FAP_COUNT), np.float32)
+        self._shown: Float32 = np.zeros((0, FAP_COUNT), np.float32)
         self._done = 0
         self._bodies = 0
         self._times: Float64 = np.zeros(0)

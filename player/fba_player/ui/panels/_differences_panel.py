@@ -6,9 +6,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from imgui_bundle import imgui, implot
 
+from fba.arrays import Float64
 from fba_player.scene.compare import ARRANGEMENTS
 from fba_player.scene.differences import Differences, Largest
 from fba_player.session.session import Session
@@ -33,7 +33,7 @@ class DifferencesPanel(Panel):
         self._second = 1
         self._known: tuple[Differences, list[Largest]] | None = None
         self._chosen: tuple[str, int] | None = None
-        self._curve: tuple[object, npt.NDArray[np.float64], npt.NDArray[np.float64]] | None = None
+        self._curve: tuple[object, Float64, Float64] | None = None
 
     def available(self, session: Session) -> bool:
         """Where several performances are shown."""
@@ -134,9 +134,7 @@ def _nothing(scene: Any, second: int, found: Differences) -> str:
     return "nothing differs" if len(found.times) else "they have no time in common"
 
 
-def thinned(
-    times: npt.NDArray[np.float64], values: npt.NDArray[np.float64], most: int
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def thinned(times: Float64, values: Float64, most: int) -> tuple[Float64, Float64]:
     """A curve of at most so many points: of each stretch the value furthest from 0, where it is."""
     if len(times) <= most:
         return times, values
