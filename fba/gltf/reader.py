@@ -13,9 +13,8 @@ from fba.gltf._accessors import Accessors
 from fba.gltf._animations import read_animations
 from fba.gltf._materials import read_materials
 from fba.gltf._meshes import read_meshes
-from fba.gltf._skins import read_skins
 from fba.gltf.document import Document, open_document
-from fba.gltf.nodes import read_nodes, read_roots
+from fba.gltf.nodes import read_nodes, read_roots, read_skins
 from fba.gltf.scene import Gltf
 from fba.source import Path
 

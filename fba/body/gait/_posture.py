@@ -1,14 +1,20 @@
-"""What rides on the legs: spine, head, shoulders, fingers."""
+"""The upper body of a walk: spine, head, shoulders, arms, fingers.
+
+Inverse kinematics bring the palms to the goals of the poses: digest 2.5.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fba.arrays import Float64
-from fba.body.gait._anatomy import Writer
-from fba.body.gait._curves import cosine
+from fba.body.gait._anatomy import Side, Writer
+from fba.body.gait._characters import Character
+from fba.body.gait._curves import cosine, periodic
 from fba.body.gait._plan import KNOTS, Plan
+from fba.body.gait._rotations import limb_angles
 from fba.body.skeleton import Skeleton
+from fba.body.solve.solver import BapSolver
 
 LUMBAR = tuple(f"vl{n}" for n in (5, 4, 3, 2, 1))
 THORAX = tuple(f"vt{n}" for n in range(12, 0, -1))
@@ -19,14 +25,20 @@ _MORE_CURL = {"index": 0.75, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
 """A hand at rest closes towards the little finger."""
 
 
-def spread(writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: int, angle: Float64) -> None:
+_LATE = 0.02
+"""Fraction of the cycle by which arms come after the legs."""
+_REACH = 0.995
+"""Share of its length to which an arm stretches."""
+
+
+def _spread(writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: int, angle: Float64) -> None:
     """Turn a part of the spine by an angle, radians, shared evenly by those of its joints that there are."""
     there = [joint for joint in joints if joint in skeleton]
     for joint in there:
         writer.turn(joint, axis, angle / len(there))
 
 
-def hold(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64) -> None:
+def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64) -> None:
     """Write the posture at phases of the cycle, from the contact of the right foot on.
 
     The shoulders turn against the pelvis; the neck turns back, so that the face looks ahead.
@@ -47,7 +59,7 @@ def hold(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64) -> None
     ):
         bent = np.radians(x) * still + (nod if joints is HEAD else -nod if joints is NECK else 0.0)
         for axis, values in ((0, bent), (1, y), (2, z)):
-            spread(writer, skeleton, joints, axis, values)
+            _spread(writer, skeleton, joints, axis, values)
     for letter, way in (("l", 1.0), ("r", -1.0)):
         girdle = f"{letter}_sternoclavicular"
         if girdle in skeleton:
@@ -60,3 +72,41 @@ def hold(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64) -> None
                     # below the wrist flexion turns about z: fingers curl towards the thigh, inward
                     curl = np.radians(arms.curl * _MORE_CURL[finger])
                     writer.turn(joint, 2, -way * curl * still)
+
+
+def _palm_goals(side: Side, character: Character, size: float) -> Float64:
+    """(8, 3), metres from the shoulder to the palm at the eight poses of a cycle of the leg on this side."""
+    out, down, forward = (np.array(character.curve(field)) for field in ("out", "down", "forward"))
+    swing = forward - forward.mean()
+    forward = forward.mean() + swing * np.clip(size, 0.0, 1.4)
+    goal = np.stack([side.way * out, -down, forward], axis=-1) * side.arm.reach
+    length = np.linalg.norm(goal, axis=-1, keepdims=True)
+    result: Float64 = goal * np.minimum(1.0, _REACH * side.arm.reach / length)
+    return result
+
+
+def swing_arms(writer: Writer, plan: Plan, phase: Float64) -> None:
+    """Write the angles of shoulders and elbows; the spine stands in writer.values already.
+
+    At the poses the palms are at their goals; in between, angles are interpolated.
+    """
+    anatomy, character = plan.anatomy, plan.character
+    solver = BapSolver(anatomy.skeleton)
+    girdle = anatomy.skeleton.parents
+    for letter, side in anatomy.sides.items():
+        start = 0.0 if letter == "r" else 0.5
+        at = np.mod(KNOTS + start + _LATE, 1.0)
+        nearest = np.array([np.argmin(np.abs(np.mod(phase - a + 0.5, 1.0) - 0.5)) for a in at])
+        shoulder = anatomy.skeleton.number(f"{letter}_shoulder")
+        matrices = solver.pose(writer.values[nearest])[:, girdle[shoulder], :3, :3]
+        # goals are meant in a frame that walks with the body, level and looking ahead
+        local = np.einsum("tji,tj->ti", matrices, _palm_goals(side, character, plan.size))
+        twist = -side.way * np.radians(character.arms.twist)
+        upper, bend = side.arm.solve(local, np.full(len(KNOTS), twist))
+        x, y, z = limb_angles(upper)
+        own = phase - start - _LATE
+        for axis, angle in ((0, x), (1, y), (2, z)):
+            writer.turn(f"{letter}_shoulder", axis, periodic(KNOTS, angle, own, plan.interpolation))
+        writer.turn(f"{letter}_elbow", 0, -periodic(KNOTS, bend, own, plan.interpolation))
+        wrist = -side.way * np.radians(character.arms.wrist)
+        writer.turn(f"{letter}_wrist", 2, np.full(phase.shape, wrist))

@@ -8,13 +8,12 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64
-from fba.body.gait import _arms as arms
 from fba.body.gait import _ground as ground
-from fba.body.gait import _posture as posture
 from fba.body.gait._anatomy import Anatomy, Writer
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import Interpolation, checked
 from fba.body.gait._plan import SHORTEST, Plan
+from fba.body.gait._posture import swing_arms, write_posture
 from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
 
@@ -84,12 +83,12 @@ def cycle(plan: Plan, period: int) -> Writer:
     anatomy, character = plan.anatomy, plan.character
     phase = np.arange(period) / period
     writer = Writer(period)
-    posture.hold(writer, anatomy.skeleton, plan, phase)
+    write_posture(writer, anatomy.skeleton, plan, phase)
     writer.turn("HumanoidRoot", 0, np.full(period, np.radians(character.pelvis.tilt)))
     turn, roll = plan.pelvis_angles(phase)
     writer.turn("sacroiliac", 1, turn)
     writer.turn("sacroiliac", 2, roll)
-    arms.swing(writer, plan, phase)
+    swing_arms(writer, plan, phase)
     rest = anatomy.skeleton.centres[0]
     root = plan.root(phase) - rest
     start = root[0, 2]

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fba.arrays import Float64, Floating
+from fba.arrays import Float64, Floating, Integer
 from fba.face.calibration._align import known_rows
-from fba.face.calibration._eyes import FittedEye
-from fba.face.calibration._lid_paths import LID_FAPS, slid
+from fba.face.calibration._eyes import FittedEye, weight_of
 from fba.face.calibration._shape import Shape, similar
 from fba.face.feature_points import row_of
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
 
 
+LID_FAPS = {19: "left", 20: "right", 21: "left", 22: "right"}
 LEAST = 1e-6
 """How much a direction that no edge has counts as stretched like the others."""
 
@@ -194,3 +194,43 @@ def stretches(part: Part, after: Floating) -> Float64:
     products += (LEAST * weight * size)[:, None, None] * np.eye(3)
     matrices: Float64 = products @ np.linalg.inv(squares)
     return matrices
+
+
+def slid(
+    eyes: Mapping[str, FittedEye],
+    fap: int,
+    borders: Integer,
+    before: tuple[Float64, Float64],
+    after: tuple[Float64, Float64],
+) -> Float64:
+    """Displacements (N, K - 1, 3), metres a step, corrected so that the lid keeps to the eyeball.
+
+    before, after: neutral vertices (N, 3) and displacements (N, K - 1, 3) of the old face and of the new
+    one. At every border, a vertex comes to lie as many radii from the centre as it did, more or less what
+    it lacks of that in the neutral face; forwards or backwards, so that heights stay and lids meet.
+    """
+    eye = eyes.get(LID_FAPS[fap])
+    moves = after[1]
+    if eye is None:
+        return moves
+    steps = np.diff(borders.astype(np.float64))
+    zero = int(np.flatnonzero(borders == 0)[0])
+    old, new = (_places(*one, steps, zero) for one in (before, after))
+    wanted = np.linalg.norm(old - eye.was.centre, axis=2) * eye.size
+    arms = new - eye.centre
+    depth = wanted**2 - arms[..., 0] ** 2 - arms[..., 1] ** 2
+    forward = np.sqrt(np.maximum(depth, 0.0)) - arms[..., 2]
+    near = weight_of(eye, old.reshape(-1, 3)).reshape(old.shape[:2]).min(axis=1)
+    # A vertex that leaves the front of the eyeball anywhere on its way is none of a lid's edge.
+    near *= ((arms[..., 2] > 0) & (depth > 0)).all(axis=1)
+    forward = (forward - forward[:, [zero]]) * near[:, None]
+    corrected = moves.copy()
+    corrected[..., 2] += np.diff(forward, axis=1) / steps
+    return corrected
+
+
+def _places(vertices: Float64, moves: Float64, steps: Float64, zero: int) -> Float64:
+    """(N, K, 3): where each vertex is at each border."""
+    path = np.concatenate([np.zeros((len(vertices), 1, 3)), moves * steps[:, None]], axis=1).cumsum(axis=1)
+    places: Float64 = vertices[:, None] + path - path[:, [zero]]
+    return places

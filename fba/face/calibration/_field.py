@@ -1,4 +1,4 @@
-"""A smooth deformation of space that takes given points exactly to other places."""
+"""A smooth deformation of space that takes given points exactly to others, and folds it makes in a mesh."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Float64, Floating
+from fba.arrays import Float64, Floating, Integer, Intp
+from fba.face.feature_points import names
+from fba.mesh.meshes import vertex_normals
 
 WELL_KNOWN = 0.02
 """Metres: the affine part is trusted along directions in which the points are spread by more."""
@@ -18,6 +20,8 @@ SAME_PLACE = 1e-5
 """Metres between sources that are taken as one."""
 SLACK = 1e-9
 """Smoothing of the anchors: they hold the far field, but need not be met."""
+LEAST_VOLUME = 0.04
+"""Share of its usual volume to which space may be pressed together."""
 KERNELS = ("thin_plate_spline", "cubic", "linear")
 """From the smoothest to the tamest."""
 
@@ -134,3 +138,40 @@ def _distinct(sources: Float64, targets: Float64) -> tuple[Float64, Float64]:
     np.add.at(summed, inverse, np.hstack([sources, targets]))
     mean = summed / count
     return mean[:, :3], mean[:, 3:]
+
+
+def folded(field: Field, mesh: Floating, size: float) -> Intp:
+    """Vertices at which the deformation turns space inside out, or nearly so; size: usual, of lengths."""
+    volume = np.linalg.det(field.jacobians(mesh)) / size**3
+    return np.flatnonzero(~(volume > LEAST_VOLUME))
+
+
+def turned_over(before: Floating, after: Float64, triangles: Integer) -> tuple[Intp, float]:
+    """Triangles that look the other way than their surroundings do after a deformation, and their area.
+
+    The area is a share of the whole, before.
+
+    Whether a triangle is turned is seen against the mean of its neighbours' normals, before and after: a
+    turn of the whole surface is none of the triangle.
+    """
+    agreeing, areas = [], []
+    for vertices in (np.asarray(before, dtype=np.float64), after):
+        corners = vertices[triangles]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        around = vertex_normals(vertices, triangles)[triangles].mean(axis=1)
+        agreeing.append((normal * around).sum(axis=1))
+        areas.append(np.linalg.norm(normal, axis=1))
+    wrong = np.flatnonzero((agreeing[0] > 0) & (agreeing[1] < 0))
+    return wrong, float(areas[0][wrong].sum() / max(areas[0].sum(), 1e-30))
+
+
+def blamed(places: Float64, sources: Float64, rows: Intp, count: int = 4) -> tuple[str, ...]:
+    """Names of the feature points (rows, at sources) that are nearest to most of the places."""
+    from scipy.spatial import cKDTree
+
+    if not len(places) or not len(sources):
+        return ()
+    _, near = cKDTree(sources).query(places, k=min(3, len(sources)))
+    votes = np.bincount(np.ravel(near), minlength=len(sources))
+    order = np.argsort(-votes, kind="stable")[:count]
+    return tuple(names()[int(rows[place])] for place in order if votes[place])

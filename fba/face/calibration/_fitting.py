@@ -15,8 +15,7 @@ from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning, ModelError
 from fba.face.calibration._align import Alignment, align, centred, known_rows
 from fba.face.calibration._complete import between_lids, mirrored, shut, without_mistakes
-from fba.face.calibration._field import KERNELS, deformation
-from fba.face.calibration._folds import blamed, folded, turned_over
+from fba.face.calibration._field import KERNELS, blamed, deformation, folded, turned_over
 from fba.face.calibration._shape import INNER, Shape, deform, rebuilt
 from fba.face.fapu import PER_DISTANCE
 from fba.face.feature_points import names, row_of

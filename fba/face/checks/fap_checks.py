@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib.resources import files
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from fba.errors import OptionError
 from fba.face.checks._findings import Finding
+from fba.face.feature_points import row_of
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 from fba.parameters import faps as fap_table
 
 if TYPE_CHECKING:
     from fba.face.checks.posing import Poser
     from fba.face.model import FaceModel
+
+
+MODERATE = 300.0
+"""Value at which regions are checked; for FAPs in units of angle, 100 times it."""
+SHARE = 0.03
+"""Vertices that move less than this share of the longest way count as still."""
 
 
 def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Finding]:
@@ -49,7 +61,6 @@ def check_posed(poser: Poser, wanted: Iterable[int]) -> list[Finding]:
 def _one(poser: Poser, fap: int) -> Iterator[Finding]:
     from fba.face.checks._fap_extremes import check_extremes
     from fba.face.checks._fap_points import check_point
-    from fba.face.checks._fap_regions import check_region
 
     if fap in poser.model.lost:
         return
@@ -57,7 +68,7 @@ def _one(poser: Poser, fap: int) -> Iterator[Finding]:
         yield Finding(fap_table()[fap - 1].label, "it has tables or a reason", "neither", "FaceDefTables")
         return
     yield from check_point(poser, fap)
-    yield from check_region(poser, fap)
+    yield from _check_region(poser, fap)
     yield from check_extremes(poser, fap)
 
 
@@ -73,3 +84,41 @@ def _together(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
     mouth = {OPEN_JAW, *(fap for pair in (*PAIRS, *OUTER_PAIRS) for fap in pair)}
     if wanted & mouth:
         yield from check_mouth(poser)
+
+
+@cache
+def _region_table() -> dict[int, tuple[tuple[str, ...], float]]:
+    """By FAP: the points of its region, and how far from them in ES0 it may reach."""
+    found = {}
+    with (files(__package__) / "fap_regions.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            for fap in row["faps"].split():
+                found[int(fap)] = (tuple(row["points"].split()), float(row["reach"]))
+    return found
+
+
+def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
+    """A finding where vertices move that are too far from the points of the FAP's region."""
+    if fap not in _region_table():
+        return
+    names, reach = _region_table()[fap]
+    points = poser.model.points[[row_of()[name] for name in names]]
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return
+    entry = fap_table()[fap - 1]
+    value = MODERATE if entry.unit != "AU" else MODERATE * 100
+    moved = np.linalg.norm(poser.shift({fap: value}), axis=1)
+    if not moved.max() > 0:
+        return
+    moving = np.flatnonzero(moved > SHARE * moved.max())
+    away = np.min(np.linalg.norm(poser.neutral[moving][:, None] - points, axis=2), axis=1)
+    es = poser.model.fapu.ES * 1024
+    if away.max() > reach * es:
+        worst = int(moving[away.argmax()])
+        yield Finding(
+            entry.label,
+            "nothing moves outside its region",
+            f"vertex {worst}, {away.max() * 1000:.0f} mm from it, moves {moved[worst] * 1000:.2f} mm",
+            f"within {reach * es * 1000:.0f} mm of {', '.join(names)}",
+        )

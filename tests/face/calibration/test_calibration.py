@@ -15,7 +15,7 @@ from fba.errors import FbaWarning, ModelError
 from fba.face.calibration import UNITS, fit, points_of_distances
 from fba.face.calibration._align import align
 from fba.face.calibration._carry import stretches
-from fba.face.calibration._folds import turned_over
+from fba.face.calibration._field import turned_over
 from fba.face.checks._findings import Finding
 from fba.face.eyeball import eyeballs
 from fba.face.fapu import Fapu

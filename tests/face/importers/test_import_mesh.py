@@ -12,7 +12,7 @@ from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.importers.assembly._kinds import kind_of
-from fba.face.importers.assembly._units import metres_per_unit
+from fba.face.importers.assembly.model import metres_per_unit
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 from mesh_files import ply, write_obj, write_points

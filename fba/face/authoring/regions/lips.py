@@ -7,12 +7,12 @@ together, as they mostly are, they move the lip as a whole.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Float64
-from fba.face.authoring.surface.contours import shares
+from fba.arrays import Float64, Intp
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
@@ -62,6 +62,9 @@ STILL = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9"
 SLACK = 0.25
 """Distance in ES0 beyond which the skin does not spring back."""
 HEM = 0.006
+TANGENT = 1.0
+"""1 makes straight lines through the points stay straight, 0 keeps the shares of far points from dipping
+below 0; between them lies what looks best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +146,7 @@ def _fields(marks: Landmarks) -> _Lips:
             if len(walk):
                 nodes = [marks.vertex.get(HANDLES[name][which]) for name in handles]
                 values[walk] = 0.0
-                values[walk[:, None], [names.index(name) for name in handles]] = shares(
+                values[walk[:, None], [names.index(name) for name in handles]] = _contour_shares(
                     marks.surface.vertices, walk, nodes
                 )
     for name, pair in HANDLES.items():
@@ -220,3 +223,39 @@ def _coupled(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tupl
             place.append(shift[vertices])
     motions = [guarded(limiter, Motion(values, vertices, np.array(shifts))) for shifts in moves]
     return motions[0], motions[1]
+
+
+def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) -> Float64:
+    """(M, K) weights of the vertices of a walk for the K nodes along it: smooth, 1 at the own node, 0 at the
+    others, with a sum of 1 everywhere.
+
+    vertices: (N, 3). walk: (M,) vertices from the first to the last node. nodes: the vertex of each
+    node, None for nodes that the face does not have: they lie evenly between the others.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    steps = np.linalg.norm(np.diff(vertices[walk], axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
+    place = {int(v): k for k, v in enumerate(walk)}
+    known = [(length[place[node]], float(k)) for k, node in enumerate(nodes) if node is not None]
+    along = np.array([k for _, k in known]) if len(known) == len(walk) else None
+    number = along if along is not None else PchipInterpolator(*zip(*known, strict=True))(length)
+    return _cardinal(np.clip(number, 0, len(nodes) - 1), len(nodes))
+
+
+def _cardinal(x: Float64, count: int) -> Float64:
+    """(M, count) weights of values at 0, 1, ... in the smooth curve through them, at x."""
+    k = np.clip(np.floor(x).astype(np.intp), 0, count - 2)
+    t = x - k
+    start, end = 2 * t**3 - 3 * t**2 + 1, -2 * t**3 + 3 * t**2
+    leave, arrive = (t**3 - 2 * t**2 + t) * TANGENT, (t**3 - t**2) * TANGENT
+    row = np.arange(len(x))
+    weights = np.zeros((len(x), count))
+    for tangent, node in ((leave, k), (arrive, k + 1)):
+        before, after = np.maximum(node - 1, 0), np.minimum(node + 1, count - 1)
+        width = (after - before).astype(np.float64)
+        np.add.at(weights, (row, after), tangent / width)
+        np.add.at(weights, (row, before), -tangent / width)
+    np.add.at(weights, (row, k), start)
+    np.add.at(weights, (row, k + 1), end)
+    return weights
