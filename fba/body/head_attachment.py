@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Bool, Float32, Float64, Intp
+from fba.arrays import Bool, Float32, Float64
 from fba.body._neck_blending import carried_by_neck
 from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
@@ -124,13 +122,6 @@ class HeadOnBody:
             raise ValueError(f"vertices must have shape {self._placed.shape}, not {local.shape}")
         sized(local, self.size, self.shift, self._placed)
         return self.skinner.carry(self._placed, upright, matrices, out, normals, method)
-
-    def chosen(self, rows: Intp) -> HeadOnBody:
-        """The same for some of the face's vertices, rows (N,), each once: `skin` takes and gives these."""
-        some = copy.copy(self)
-        some.skinner = self.skinner.chosen(rows)
-        some._placed = np.empty((len(rows), 3), dtype=np.float32)
-        return some
 
 
 def skull_of(body: BodyModel) -> int:

@@ -62,14 +62,6 @@ def girdle(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, 
     )
 
 
-def chosen_girdle(girdle: Girdle, place: Int32) -> Girdle:
-    """The same for some of the vertices. place (V,): the new number of each, -1 where it is left out."""
-    found = place[girdle.rows]
-    return girdle._replace(
-        rows=found[found >= 0].astype(np.int64), shares=np.ascontiguousarray(girdle.shares[found >= 0])
-    )
-
-
 def _below(skeleton: Skeleton, joint: int) -> list[int]:
     """A joint and all that hang on it."""
     found = [joint]

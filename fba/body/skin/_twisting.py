@@ -63,17 +63,6 @@ def twists(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, 
     )
 
 
-def chosen_twists(twisting: Twisting, place: Int32) -> Twisting:
-    """The same for some of the vertices. place (V,): the new number of each, -1 where it is left out."""
-    found = place[twisting.rows]
-    kept = np.flatnonzero(found >= 0)
-    return twisting._replace(
-        rows=found[kept].astype(np.int64),
-        shares=np.ascontiguousarray(twisting.shares[kept]),
-        starts=np.searchsorted(kept, twisting.starts).astype(np.int64),
-    )
-
-
 def _axis(bind: Float64, joint: int, child: int) -> Float64:
     way = bind[child, :3, 3] - bind[joint, :3, 3]
     unit: Float64 = way / max(float(np.linalg.norm(way)), 1e-12)

@@ -3,57 +3,21 @@
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float32, Float64, Int32, Intp
+from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
-from fba.body.skin._girdle import chosen_girdle, girdle
+from fba.body.skin._girdle import girdle
 from fba.body.skin._moving_normals import rings
-from fba.body.skin._twisting import chosen_twists, twists
+from fba.body.skin._twisting import twists
 from fba.mesh.meshes import result_array
 
 METHODS = ("dual", "linear")
 """Ways to blend the motion of several joints."""
 BLOCK = 64
 """Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
-
-
-class SkinTables(NamedTuple):
-    """The vertices of a `Skinner`, a row each."""
-
-    vertices: Float32
-    """(V, 3) as modelled."""
-    upright: Float32
-    """(V, 3) normals as modelled."""
-    joints: Int32
-    """(V, 4)"""
-    weights: Float32
-    """(V, 4), 0 where a joint does not carry it."""
-    wring: Float32
-    """(V, 4): the bone that it is turned about beforehand, -1 for none, its shares of both twists, and how
-    far matrices draw it straight (`fba.body.skin._girdle`)."""
-    around: Int32
-    """(V, 4), see `fba.body.skin._moving_normals`, -1 where the normal only turns."""
-    numbers: Float32
-    """(V, 3), likewise."""
-    axis: Float64
-    """(B, 3) directions of the bones, as modelled."""
-    centre: Float64
-    """(B, 3) their beginnings."""
-
-
-class JointMotion(NamedTuple):
-    """Joints in one pose: see `fba.body.skin._joint_motion.motion_of_joints`."""
-
-    duals: Float32
-    """(J, 8), from the root."""
-    angles: Float32
-    """(B, 2)"""
-    root: Float64
-    """(3,) where the root is."""
 
 
 class Skinner:
@@ -129,64 +93,6 @@ class Skinner:
                     f"vertices and normals must have shape {self._modelled.shape}, not {array.shape}"
                 )
         return self._run(vertices, upright, matrices, out, normals, method)
-
-    def chosen(self, rows: Intp) -> Skinner:
-        """A skinner of some vertices, rows (N,), each once. Their normals follow the surface where all the
-        neighbours that they are taken from are among them (`with_neighbours`), else they only turn."""
-        some = Skinner.__new__(Skinner)
-        some.__dict__.update(self.__dict__)
-        for name in ("_joints", "_weights", "_counts", "_modelled", "_upright_modelled", "_numbers"):
-            setattr(some, name, np.ascontiguousarray(getattr(self, name)[rows]))
-        place = np.full(len(self._modelled), -1, dtype=np.int32)
-        place[rows] = np.arange(len(rows))
-        around = self._around[rows]
-        around = np.where(around < 0, -1, place[around])
-        some._around = np.where((around < 0).any(axis=1, keepdims=True), -1, around).astype(np.int32)
-        some._twists, some._girdle = chosen_twists(self._twists, place), chosen_girdle(self._girdle, place)
-        some._vertices, some._upright = some._modelled.copy(), some._upright_modelled.copy()
-        some._wrung, some._wrung_modelled = some._modelled.copy(), True
-        some._scratch = np.empty_like(self._scratch)
-        some._lock = threading.Lock()
-        return some
-
-    def with_neighbours(self, rows: Intp) -> Intp:
-        """(N,) the rows and those that their normals are taken from, rising."""
-        around = self._around[rows]
-        return np.union1d(rows, np.where(around < 0, rows[:, None], around))
-
-    def tables(self) -> SkinTables:
-        """What it knows of its vertices, for those that carry them by other means."""
-        wring = np.zeros((len(self._modelled), 4), dtype=np.float32)
-        wring[:, 0] = -1
-        for bone in range(len(self._twists.joint)):
-            part = slice(self._twists.starts[bone], self._twists.starts[bone + 1])
-            wring[self._twists.rows[part], 0] = bone
-            wring[self._twists.rows[part], 1:3] = self._twists.shares[part]
-        wring[self._girdle.rows, 3] = self._girdle.shares
-        return SkinTables(
-            self._modelled,
-            self._upright_modelled,
-            self._joints,
-            self._weights,
-            wring,
-            self._around,
-            self._numbers,
-            self._twists.axis,
-            self._twists.centre,
-        )
-
-    def motion(self, matrices: npt.ArrayLike) -> JointMotion:
-        """What joint matrices (J, 4, 4) do to any vertices, with dual quaternions. Errors as of `skin`."""
-        from fba.body.skin._joint_motion import motion_of_joints
-
-        frames, _ = self._frames(matrices)
-        duals = np.empty((len(self._inverse), 8), dtype=np.float32)
-        angles = np.empty((len(self._twists.joint), 2), dtype=np.float32)
-        with np.errstate(all="ignore"):
-            motion_of_joints(
-                frames[0], self._inverse, self._parents, self._twists, self._girdle, duals, angles
-            )
-        return JointMotion(duals, angles, frames[0, 0, :3, 3].copy())
 
     def _run(
         self,

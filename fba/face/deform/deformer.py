@@ -6,23 +6,20 @@ ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float32, Float64, Int64, Intp
+from fba.arrays import Float32, Float64, Int64
 from fba.errors import RangeError
-from fba.face.deform._subset import ChosenVertices
 from fba.face.deform.flat_tables import (
     VALUE_MAX,
-    Shifts,
     all_vertices,
     bound_points,
     flat_shifts,
     flat_transforms,
 )
-from fba.face.deform.normals import Surface, surface
+from fba.face.deform.normals import surface
 from fba.face.feature_points import names
 from fba.face.model import FaceModel
 from fba.mesh.meshes import result_array
@@ -30,24 +27,6 @@ from fba.parameters import FAP_COUNT, faps
 
 BLOCK = 64
 """Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
-
-
-class DeformerTables(NamedTuple):
-    """The vertices of a `Deformer`."""
-
-    part_start: Int64
-    """(P + 1,) where its parts begin."""
-    shifts: Shifts
-    surface: Surface
-
-
-class FaceMotion(NamedTuple):
-    """A face in one pose: see `fba.face.deform._subset_loops.motion_of_parts`."""
-
-    tracks: Float32
-    """(M, 4)"""
-    poses: Float32
-    """(P, 6, 4)"""
 
 
 class Deformer:
@@ -116,28 +95,6 @@ class Deformer:
     ) -> Float32:
         """Like calling, but in the frame of the head: the transforms of `HEAD` left out."""
         return self._run(faps, out, normals, with_head=False)
-
-    def chosen(self, rows: Intp) -> ChosenVertices:
-        """Some vertices of the face, rows (N,), rising: moved alone, in a fraction of the time."""
-        return ChosenVertices(
-            self.model.vertices, self._part_start, self._shifts, self._transforms, np.asarray(rows)
-        )
-
-    @property
-    def tables(self) -> DeformerTables:
-        """What it knows of its vertices, for those that move them by other means."""
-        return DeformerTables(self._part_start, self._shifts, self._surface)
-
-    def motion(self, faps: npt.ArrayLike) -> FaceMotion:
-        """What FAPs (68,) do to any vertices, in the frame of the head. Errors as when called."""
-        values, _ = _frames(faps)
-        tracks = np.empty((len(self._shifts.column), 4), dtype=np.float32)
-        poses = np.empty((len(self.model.parts), 6, 4), dtype=np.float32)
-        from fba.face.deform._subset_loops import motion_of_parts
-
-        with np.errstate(all="ignore"):
-            motion_of_parts(values[0], self._shifts, self._transforms, tracks, poses)
-        return FaceMotion(tracks, poses)
 
     def head_matrices(self, faps: npt.ArrayLike) -> Float64:
         """How the head is turned: float64 (4, 4) for FAPs (68,), (T, 4, 4) for (T, 68).

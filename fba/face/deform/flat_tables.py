@@ -145,28 +145,6 @@ def _most_rows(model: FaceModel, members: Members, number: dict[str, int]) -> in
     return most
 
 
-def chosen_shifts(shifts: Shifts, rows: Intp, count: int) -> Shifts:
-    """What they do to some of all `count` vertices, rows (N,), rising; numbered 0 to N - 1."""
-    place = np.full(count, -1, dtype=np.int64)
-    place[rows] = np.arange(len(rows))
-    found = place[shifts.rows]
-    kept = np.flatnonzero(found >= 0)
-    start = np.searchsorted(kept, shifts.start)
-    sizes = np.diff(start)
-    interval = np.repeat(np.arange(len(sizes)), sizes)
-    held = shifts.base[interval] >= 0
-    of_bases = (shifts.base - shifts.start[:-1])[interval] + kept
-    first = np.cumsum(np.where(shifts.base >= 0, sizes, 0)) - sizes
-    return shifts._replace(
-        start=start.astype(np.int64),
-        base=np.where(shifts.base >= 0, first, -1).astype(np.int64),
-        rows=found[kept].astype(np.uint32),
-        slopes=np.ascontiguousarray(shifts.slopes[kept]),
-        bases=np.ascontiguousarray(shifts.bases[of_bases[held]]),
-        amount=np.zeros_like(shifts.amount),
-    )
-
-
 _Interval = tuple[float, float, Intp, Float64, Float64]
 
 

@@ -12,10 +12,8 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
-from fba_player.figure.texture_images import breadth
 from fba_player.mesh.simplify import Coarser
-from fba_player.mesh.skin_relief import RELIEF
-from fba_player.mesh.texture_image import FacePicture
+from fba_player.mesh.textures import RELIEF, FacePicture, texture_breadth
 from fba_player.view.view import FaceShape
 
 if TYPE_CHECKING:
@@ -92,7 +90,7 @@ def coarser_part(part: Part | BodyPart, poses: Sequence[Float32], more: Float32 
     if part.normals is not None:
         columns.append(part.normals * NORMAL_WEIGHT)
     if part.texcoords is not None and len(part.triangles):
-        metres = breadth(part.vertices, part.texcoords, part.triangles)
+        metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
         columns.append(part.texcoords * (TEXTURE_WEIGHT * metres))
     if part.colours is not None:
         columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
@@ -165,7 +163,7 @@ def _relief(part: Part) -> tuple[float, float]:
     """Strength of the skin's relief and its repeats, so that a repeat is `RELIEF` metres wide."""
     if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
         return (0.0, 1.0)
-    metres = breadth(part.vertices, part.texcoords, part.triangles)
+    metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
     return (ROUGH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
 
 

@@ -16,7 +16,8 @@ from fba_player.figure._eyeball import Eyeball, find_eyeball
 from fba_player.figure._face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
 from fba_player.figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player.view.camera import Subject
-from fba_player.view.view import Eye, FaceMesh, FaceShape, rotation_vector
+from fba_player.view.geometry import rotation_vector
+from fba_player.view.view import Eye, FaceMesh, FaceShape
 
 CUT = 0.45
 """On a body, what sways less than this is left out: the body has a neck of its own."""

@@ -18,10 +18,9 @@ from fba_player.gl._labels import (
     placed_names,
 )
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
-from fba_player.view.annotations import Dots, Extras, Grid, Legend, Lines
 from fba_player.view.camera import Camera
-from fba_player.view.view import FaceMesh, FaceShape
-from fba_player.view.world_positions import directions, places
+from fba_player.view.geometry import world_normals, world_positions
+from fba_player.view.view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
 
 REFERENCE_HEIGHT, LEAST_SCALE = 720, 0.35
 CROWDED = 7.0
@@ -145,7 +144,7 @@ class ExtrasRenderer:
     def _draw_shells(self, shells: tuple[FaceMesh, ...]) -> None:
         gl, arrays = self._gl, []
         for number, mesh in enumerate(shells):
-            at = np.concatenate([places(mesh), directions(mesh)], axis=1).astype("f4")
+            at = np.concatenate([world_positions(mesh), world_normals(mesh)], axis=1).astype("f4")
             vertices = self._filled(f"shell {number}", at)
             content = [(vertices, "3f 3f", "in_position", "in_normal")]
             triangles = self._triangles(mesh.shape)

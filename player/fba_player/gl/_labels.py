@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fba.arrays import Float64, Int64, Intp, UInt8
-from fba_player.view.annotations import Legend
+from fba_player.view.font import label_font
+from fba_player.view.view import Legend
 
 if TYPE_CHECKING:
-    from PIL.ImageFont import FreeTypeFont, ImageFont
+    pass
 
 
 TEXT = (240, 242, 245, 255)
@@ -24,19 +24,11 @@ MOST_NAMES = 45
 GAP = 2.0
 
 
-@lru_cache(maxsize=16)
-def _font(pixels: int) -> FreeTypeFont | ImageFont:
-    """Pillow's own font: the same on every machine."""
-    from PIL import ImageFont
-
-    return ImageFont.load_default(max(pixels, 6))
-
-
 def legend_picture(legend: Legend, scale: float) -> UInt8:
     """(H, W, 4) colours with numbers below them and a title above. scale: 1 in a picture 720 high."""
     from PIL import Image, ImageDraw
 
-    title, small = _font(round(17 * scale)), _font(round(14 * scale))
+    title, small = label_font(round(17 * scale)), label_font(round(14 * scale))
     pad, bar = 12 * scale, 14 * scale
     inner = max(220 * scale, title.getlength(legend.title), small.getlength(legend.unit))
     width, height = round(inner + 2 * pad), round(88 * scale + pad)
@@ -62,7 +54,7 @@ def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
     """(H, W, 4) all names one below the other, and (N, 4) left, top, width and height of each."""
     from PIL import Image, ImageDraw
 
-    font = _font(pixels)
+    font = label_font(pixels)
     row, pad = round(pixels * 1.35), max(round(pixels * 0.3), 2)
     widths = [int(np.ceil(font.getlength(name))) + 2 * pad for name in names]
     picture = Image.new("RGBA", (max(widths, default=1), max(row * len(names), 1)), (0, 0, 0, 0))

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, Float64, UInt8
-from fba_player.figure.texture_images import Pictures, halved
+from fba_player.gl._textures import Pictures, halved
 from fba_player.gl.lod import distance, same
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
-from fba_player.mesh.skin_relief import RELIEF, relief
+from fba_player.mesh.textures import RELIEF, skin_relief
 from fba_player.view.view import FaceMesh, FaceShape
 
 MOST_SHAPES = 64
@@ -162,7 +162,7 @@ class FaceRenderer:
     def _relief_texture(self, wide: float) -> Any:
         """The relief for pixels as wide as this (m), or None where it is not seen."""
         if self._pixels is None:
-            self._pixels = relief()
+            self._pixels = skin_relief()
         size = self._pixels.shape[0]
         halvings = halved(RELIEF / size, wide, size)
         if size / 2**halvings < FAINTEST * size:

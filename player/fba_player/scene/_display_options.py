@@ -14,9 +14,8 @@ from fba_player.scene._bones import Bones, face_pivots
 from fba_player.scene._fap_heatmap import Influence
 from fba_player.scene._ground import body_grid, face_grid, no_shadows
 from fba_player.scene._wireframe import Wireframe
-from fba_player.view.annotations import Colour, Dots, Extras, Grid
 from fba_player.view.switches import Switches
-from fba_player.view.view import FaceMesh, FaceShape, View
+from fba_player.view.view import Colour, Dots, Extras, FaceMesh, FaceShape, Grid, View
 
 LEFT_OUT = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
 """Kinds of parts that a switch takes out."""

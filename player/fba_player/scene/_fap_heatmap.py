@@ -14,9 +14,8 @@ from fba.arrays import Float32, Float64, Floating
 from fba.parameters import FAP_COUNT, faps
 from fba_player.figure.face import FaceFigure
 from fba_player.mesh.primitives import sphere_mesh
-from fba_player.view.annotations import Legend
-from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape, rotation_vector
-from fba_player.view.world_positions import swayed
+from fba_player.view.geometry import rotation_vector, turn_partly
+from fba_player.view.view import Eye, FaceMesh, FaceShape, Legend, Mesh, MeshShape
 
 STEPS, ANGLE = 100, 10_000
 """The value of the FAP that is looked at: of distances, about a tenth of the unit; of angles, 0.1 rad."""
@@ -68,7 +67,7 @@ class Influence:
         figure = self._figure
         neutral, moved = figure.pose(np.zeros_like(self._values)).positions, figure.pose(self._values)
         turn = rotation_vector(moved.turn[:3, :3])
-        placed = swayed(moved.positions, figure.sway, turn, figure.centre)
+        placed = turn_partly(moved.positions, figure.sway, turn, figure.centre)
         distances: Float32 = np.linalg.norm(placed - neutral, axis=1).astype(np.float32)
         return distances
 

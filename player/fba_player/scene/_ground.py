@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba_player.view.annotations import Grid
 from fba_player.view.camera import Subject
+from fba_player.view.view import Grid
 
 SHADOWS = (
     ("HumanoidRoot", 0.55, 0.42, 0.97),

@@ -8,9 +8,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba_player.mesh.primitives import sphere_mesh
-from fba_player.view.annotations import Colour, Lines
-from fba_player.view.view import Eye, FaceMesh, FaceShape, Mesh, MeshShape
-from fba_player.view.world_positions import directions, places
+from fba_player.view.geometry import world_normals, world_positions
+from fba_player.view.view import Colour, Eye, FaceMesh, FaceShape, Lines, Mesh, MeshShape
 
 WIRE: Colour = (0.03, 0.05, 0.08, 0.8)
 WIRE_LIFT = 0.0012
@@ -36,7 +35,7 @@ class Wireframe:
     def edges(self, faces: list[FaceMesh], meshes: list[Mesh], eyes: list[Eye], scale: float) -> Lines:
         """Every edge once; scale: size of the face, 1 for an adult's."""
         found = [np.zeros((0, 2, 3), dtype=np.float32)]
-        found += [places(mesh)[self._of(mesh.shape)] for mesh in faces]
+        found += [world_positions(mesh)[self._of(mesh.shape)] for mesh in faces]
         found += [_moved(mesh.positions, mesh.matrix)[self._of(mesh.shape)] for mesh in meshes]
         found += [_moved(self._ball, eye.matrix) for eye in eyes]
         return Lines(np.concatenate(found), WIRE, 1.0, WIRE_LIFT * scale)
@@ -48,7 +47,7 @@ class Wireframe:
             if mesh.shape not in self._thinned:
                 self._thinned[mesh.shape] = _thinned(mesh, NORMAL_CELL * scale)
             rows = self._thinned[mesh.shape]
-            foot, way = places(mesh)[rows], directions(mesh)[rows]
+            foot, way = world_positions(mesh)[rows], world_normals(mesh)[rows]
             ends.append(np.stack([foot, foot + way * np.float32(NORMAL_LENGTH * scale)], axis=1))
             shade = np.ones((len(rows), 2, 4), dtype=np.float32)
             shade[..., :3] = (way * 0.5 + 0.5)[:, None]

@@ -6,6 +6,7 @@ more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres;
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -16,9 +17,11 @@ from fba.arrays import Float32, Float64, Int32
 
 if TYPE_CHECKING:
     from fba_player.mesh.simplify import Coarser
-    from fba_player.mesh.texture_image import FacePicture
-    from fba_player.view.annotations import Extras
+    from fba_player.mesh.textures import FacePicture
 
+
+Colour = tuple[float, float, float, float]
+"""Of annotations: red, green, blue as displayed (sRGB, 0..1), and opacity."""
 
 CAPSULE_FLOATS = 16
 """A capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
@@ -129,6 +132,72 @@ class Eye:
 
 
 @dataclass(frozen=True, eq=False)
+class Lines:
+    """Straight lines, equally wide near and far.
+
+    ends: float32 (N, 2, 3). colours: one for all, or float32 (N, 2, 4), one an end. width: pixels of a
+    picture 720 high. lift: they are drawn over what hides them by less than this (m).
+    """
+
+    ends: Float32
+    colours: Colour | Float32
+    width: float = 1.0
+    lift: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Dots:
+    """Round dots, equally large near and far, with names.
+
+    places: float32 (N, 3). colour: of all. radius: pixels of a picture 720 high; 0 for names alone. lift:
+    as of lines; hidden further, a dot shines through faintly. names: one a dot, shown where few are in
+    view. facing: float32 (N, 3), the way in which a dot can be seen; zeros: from everywhere. most: no dot
+    has a larger radius than this (m), so that from afar they stay apart.
+    """
+
+    places: Float32
+    colour: Colour
+    radius: float
+    lift: float
+    names: tuple[str, ...]
+    facing: Float32
+    most: float = math.inf
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Lines on a level plane. height: y. step: metres between the bold ones, ten fine ones in each. centre:
+    x and z around which they are seen. reach: how far they fade out, metres."""
+
+    height: float
+    step: float
+    centre: tuple[float, float]
+    reach: float
+
+
+@dataclass(frozen=True)
+class Legend:
+    """What colours mean. title, unit: words. most: the value of the last colour; the first is 0.
+    stops: colours at equal steps."""
+
+    title: str
+    unit: str
+    most: float
+    stops: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Extras:
+    """All of it; shells are meshes drawn as if of glass."""
+
+    lines: tuple[Lines, ...] = ()
+    dots: tuple[Dots, ...] = ()
+    shells: tuple[FaceMesh, ...] = field(default=())
+    grid: Grid | None = None
+    legend: Legend | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """Everything to be drawn at one moment.
 
@@ -136,7 +205,7 @@ class View:
     through a little. blobs: float32 (K, 4), soft shadows on the ground:
     x, z, radius, darkness. ground: whether there is a ground. background: colour behind everything (sRGB,
     0..1, as shown) instead of the studio. extras: what is drawn over the figure, see
-    `fba_player.view.annotations`.
+    `Extras`.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -167,39 +236,3 @@ def srgb(text: str) -> tuple[float, float, float]:
     values = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
     red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values)
     return red, green, blue
-
-
-def rotation_vector(matrix: Float64) -> Float64:
-    """(3,) axis of a rotation (3, 3) times its angle, 0..pi."""
-    # The quaternion, by its largest component: exact near half a turn too.
-    trace = float(np.trace(matrix))
-    squares = np.array([trace, *np.diag(matrix)])
-    largest = int(squares.argmax())
-    if largest == 0:
-        q = np.array([
-            1 + trace,
-            matrix[2, 1] - matrix[1, 2],
-            matrix[0, 2] - matrix[2, 0],
-            matrix[1, 0] - matrix[0, 1],
-        ])  # fmt: skip
-    else:
-        i = largest - 1
-        j, k = (i + 1) % 3, (i + 2) % 3
-        q = np.zeros(4)
-        q[0] = matrix[k, j] - matrix[j, k]
-        q[1 + i] = 1 + 2 * matrix[i, i] - trace
-        q[1 + j], q[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
-    q = q / np.linalg.norm(q)
-    sine = float(np.linalg.norm(q[1:]))
-    if sine < 1e-12:
-        return np.zeros(3)
-    angle = 2 * np.arctan2(sine, abs(q[0])) * (1 if q[0] >= 0 else -1)
-    vector: Float64 = q[1:] / sine * angle
-    return vector
-
-
-def translation(offset: npt.ArrayLike) -> Float64:
-    """(4, 4) matrix of a shift."""
-    matrix = np.eye(4)
-    matrix[:3, 3] = offset
-    return matrix

@@ -16,7 +16,8 @@ from fba_player.gl._antialias_region import filled
 from fba_player.gl._silhouette import TILE, Outliner
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.view.camera import Camera
-from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, View, rotation_vector
+from fba_player.view.geometry import rotation_vector
+from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, View
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 2.0, 3.1, np.pi])

@@ -1,6 +1,6 @@
-"""The picture that lies on a part of a face.
+"""Textures of faces: pictures in PNG or JPEG, how large they lie on a mesh, and the relief of skin.
 
-To decode one takes a tenth of a second: what a screen shows of it is kept on disk.
+Decoding a picture takes a tenth of a second, so the reduced sizes that screens show are cached on disk.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from fba.arrays import Int32, UInt8
+from fba.arrays import Float32, Int32, UInt8
 from fba.cache import kept, key_of
 
 LARGEST = 4096
@@ -18,7 +18,17 @@ LARGEST = 4096
 LARGE = 100_000
 """Of files of so many bytes and more something is kept."""
 MAKING = 1
-"""Counts up with every change of what is made of a picture: what was kept before is then made anew."""
+"""Cache version of pictures; increment when `FacePicture` gives other pixels or measures."""
+
+RELIEF_SIZE = 256
+RELIEF = 0.022
+"""Metres after which the skin's relief repeats."""
+SHARES = ((3.0, 0.35), (9.0, 0.7), (26.0, 1.0), (60.0, 0.6))
+"""Bands of the relief's noise: grains across the picture, and their weights."""
+SPREAD = 0.17
+"""Standard deviation of a channel of the relief, as a share of its range."""
+RELIEF_MAKING = 1
+"""Cache version of the relief; increment when `skin_relief` gives other pixels."""
 
 
 class FacePicture:
@@ -85,3 +95,39 @@ def _roots() -> tuple[int, ...]:
     code = np.arange(256) / 255
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
     return tuple(int(v) for v in np.round(255 * np.sqrt(linear)))
+
+
+def texture_breadth(positions: Float32, texcoords: Float32, triangles: Int32) -> float:
+    """Metres that the whole width of a texture covers on a mesh (a median); 0 where it covers nothing."""
+    if not len(triangles):
+        return 0.0
+    corners, flat = positions[triangles], texcoords[triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    spread = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    laid = spread > 1e-9
+    return float(np.sqrt(np.median(area[laid] / spread[laid]))) if laid.any() else 0.0
+
+
+def skin_relief() -> UInt8:
+    """uint8 (256, 256, 3): the fine relief of skin, three channels of repeating noise around 128.
+
+    From pores to the coarser grain seen from further away; always the same, stored in the disk cache.
+    """
+    key = key_of("relief", RELIEF_MAKING, RELIEF_SIZE, SPREAD, SHARES)
+    (found,) = kept(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
+    return found
+
+
+def _make_relief() -> UInt8:
+    random = np.random.default_rng(20)
+    along = np.fft.fftfreq(RELIEF_SIZE, 1 / RELIEF_SIZE)
+    distance = np.hypot(along[:, None], along[None])
+    bands = sum(
+        share * np.exp(-(((distance - grains) / (0.45 * grains)) ** 2)) / grains for grains, share in SHARES
+    )
+    white = np.fft.fft2(random.standard_normal((3, RELIEF_SIZE, RELIEF_SIZE)))
+    noise = np.real(np.fft.ifft2(white * bands))
+    noise /= noise.std(axis=(1, 2), keepdims=True)
+    pixels = np.clip(127.5 + 255 * SPREAD * noise, 0, 255).astype(np.uint8)
+    return np.ascontiguousarray(pixels.transpose(1, 2, 0))

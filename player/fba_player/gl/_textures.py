@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
-from fba.arrays import Float32, Int32
+from fba.arrays import Float32
+from fba_player.mesh.textures import texture_breadth
 from fba_player.view.view import FaceShape
 
 SHARPEST = 0.8
@@ -31,7 +30,7 @@ class Pictures:
         self._sizes: dict[int, Any] = {}
         self._breadth = 0.0
         if shape.picture is not None and shape.texcoords is not None:
-            self._breadth = breadth(positions, shape.texcoords, shape.triangles)
+            self._breadth = texture_breadth(positions, shape.texcoords, shape.triangles)
 
     def suited(self, pixel: float) -> Any:
         """The texture for a screen whose pixels are so wide where the part is (m), or None without one."""
@@ -62,15 +61,3 @@ def halved(texel: float, pixel: float, size: int) -> int:
         return 0
     most = int(math.log2(max(size / SMALLEST, 1)))
     return min(math.ceil(math.log2(ratio)), most) if ratio < math.inf else most
-
-
-def breadth(positions: Float32, texcoords: Float32, triangles: Int32) -> float:
-    """Metres across the whole of a picture that lies on triangles; 0 where none does."""
-    if not len(triangles):
-        return 0.0
-    corners, flat = positions[triangles], texcoords[triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    spread = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    laid = spread > 1e-9
-    return float(np.sqrt(np.median(area[laid] / spread[laid]))) if laid.any() else 0.0

@@ -10,7 +10,7 @@ import pytest
 
 Image = pytest.importorskip("PIL.Image")
 
-from fba_player.mesh.texture_image import LARGE, FacePicture  # noqa: E402 - needs Pillow
+from fba_player.mesh.textures import LARGE, FacePicture  # noqa: E402 - needs Pillow
 
 
 def encoded(pixels: np.ndarray) -> bytes:

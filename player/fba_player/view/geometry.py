@@ -1,0 +1,78 @@
+"""Vertices of face meshes in the world, as the shader `face.vert` computes them; rotations and shifts."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fba.arrays import Float32, Float64
+from fba_player.view.view import FaceMesh
+
+
+def world_positions(mesh: FaceMesh) -> Float32:
+    """(V, 3) positions in the world."""
+    at = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
+    world: Float32 = (at @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
+    return world
+
+
+def world_normals(mesh: FaceMesh) -> Float32:
+    """(V, 3) unit normals in the world."""
+    turned = turn_partly(mesh.normals, mesh.shape.sway, mesh.turn, np.zeros(3)) @ mesh.matrix[:3, :3].T
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    unit: Float32 = (turned / np.maximum(length, 1e-20)).astype(np.float32)
+    return unit
+
+
+def turn_partly(positions: Float32, sway: Float32, turn: Float64, centre: Float64) -> Float64:
+    """(V, 3) positions turned about `centre` (3,), each vertex by its share `sway` (V,) of a rotation.
+
+    turn: (3,), the rotation's axis times its angle.
+    """
+    at = positions.astype(np.float64)
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-6:
+        return at
+    axis, arm = turn / angle, at - centre
+    angles = angle * sway.astype(np.float64)[:, None]
+    along = (arm @ axis)[:, None] * axis
+    turned: Float64 = (
+        arm * np.cos(angles) + np.cross(axis, arm) * np.sin(angles) + along * (1 - np.cos(angles)) + centre
+    )
+    return turned
+
+
+def rotation_vector(matrix: Float64) -> Float64:
+    """(3,) axis of a rotation (3, 3) times its angle, 0..pi."""
+    # The quaternion, by its largest component: exact near half a turn too.
+    trace = float(np.trace(matrix))
+    squares = np.array([trace, *np.diag(matrix)])
+    largest = int(squares.argmax())
+    if largest == 0:
+        q = np.array([
+            1 + trace,
+            matrix[2, 1] - matrix[1, 2],
+            matrix[0, 2] - matrix[2, 0],
+            matrix[1, 0] - matrix[0, 1],
+        ])  # fmt: skip
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = np.zeros(4)
+        q[0] = matrix[k, j] - matrix[j, k]
+        q[1 + i] = 1 + 2 * matrix[i, i] - trace
+        q[1 + j], q[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
+    q = q / np.linalg.norm(q)
+    sine = float(np.linalg.norm(q[1:]))
+    if sine < 1e-12:
+        return np.zeros(3)
+    angle = 2 * np.arctan2(sine, abs(q[0])) * (1 if q[0] >= 0 else -1)
+    vector: Float64 = q[1:] / sine * angle
+    return vector
+
+
+def translation(offset: npt.ArrayLike) -> Float64:
+    """(4, 4) matrix of a shift."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
