@@ -2,7 +2,7 @@
 
 from fba.codec._decoder import Damage, Decoder, decode
 from fba.codec._encoder import Encoder, EncoderStatistics, encode, encode_with_statistics
-from fba.codec._planner import EncoderOptions
+from fba.codec._options import EncoderOptions
 from fba.codec._script import encode_planes
 from fba.codec.block import Block
 from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
