@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.arrays import Float64, Intp
 
@@ -25,11 +26,29 @@ def multiply(a: Float64, b: Float64) -> Float64:
     )
 
 
-def about(axis: int, angle: Float64) -> Float64:
+def axis_quaternions(axis: int, angle: Float64) -> Float64:
     """Quaternions (..., 4) of turns about x, y or z (0, 1, 2) by angles (...) in radians."""
     result = np.zeros((*np.shape(angle), 4))
     result[..., 0] = np.cos(np.asarray(angle) / 2)
     result[..., 1 + axis] = np.sin(np.asarray(angle) / 2)
+    return result
+
+
+def axis_matrices(axis: int, angle: npt.ArrayLike) -> Float64:
+    """Matrices (..., 3, 3) of turns about x, y or z (0, 1, 2) by angles (...) in radians."""
+    angle = np.asarray(angle, dtype=np.float64)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    result = np.zeros((*angle.shape, 3, 3))
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    result[..., axis, axis] = 1.0
+    result[..., one, one] = result[..., two, two] = cosine
+    result[..., two, one], result[..., one, two] = sine, -sine
+    return result
+
+
+def apply(rotation: Float64, vector: Float64) -> Float64:
+    """Vectors (..., 3) under rotations (..., 3, 3)."""
+    result: Float64 = np.einsum("...ij,...j->...i", rotation, vector)
     return result
 
 
@@ -42,6 +61,38 @@ def matrices(quaternions: Float64) -> Float64:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternions(matrices: Float64) -> Float64:
+    """Unit quaternions (..., 4), w first, of rotations (..., 3, 3)."""
+    m = matrices
+    trace = np.trace(m, axis1=-2, axis2=-1)
+    # four ways to take it apart; the one with the largest part is exact
+    squares = np.stack([trace, m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], axis=-1)
+    best = np.argmax(squares, axis=-1)
+    result = np.zeros((*m.shape[:-2], 4))
+    for which in range(4):
+        use = best == which
+        if not use.any():
+            continue
+        n = m[use]
+        if which == 0:
+            w = np.sqrt(1 + trace[use]) / 2
+            parts = [
+                w, (n[:, 2, 1] - n[:, 1, 2]) / (4 * w), (n[:, 0, 2] - n[:, 2, 0]) / (4 * w),
+                (n[:, 1, 0] - n[:, 0, 1]) / (4 * w),
+            ]  # fmt: skip
+        else:
+            i = which - 1
+            j, k = (i + 1) % 3, (i + 2) % 3
+            x = np.sqrt(np.maximum(1 + n[:, i, i] - n[:, j, j] - n[:, k, k], 1e-300)) / 2
+            parts = [(n[:, k, j] - n[:, j, k]) / (4 * x), x, x, x]
+            parts[1 + i] = x
+            parts[1 + j] = (n[:, j, i] + n[:, i, j]) / (4 * x)
+            parts[1 + k] = (n[:, k, i] + n[:, i, k]) / (4 * x)
+        result[use] = np.stack(parts, axis=-1)
+    unit: Float64 = result / np.linalg.norm(result, axis=-1, keepdims=True)
+    return unit
 
 
 def cross(a: Float64, b: Float64) -> Float64:

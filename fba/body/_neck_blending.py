@@ -10,6 +10,7 @@ from fba.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from fba.body.model import BodyPart
 from fba.body.skin.skin_weights import INFLUENCES, strongest
 from fba.cache import kept, key_of
+from fba.easing import smoothstep
 
 NEAR, FAR = 0.010, 0.030
 """Metres from the body's neck: up to the first a vertex moves as the neck there, beyond the second with the
@@ -125,8 +126,7 @@ def _nearest(tree: Any, dense: Float64, places: Float64, skull: int, below: Bool
     share = 1 / np.maximum(away, 1e-6) ** 2
     share /= share.sum(axis=1, keepdims=True)
     found = np.einsum("vk,vkj->vj", share, dense[rows])
-    t = np.clip((away[:, :1] - NEAR) / (FAR - NEAR), 0.0, 1.0)
-    alone = np.where(below[:, None], 0.0, t * t * (3 - 2 * t))
+    alone = np.where(below[:, None], 0.0, smoothstep((away[:, :1] - NEAR) / (FAR - NEAR)))
     found *= 1 - alone
     found[:, skull] += alone[:, 0]
     return strongest(found)

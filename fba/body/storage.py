@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from fba import rotations
 from fba.arrays import Float32, Float64, Int32, Int64
 from fba.body.model import BODY_PART_KINDS, BodyModel, BodyPart
 from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.body.skin.skin_weights import INFLUENCES
 from fba.errors import ModelError
 from fba.gltf.document import Document
-from fba.gltf.nodes import rotation_matrix
 from fba.gltf.part_materials import Looks, material_of
 from fba.gltf.scene import Gltf, Primitive
 from fba.gltf.values import Value, located, optional
@@ -190,7 +190,7 @@ def _skeleton(gltf: Gltf, joints: tuple[int, ...]) -> tuple[Skeleton, Float64, I
         parent = -1 if shown.parent is None else row[shown.parent]
         parents.append(parent)
         centres[number] = shown.translation + (centres[parent] if parent >= 0 else 0.0)
-        bind[number, :3, :3] = rotation_matrix(shown.rotation)
+        bind[number, :3, :3] = rotations.matrices(shown.rotation[[3, 0, 1, 2]])
         bind[number, :3, 3] = shown.translation
         if parent >= 0:
             bind[number] = bind[parent] @ bind[number]

@@ -1,22 +1,23 @@
 """The FBA codec: numbers to bits and back (ISO/IEC 14496-2, FBA object; predictive mode)."""
 
-from fba.codec._assembly import Assembly
 from fba.codec._decoder import Damage, Decoder, decode
 from fba.codec._encoder import Encoder, EncoderStatistics, encode, encode_with_statistics
-from fba.codec._planner import EncoderOptions
+from fba.codec._options import EncoderOptions
 from fba.codec._script import encode_planes
 from fba.codec.block import Block
+from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
 from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
 
 __all__ = [
-    "Assembly",
     "Block",
     "Damage",
+    "DecodedFrames",
     "Decoder",
     "Encoder",
     "EncoderOptions",
     "EncoderStatistics",
+    "FrameBuffer",
     "FrameRate",
     "PartInfo",
     "PartSettings",

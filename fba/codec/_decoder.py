@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fba.animation import Animation, Frame
-from fba.codec._assembly import Assembly
 from fba.codec._buffer import Buffer
 from fba.codec._clock import StreamClock
 from fba.codec._plane import loops, slots, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec.block import Block
+from fba.codec.frame_buffer import FrameBuffer
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, but_recognised
@@ -371,18 +371,18 @@ def decode(
     Raises BitstreamError, UnsupportedError.
     """
     decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
-    assembly = Assembly()
+    frames = FrameBuffer(in_place=True)
     view = memoryview(data)
     for start in range(0, len(view), _CHUNK):
         for block in decoder.push_blocks(view[start : start + _CHUNK]):
-            assembly.add(block)
+            frames.add(block)
     for block in decoder.finish_blocks():
-        assembly.add(block)
+        frames.add(block)
     for damage in decoder.damage:
         warnings.warn(
             f"bytes {damage.start}..{damage.stop} were lost: {damage.error}", FbaWarning, stacklevel=2
         )
-    if not assembly.frames:
+    if not frames.frames:
         error = decoder.damage[0].error if decoder.damage else None
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error
-    return assembly.animation()
+    return frames.decoded().animation()

@@ -10,11 +10,13 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack, FaceTrack, Frame
 from fba.arrays import Bool, Int32, Int64
-from fba.codec import _planner as planner
+from fba.codec import _headers as headers
+from fba.codec import _ranges as range_fitting
+from fba.codec._options import EncoderOptions
 from fba.codec._plane import quantiser, slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
-from fba.codec._planner import EncoderOptions, Ranges
+from fba.codec._ranges import Ranges
 from fba.codec.settings import PartSettings, PlaneSettings, RangeLists
 from fba.errors import RangeError
 from fba.parameters import INTENSITY_MAX
@@ -84,7 +86,7 @@ class Encoder:
             frames = _followed(self._held, animation)
         self._check_skips(frames)
         if self._rate is None:
-            planner.frame_rate(animation.rate)  # refuses what cannot be coded before anything is written
+            headers.frame_rate(animation.rate)  # refuses what cannot be coded before anything is written
             self._rate = animation.rate
         self._held = frames[len(frames) - 1 :]
         self._encode(frames, len(frames) - 1)
@@ -130,7 +132,7 @@ class Encoder:
 
     def _clip_amounts(self, rows: Int32) -> None:
         """Bring blends and intensities into 0..63. Raises RangeError for those that no quantiser makes."""
-        wrong = planner.clip_amounts(rows)
+        wrong = range_fitting.clip_amounts(rows)
         if len(wrong) and not self.options.clamp:
             frame, slot, value = wrong[0]
             raise RangeError(
@@ -139,7 +141,7 @@ class Encoder:
                 value=value,
                 limits=(0, INTENSITY_MAX),
                 frame=self._position + frame,
-            ).with_remedies(planner.CLAMP)
+            ).with_remedies(range_fitting.CLAMP)
         self.statistics.clamped += len(wrong)
 
     def _encode_run(self, frames: Animation, start: int, stop: int, rows: Int32, skips: Int64) -> None:
@@ -147,7 +149,7 @@ class Encoder:
         masks = _masks(frames, start)
         interpolated = _interpolated(frames, start)
         types = {
-            part: planner.mask_types(
+            part: headers.mask_types(
                 part, mask, interpolated if part == slots.FACE_BIT else None, self.options.unsent
             )
             for part, mask in masks.items()
@@ -223,8 +225,8 @@ class Encoder:
             intra=True,
             face=settings.get(slots.FACE_BIT),
             body=settings.get(slots.BODY_BIT),
-            frame_rate=planner.frame_rate(frames.rate) if first or self.options.start_codes else None,
-            time_code=planner.time_code(index, frames.rate) if first else None,
+            frame_rate=headers.frame_rate(frames.rate) if first or self.options.start_codes else None,
+            time_code=headers.time_code(index, frames.rate) if first else None,
             skip=skip,
             start_code=self.options.start_codes and not first,
         )
@@ -263,7 +265,7 @@ class Encoder:
         if beyond.any():
             slot = int(coded[beyond][0])
             if not options.clamp:
-                raise planner.does_not_fit(slot, int(row[slot]), self._position + position, options)
+                raise range_fitting.does_not_fit(slot, int(row[slot]), self._position + position, options)
             ranges.widen_to_catch_up(coded[beyond], levels[beyond])
             self._stale[part] = True
         none = np.zeros_like(levels)
@@ -294,7 +296,7 @@ def encode_with_statistics(
 ) -> tuple[bytes, EncoderStatistics]:
     """Like `encode`, and what the encoder counted."""
     options = options or EncoderOptions()
-    encoder = Encoder(options, ranges=planner.fitting_ranges(animation, options))
+    encoder = Encoder(options, ranges=range_fitting.fitting_ranges(animation, options))
     starts = range(0, len(animation), _CHUNK)
     chunks = [encoder.push_animation(animation[start : start + _CHUNK]) for start in starts]
     chunks.append(encoder.finish())

@@ -20,6 +20,7 @@ from fba.errors import ModelError
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
 from fba.parameters import FAP_COUNT, faps
+from fba.rotations import axis_matrices
 
 DIRECTIONS = {
     "left": (1.0, 0.0, 0.0),
@@ -203,17 +204,5 @@ def _turned_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
 def _head_matrices(values: Float64) -> Float64:
     """(T, 3, 3): yaw . roll . pitch, the order of the spine's joints; each angle FAP x 1e-5 rad."""
     pitch, yaw, roll = (values[:, n - 1] * 1e-5 for n in (HEAD_PITCH, HEAD_YAW, HEAD_ROLL))
-    zero, one = np.zeros(len(values)), np.ones(len(values))
-    cp, sp, cy, sy, cr, sr = (
-        np.cos(pitch),
-        np.sin(pitch),
-        np.cos(yaw),
-        np.sin(yaw),
-        np.cos(roll),
-        np.sin(roll),
-    )
-    about_x = np.stack([one, zero, zero, zero, cp, -sp, zero, sp, cp], axis=-1).reshape(-1, 3, 3)
-    about_y = np.stack([cy, zero, sy, zero, one, zero, -sy, zero, cy], axis=-1).reshape(-1, 3, 3)
-    about_z = np.stack([cr, -sr, zero, sr, cr, zero, zero, zero, one], axis=-1).reshape(-1, 3, 3)
-    matrices: Float64 = about_y @ about_z @ about_x
+    matrices: Float64 = axis_matrices(1, yaw) @ axis_matrices(2, roll) @ axis_matrices(0, pitch)
     return matrices

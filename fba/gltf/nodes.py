@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fba import rotations
 from fba.arrays import Float64
 from fba.gltf._accessors import Accessors
 from fba.gltf.document import MAX_ITEMS, Document
@@ -124,23 +125,11 @@ def _transform(entry: Value) -> tuple[Float64 | None, Float64 | None, Float64 | 
         turn /= length
     matrix_out = np.eye(4)
     with np.errstate(all="ignore"):  # what overflows is found where the frames are multiplied
-        matrix_out[:3, :3] = rotation_matrix(turn) * size
+        matrix_out[:3, :3] = rotations.matrices(turn[[3, 0, 1, 2]]) * size
     matrix_out[:3, 3] = shift
     for array in (shift, turn, size):
         array.flags.writeable = False
     return shift, turn, size, matrix_out
-
-
-def rotation_matrix(quaternion: Float64) -> Float64:
-    """float64 (3, 3) of a unit quaternion x, y, z, w."""
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _highest_joint(mesh: Mesh) -> int:

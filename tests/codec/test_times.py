@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from codec_streams import OBJECT, RATES, decoded, jaw_intra, packed
 from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, decode, encode
-from fba.codec import FrameRate, PlaneSettings, TimeCode, encode_planes
+from fba.codec import Block, FrameBuffer, FrameRate, PlaneSettings, TimeCode, encode_planes
 from fba_conformance import _motion as motion
 
 SKIP_MAX = 15 << 20
@@ -155,6 +155,61 @@ def test_a_rate_that_changes() -> None:
         animation = decode(data)
     assert animation.rate == 50
     assert [Fraction(int(index)) / 50 for index in animation.index] == times
+
+
+@pytest.mark.filterwarnings("ignore:.*the frame rate changes")
+@pytest.mark.parametrize(
+    ("rates", "common"),
+    [
+        ((FrameRate(25), FrameRate(30), FrameRate(50)), Fraction(150)),
+        ((FrameRate(30, 0, 1), FrameRate(30)), Fraction(30000)),
+        ((FrameRate(30, 0, 1), FrameRate(255, 1)), Fraction(4081, 16)),  # 30000 x 4081 would be too fine
+        ((FrameRate(255, 1), FrameRate(30, 0, 1), FrameRate(255, 15)), Fraction(4095, 16)),
+    ],
+)
+def test_rates_that_change_have_one_in_common(rates: tuple[FrameRate, ...], common: Fraction) -> None:
+    """The lowest that holds all times, or the highest of the stream; however it is cut into blocks."""
+    planes = [replace(INTRA, frame_rate=rate) if not t else PREDICTED for rate in rates for t in range(40)]
+    data = written(*planes)
+    exact, time = [], Fraction(0)
+    for rate in rates:
+        exact += [time + t / rate.fraction for t in range(40)]
+        time += 40 / rate.fraction
+    animation = decode(data)
+    decoder = Decoder()
+    blocks = [block for byte in data for block in decoder.push_blocks(bytes([byte]))]
+    blocks += decoder.finish_blocks()
+    assert animation.rate == common
+    assert animation.index.tolist() == [floor(time * common + Fraction(1, 2)) for time in exact]
+    assert len(blocks) > len(rates)
+    looked, waited = FrameBuffer(), FrameBuffer(in_place=True)
+    earlier: list[tuple[Animation, Animation]] = []
+    for block in blocks:
+        looked.add(block)
+        waited.add(block)
+        seen = looked.decoded().animation()
+        earlier.append((seen, replace(seen, index=seen.index.copy())))
+    assert looked.decoded().animation() == waited.decoded().animation() == animation
+    assert all(seen == copy for seen, copy in earlier)  # what was looked at did not change
+
+
+def test_masks_that_change_from_plane_to_plane() -> None:
+    frames = FrameBuffer()
+    tracks = [
+        motion.face(2, faps_sent=(3,)),
+        motion.face(3, faps_sent=(3, 4)),
+        motion.face(1, faps_sent=(3,)),
+    ]
+    blocks: list[Block] = []
+    for track in tracks:
+        decoder = Decoder()
+        blocks += decoder.push_blocks(encode(motion.animation(track))) + decoder.finish_blocks()
+    for block in blocks:
+        frames.add(block)
+    face = frames.decoded().face
+    assert face is not None
+    sent = [[3]] * 2 + [[3, 4]] * 3 + [[3]]
+    assert [(np.flatnonzero(row) + 1).tolist() for row in face.mask] == sent
 
 
 def test_a_rate_said_again_changes_nothing() -> None:

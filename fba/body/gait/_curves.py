@@ -13,13 +13,6 @@ Interpolation = Literal["linear", "smooth"]
 """"linear" as in the digest, or cubic."""
 
 
-def smoothstep(value: npt.ArrayLike) -> Float64:
-    """From 0 to 1 over 0..1, level at both ends."""
-    x = np.clip(np.asarray(value, dtype=np.float64), 0.0, 1.0)
-    result: Float64 = x * x * (3.0 - 2.0 * x)
-    return result
-
-
 def checked(interpolation: Interpolation) -> Interpolation:
     """The same; ValueError on another word."""
     if interpolation not in ("linear", "smooth"):

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64
-from fba.body.gait._rotations import about, turned
+from fba.rotations import apply, axis_matrices
 
 KNEE, ELBOW = 1.0, -1.0
 """Which way a hinge bends: about +x a knee (backward), about -x an elbow (forward)."""
@@ -58,12 +58,12 @@ class Limb:
         """
         twist = np.asarray(twist, dtype=np.float64)
         bend = self.bend(np.linalg.norm(target, axis=-1))
-        end = self.upper + turned(about(0, self.way * bend), self.lower)
-        end = turned(about(1, twist), end)
+        end = self.upper + apply(axis_matrices(0, self.way * bend), self.lower)
+        end = apply(axis_matrices(1, twist), end)
         size = np.linalg.norm(end, axis=-1) / np.linalg.norm(target, axis=-1)
         wanted = target * size[..., None]
         flat = np.hypot(end[..., 0], end[..., 1])
         aside = -np.arccos(np.clip(wanted[..., 0] / flat, -1.0, 1.0)) - np.arctan2(end[..., 1], end[..., 0])
-        leant = turned(about(2, aside), end)
+        leant = apply(axis_matrices(2, aside), end)
         forward = np.arctan2(wanted[..., 2], wanted[..., 1]) - np.arctan2(leant[..., 2], leant[..., 1])
-        return about(0, forward) @ about(2, aside) @ about(1, twist), bend
+        return axis_matrices(0, forward) @ axis_matrices(2, aside) @ axis_matrices(1, twist), bend

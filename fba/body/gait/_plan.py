@@ -13,10 +13,12 @@ from fba.arrays import Float64
 from fba.body.gait import _ground as ground
 from fba.body.gait._anatomy import Anatomy, Side
 from fba.body.gait._characters import CYCLE, PHASES, Character
-from fba.body.gait._curves import Interpolation, cosine, periodic, smoothstep, spline
+from fba.body.gait._curves import Interpolation, cosine, periodic, spline
 from fba.body.gait._ground import TOE_OFF, Footing, Leg
-from fba.body.gait._rotations import about, limb_angles
+from fba.body.gait._joint_angles import limb_angles
+from fba.easing import smoothstep
 from fba.errors import ModelError
+from fba.rotations import axis_matrices
 
 KNOTS = np.array([*PHASES, *(phase + 0.5 for phase in PHASES)])
 FLAT = 0.09
@@ -90,7 +92,7 @@ class Plan:
 
     def lean(self, phase: Float64) -> Float64:
         """(T, 3, 3) rotation of the root."""
-        return about(0, np.full(phase.shape, np.radians(self.character.pelvis.tilt)))
+        return axis_matrices(0, np.full(phase.shape, np.radians(self.character.pelvis.tilt)))
 
     def pelvis_angles(self, phase: Float64) -> tuple[Float64, Float64]:
         """Torsion about y and roll about z of the pelvis, against the root."""
@@ -102,7 +104,7 @@ class Plan:
 
     def pelvis(self, phase: Float64) -> Float64:
         turn, roll = self.pelvis_angles(phase)
-        return about(1, turn) @ about(2, roll)
+        return axis_matrices(1, turn) @ axis_matrices(2, roll)
 
     def side_phase(self, side: Side, phase: Float64) -> Float64:
         return phase if side.letter == "r" else phase - 0.5
@@ -261,7 +263,7 @@ class Plan:
             x, z, bend = (np.interp(swing, knots, column) for column in values.T)
         else:
             x, z, bend = np.moveaxis(spline(knots, values, off, on, swing), -1, 0)
-        thigh = about(0, x) @ about(2, z) @ about(1, np.full(x.shape, yaw))
+        thigh = axis_matrices(0, x) @ axis_matrices(2, z) @ axis_matrices(1, np.full(x.shape, yaw))
         hip = self.hip(side, root, phase)
         swinging = ground.hanging(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
         rise = np.minimum((own - TOE_OFF) / 0.03, (1.0 - own) / 0.06)

@@ -11,8 +11,8 @@ from fba.arrays import Float64
 from fba.body.gait._anatomy import Side, Writer
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import cosine, periodic
+from fba.body.gait._joint_angles import limb_angles
 from fba.body.gait._plan import KNOTS, Plan
-from fba.body.gait._rotations import limb_angles
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
 

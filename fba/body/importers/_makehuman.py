@@ -22,6 +22,7 @@ from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest
 from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
+from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
 from fba.gltf.document import MAX_ITEMS, parse_json
 from fba.gltf.values import Value
@@ -210,8 +211,8 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, pl
         )
         way = places[arm] - places[inner]
         along = (vertices - places[inner]) @ way / max(float(way @ way), 1e-12)
-        far = np.clip((along - BLADE[0]) / (BLADE[1] - BLADE[0]), 0.0, 1.0)
-        weights[:, outer] += weights[:, inner] * far * far * (3 - 2 * far)
+        far = smoothstep((along - BLADE[0]) / (BLADE[1] - BLADE[0]))
+        weights[:, outer] += weights[:, inner] * far
         weights[:, inner] -= weights[:, outer]
     skull = default.number("skullbase")
     for bone in bones:

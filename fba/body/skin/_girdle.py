@@ -16,6 +16,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin._girdle_loops import Girdle
+from fba.easing import smoothstep
 
 CHAIN = ("sternoclavicular", "acromioclavicular", "shoulder", "elbow")
 TAUT = 0.7
@@ -51,7 +52,7 @@ def girdle(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, 
         carried = (weights * np.isin(joints, _below(skeleton, shoulder))).sum(axis=1)
         low = bind[shoulder, 1, 3] - vertices[:, 1].astype(np.float64)
         between = (carried > LEAST) & (carried < 1 - LEAST)
-        taut = np.maximum(taut, TAUT * between * _smooth((low - BELOW[0]) / (BELOW[1] - BELOW[0])))
+        taut = np.maximum(taut, TAUT * between * smoothstep((low - BELOW[0]) / (BELOW[1] - BELOW[0])))
     rows = np.flatnonzero(taut)
     return Girdle(
         np.array(chains, dtype=np.int64).reshape(-1, 4),
@@ -69,9 +70,3 @@ def _below(skeleton: Skeleton, joint: int) -> list[int]:
         if parent in found:
             found.append(number)
     return found
-
-
-def _smooth(value: Float64) -> Float64:
-    t = np.clip(value, 0.0, 1.0)
-    smooth: Float64 = t * t * (3 - 2 * t)
-    return smooth

@@ -8,6 +8,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Int64
 from fba.compiled import compiled, inlined
+from fba.easing import smoothstep_of_one
 
 
 class Girdle(NamedTuple):
@@ -42,8 +43,8 @@ def lift(duals: Float32, girdle: Girdle) -> None:
         if sine < 1e-6:
             continue
         cx, cy, cz = cx / sine, cy / sine, cz / sine
-        fade = min(max((cosine + 1.0) / 0.15, 0.0), 1.0)  # straight backwards there is no one way
-        wanted = LIFT * np.arctan2(sine, cosine) * fade * fade * (3.0 - 2.0 * fade)
+        fade = smoothstep_of_one((cosine + 1.0) / 0.15)  # straight backwards there is no one way
+        wanted = LIFT * np.arctan2(sine, cosine) * fade
         a, b, c, d = _relative(duals, trunk, outer)
         along = b * cx + c * cy + d * cz
         done = 2.0 * np.arctan2(along if a >= 0.0 else -along, abs(a))

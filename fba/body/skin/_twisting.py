@@ -12,6 +12,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin.loops import Twisting
+from fba.easing import smoothstep
 
 LIMB = ("shoulder", "elbow", "wrist")
 WRIST_FROM = 0.35
@@ -46,7 +47,7 @@ def twists(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, 
             shares.append(np.stack([own[turned], child[turned]], axis=1))
             place = np.clip(along[1], 0.0, 1.0)
             own = place - carried[1]
-            child = _smooth((place - WRIST_FROM) / (1 - WRIST_FROM)) - carried[2]
+            child = smoothstep((place - WRIST_FROM) / (1 - WRIST_FROM)) - carried[2]
         bones += [(shoulder, elbow), (elbow, wrist)]
         axes += [_axis(bind, shoulder, elbow), _axis(bind, elbow, wrist)]
     pairs = np.array(bones, dtype=np.int64).reshape(-1, 2)
@@ -86,9 +87,3 @@ def _along(bind: Float64, pair: tuple[int, int], vertices: Float32) -> Float64:
     way = end - start
     place: Float64 = (vertices - start) @ way / max(float(way @ way), 1e-12)
     return place
-
-
-def _smooth(value: Float64) -> Float64:
-    t = np.clip(value, 0.0, 1.0)
-    smooth: Float64 = t * t * (3 - 2 * t)
-    return smooth

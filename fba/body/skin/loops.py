@@ -12,6 +12,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32, Int64
 from fba.body.skin._girdle_loops import Girdle, lift, straighten
 from fba.compiled import compiled, inlined
+from fba.easing import smoothstep_of_one
 
 
 class Twisting(NamedTuple):
@@ -153,8 +154,8 @@ def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
         + axis[1] * (w * c + x * d - y * a - z * b)
         + axis[2] * (w * d - x * c + y * b - z * a)
     )
-    fade = min(max((scalar * scalar + about * about - 0.03) / 0.12, 0.0), 1.0)
-    angle: float = 2.0 * np.arctan2(about, scalar) * fade * fade * (3.0 - 2.0 * fade)
+    fade = smoothstep_of_one((scalar * scalar + about * about - 0.03) / 0.12)
+    angle: float = 2.0 * np.arctan2(about, scalar) * fade
     return angle
 
 

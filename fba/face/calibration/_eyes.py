@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fba.arrays import Bool, Float64, Floating
+from fba.easing import smoothstep
 from fba.errors import FbaWarning
 from fba.face.calibration._field import between
 from fba.face.eyeball import Eyeball
@@ -166,8 +167,7 @@ def _laid(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
 def weight_of(eye: FittedEye, places: Float64) -> Float64:
     """How much a place belongs to the eyeball: 1 on it, 0 out of its reach."""
     distance = np.linalg.norm(places - eye.was.centre, axis=1)
-    share = np.clip((distance / eye.was.radius - LID) / (REACH - LID), 0.0, 1.0)
-    weight: Float64 = 1 - share**2 * (3 - 2 * share)
+    weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID) / (REACH - LID))
     return weight
 
 

@@ -344,7 +344,7 @@ def _motion(
             if channel.endswith("position"):
                 place[:, axis] = numbers[:, column]
             else:
-                turn = rotations.about(axis, np.deg2rad(numbers[:, column]))
+                turn = rotations.axis_quaternions(axis, np.deg2rad(numbers[:, column]))
                 turned[:, joint] = rotations.multiply(turned[:, joint], turn)
             column += 1
         if joint == 0:

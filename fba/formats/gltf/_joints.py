@@ -8,8 +8,8 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
 from fba.errors import FormatError
-from fba.formats.gltf._pose import quaternions
 from fba.gltf.writer import Builder
+from fba.rotations import quaternions
 from fba.source import Path
 
 STILL = 1e-7

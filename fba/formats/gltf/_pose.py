@@ -63,7 +63,7 @@ class BindPose:
 
     def turned(self, number: int, linear: Float64) -> Float64:
         """Quaternions (T, 4), w first: how far a joint is turned from the bind pose, from its (T, 3, 3)."""
-        return quaternions(nearest_rotation(linear) @ self._turns[number].T)
+        return rotations.quaternions(nearest_rotation(linear) @ self._turns[number].T)
 
 
 class Sampler:
@@ -146,37 +146,6 @@ def nearest_rotation(matrices: Float64) -> Float64:
     u[..., :, -1] *= sign[..., None]
     result: Float64 = u @ v
     return result
-
-
-def quaternions(matrices: Float64) -> Float64:
-    """Unit quaternions (..., 4), w first, of rotations (..., 3, 3)."""
-    m = matrices
-    trace = np.trace(m, axis1=-2, axis2=-1)
-    # four ways to take it apart; the one with the largest part is exact
-    squares = np.stack([trace, m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], axis=-1)
-    best = np.argmax(squares, axis=-1)
-    result = np.zeros((*m.shape[:-2], 4))
-    for which in range(4):
-        use = best == which
-        if not use.any():
-            continue
-        n = m[use]
-        if which == 0:
-            w = np.sqrt(1 + trace[use]) / 2
-            parts = [
-                w, (n[:, 2, 1] - n[:, 1, 2]) / (4 * w), (n[:, 0, 2] - n[:, 2, 0]) / (4 * w),
-                (n[:, 1, 0] - n[:, 0, 1]) / (4 * w),
-            ]  # fmt: skip
-        else:
-            i = which - 1
-            j, k = (i + 1) % 3, (i + 2) % 3
-            x = np.sqrt(np.maximum(1 + n[:, i, i] - n[:, j, j] - n[:, k, k], 1e-300)) / 2
-            parts = [(n[:, k, j] - n[:, j, k]) / (4 * x), x, x, x]
-            parts[1 + i] = x
-            parts[1 + j] = (n[:, j, i] + n[:, i, j]) / (4 * x)
-            parts[1 + k] = (n[:, k, i] + n[:, i, k]) / (4 * x)
-        result[use] = np.stack(parts, axis=-1)
-    return _unit(result)
 
 
 def _unit(values: Float64) -> Float64:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Intp
+from fba.easing import smoothstep
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.mesh.simplify import Coarser
@@ -48,9 +49,7 @@ def sway(model: FaceModel) -> Float32:
     # The border between head and neck rises from below the chin to below the ears, and stays level behind.
     along = np.clip((z - lobe[2]) / max(chin[2] - lobe[2], 1e-6), 0.0, 1.0)
     border = lobe[1] + (chin[1] - 0.12 * reach - lobe[1]) * along
-    share = np.clip(1 - (border - y) / reach, 0.0, 1.0)
-    smooth: Float32 = (share * share * (3 - 2 * share)).astype(np.float32)
-    return smooth
+    return smoothstep(1 - (border - y) / reach).astype(np.float32)
 
 
 def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:

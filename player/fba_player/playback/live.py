@@ -15,10 +15,9 @@ from typing import Any, Protocol
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
-from fba.codec import Decoder, StreamInfo
+from fba.codec import Decoder, FrameBuffer, StreamInfo
 from fba.codec.block import Block
 from fba.errors import BitstreamError, FbaError, FbaWarning
-from fba_player.playback._frame_buffer import GrowingFrames
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import BUFFER
 
@@ -68,7 +67,8 @@ class LiveAnimation:
         self._source = source
         self._at_end = at_end
         self._decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
-        self._frames = GrowingFrames()
+        self._buffer = FrameBuffer()
+        self._now = self._buffer.decoded()
         self._news = threading.Condition()
         self._closing = False
         self._failure: BaseException | None = None
@@ -82,42 +82,41 @@ class LiveAnimation:
     @property
     def rate(self) -> Fraction:
         """Frames a second."""
-        return self._frames.now.rate
+        return self._now.rate
 
     @property
     def index(self) -> Int64:
         """int64 (T,) of what has arrived."""
-        return self._frames.now.index
+        return self._now.index
 
     @property
     def face(self) -> FaceTrack | None:
         """FAPs of what has arrived."""
-        return self._frames.now.face
+        return self._now.face
 
     @property
     def body(self) -> BodyTrack | None:
         """BAPs of what has arrived."""
-        return self._frames.now.body
+        return self._now.body
 
     @property
     def duration(self) -> Fraction:
         """Seconds from the first frame to one frame period after the last that has arrived."""
-        now = self._frames.now
+        now = self._now
         return Fraction(int(now.index[-1] - now.index[0]) + 1) / now.rate if len(now.index) else Fraction(0)
 
     def __len__(self) -> int:
-        return len(self._frames.now.index)
+        return len(self._now.index)
 
     def snapshot(self) -> Animation:
         """What has arrived until now, to keep. ValueError before the first frame."""
-        now = self._frames.now
-        return Animation(now.rate, now.index, now.face, now.body, self.name)
+        return self._now.animation(self.name)
 
     # ---- a stream
 
     def info(self) -> StreamInfo:
         """What has arrived: planes, their bits, the bit rate. Of no parameters."""
-        now, size = self._frames.now, self.received
+        now, size = self._now, self.received
         first, last = (int(now.index[0]), int(now.index[-1])) if len(now.index) else (0, -1)
         return StreamInfo(
             format="fba",
@@ -152,7 +151,7 @@ class LiveAnimation:
             self._news.wait_for(self._enough, PATIENCE)
             if not len(self):
                 raise self._failure or BitstreamError("the stream ended before its first I plane", plane=0)
-            self._frames.settle()
+            self._buffer.fix_parts()
         return True
 
     def wait_end(self, timeout: float | None = None) -> bool:
@@ -166,7 +165,7 @@ class LiveAnimation:
         self._end()
 
     def _enough(self) -> bool:
-        now = self._frames.now
+        now = self._now
         span = int(now.index[-1] - now.index[0]) / now.rate if len(now.index) else 0
         return not self.growing or span >= BUFFER
 
@@ -192,7 +191,8 @@ class LiveAnimation:
     def _take(self, blocks: list[Block]) -> None:
         with self._news:
             for block in blocks:
-                self._frames.append(block)
+                self._buffer.add(block)
+            self._now = self._buffer.decoded()
             damage = self._decoder.damage
             if damage:
                 self._failure = damage[0].error if self._failure is None else self._failure
@@ -203,13 +203,13 @@ class LiveAnimation:
                 before = f" ({self._losses} losses before)" if self._losses else ""
                 self.message = lost + before
                 self.details = f"{lost}{before}: {closed.error}"
-            if self._frames.left_out:
-                self.message = f"{self._frames.left_out} came too late to be shown"
+            if self._buffer.left_out:
+                self.message = f"{self._buffer.left_out} came too late to be shown"
                 self.details = f"{self.message}: the stream brings it, but had none when playing started"
             self._news.notify_all()
 
     def _judge(self, *, at_end: bool = False) -> None:
-        now = self._frames.now
+        now = self._now
         if self._judged or now.body is None or (self.duration < JUDGED and not at_end):
             return
         from fba.body.plausibility import find_doubt

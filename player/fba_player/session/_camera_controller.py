@@ -7,6 +7,7 @@ import time as wall
 from collections.abc import Callable
 from dataclasses import replace
 
+from fba.easing import smoothstep
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
@@ -132,8 +133,7 @@ class Viewpoint:
 
     def _eased(self, until: float) -> float:
         """How far a change is that ends then: from 0 to 1, beginning and ending slowly."""
-        share = min(max(1.0 - (until - self._clock()) / GLIDE, 0.0), 1.0)
-        return share * share * (3 - 2 * share)
+        return float(smoothstep(1.0 - (until - self._clock()) / GLIDE))
 
     def _aside_now(self) -> tuple[float, float]:
         share = self._eased(self._aside_until)

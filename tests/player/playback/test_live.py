@@ -14,9 +14,8 @@ import pytest
 
 import fba
 from fba.animation import Animation
-from fba.codec import Decoder, EncoderOptions
+from fba.codec import Decoder, EncoderOptions, FrameBuffer, FrameRate, PlaneSettings, encode_planes
 from fba.errors import FbaError
-from fba_player.playback._frame_buffer import GrowingFrames
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import BUFFER, Transport
@@ -283,30 +282,54 @@ def test_closing_ends_it_though_the_sender_goes_on(wire: Wire) -> None:
 
 
 def test_a_body_that_comes_late_is_told_but_not_shown() -> None:
-    frames = GrowingFrames()
+    frames = FrameBuffer()
     alone, both = performance(10), performance(10, both=True)
     for animation in (alone, both):
         data = fba.encode(animation)
         decoder = Decoder()
         for block in [*decoder.push_blocks(data), *decoder.finish_blocks()]:
-            frames.append(block)
-        frames.settle()
-    assert (frames.now.body, frames.left_out) == (None, "a body")
-    assert len(frames.now.index) == 20
+            frames.add(block)
+        frames.fix_parts()
+    now = frames.decoded()
+    assert (now.body, frames.left_out) == (None, "a body")
+    assert len(now.index) == 20
 
 
 def test_a_rate_that_changes_keeps_the_times() -> None:
-    frames = GrowingFrames()
+    frames = FrameBuffer()
     for rate, first in ((25, 0), (10, 4)):
         animation = Animation(Fraction(rate), np.arange(10), face=face_track([{3: 9}] * 10))
         decoder = Decoder()
         data = fba.encode(animation)
         for block in [*decoder.push_blocks(data), *decoder.finish_blocks()]:
-            frames.append(replace(block, start=block.start + Fraction(first, rate)))
-    times = frames.now.index / float(frames.now.rate)
+            frames.add(replace(block, start=block.start + Fraction(first, rate)))
+    now = frames.decoded()
+    times = now.index / float(now.rate)
     np.testing.assert_allclose(times[:10], np.arange(10) / 25)
     assert (np.diff(times) > 0).all()
     np.testing.assert_allclose(np.diff(times[10:]), 0.1)
+
+
+@pytest.mark.filterwarnings("ignore:.*the frame rate changes")
+@pytest.mark.parametrize("rates", [(FrameRate(30, 0, 1), FrameRate(255, 1)), (FrameRate(25), FrameRate(30))])
+def test_times_are_those_of_decode_where_the_rate_changes(
+    wire: Wire, rates: tuple[FrameRate, FrameRate]
+) -> None:
+    animation = performance(200)
+    (first,) = Decoder().push_blocks(fba.encode(animation))[:1]
+    part = first.settings.face
+    planes = [PlaneSettings(t % 100 == 0, face=part, face_frame=t) for t in range(200)]
+    for t, rate in zip((0, 100), rates, strict=True):
+        planes[t] = replace(planes[t], frame_rate=rate)
+    data = encode_planes(animation, planes)
+    whole = fba.decode(data)
+    live = LiveAnimation(wire.out)
+    for start in range(0, len(data), 7):
+        wire.send(data[start : start + 7])
+    wire.end()
+    assert live.wait_end(20)
+    assert live.snapshot() == whole
+    assert live.duration == whole.duration
 
 
 def test_arrays_that_somebody_looks_at_do_not_change(wire: Wire) -> None:

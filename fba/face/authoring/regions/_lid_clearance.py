@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
+from fba.easing import smoothstep
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.regions.mouth_opening import CLOSED
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import Surface
-from fba.face.authoring.surface.weights import smooth_step
 from fba.face.model import Part
 
 CLEARANCE = 0.012
@@ -103,7 +103,7 @@ def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
 def freed(profile: Profile, points: Float64, shifts: Float64, values: Float64) -> Float64:
     """Shifts (K, N, 3) with what would cut the eyeball brought before it, the more the further on its way."""
     result = shifts.copy()
-    for k, share in enumerate(smooth_step(np.abs(values) / CLOSED / FREED)):
+    for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FREED)):
         result[k] += profile.lift(points, shifts[k]) * share
     return result
 
@@ -121,7 +121,7 @@ def bridged(
     free = ~margins[edges]
     local, points = place[edges], surface.vertices[vertices]
     result = shifts.copy()
-    for k, share in enumerate(smooth_step(np.abs(values) / CLOSED / FREED)):
+    for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FREED)):
         for _ in range(BRIDGINGS):
             middles = points[local].mean(axis=1)
             push = profile.lift(middles, result[k][local].mean(axis=1), edges=False)[:, 2]

@@ -7,11 +7,12 @@ from itertools import pairwise
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.motion_limits import linear
-from fba.face.authoring.surface.weights import smooth_step, smoothed, without_hem
+from fba.face.authoring.surface.weights import smoothed, without_hem
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
@@ -60,12 +61,12 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
     width = float(np.linalg.norm(back - root))
     rim = _rim(marks, names)
     away = surface.distances(rim, 1.5 * width) / width
-    share = 1 - smooth_step((np.nan_to_num(away, posinf=9.0) - WHOLE) / (ROOT - WHOLE))
+    share = 1 - smoothstep((np.nan_to_num(away, posinf=9.0) - WHOLE) / (ROOT - WHOLE))
     share = smoothed(surface, share, SMOOTHINGS)
     centre = ((top + lobe) / 2 + (back + root) / 2) / 2
     half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * WIDER])
     beside = np.linalg.norm((surface.vertices - centre) / half, axis=1)
-    share *= 1 - smooth_step((beside - AROUND[0]) / (AROUND[1] - AROUND[0]))
+    share *= 1 - smoothstep((beside - AROUND[0]) / (AROUND[1] - AROUND[0]))
     if pull:
         out = root - back
         far = 1 - ((surface.vertices - back) @ out) / (out @ out)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.easing import smoothstep
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import limits
-from fba.face.authoring.surface.weights import region, smooth_step, spread, without_hem
+from fba.face.authoring.surface.weights import region, spread, without_hem
 from fba.face.model import Part
 from fba.face.points import OPEN_JAW
 
@@ -145,7 +146,7 @@ def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
         return np.ones(len(part.vertices))
     shape = Surface([part])
     margin = TEETH_MARGIN * marks.fapu.MNS * 1024
-    each = smooth_step(below_bite(marks, shape.vertices, hinge) / (2 * margin) + 0.5)
+    each = smoothstep(below_bite(marks, shape.vertices, hinge) / (2 * margin) + 0.5)
     if part.kind == "teeth":
         row = _by_teeth_points(marks, part)
         if row is not None:
@@ -217,7 +218,7 @@ def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
     first, last = length[chin[0]], length[chin[-1]]
     left = np.where(length < first, (first - length) / max(first, 1e-9), 0.0)
     right = np.where(length > last, (length - last) / max(length[-1] - last, 1e-9), 0.0)
-    return 1 - (1 - CORNER) * smooth_step(np.maximum(left, right))
+    return 1 - (1 - CORNER) * smoothstep(np.maximum(left, right))
 
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:
@@ -247,4 +248,4 @@ def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:
     x = marks.surface.vertices[vertices, 0]
     left, right = marks.guess("2.4")[0], marks.guess("2.5")[0]
     across = (x - right) / (left - right)
-    return smooth_step(3.5 * np.minimum(across, 1 - across) - 0.5)
+    return smoothstep(3.5 * np.minimum(across, 1 - across) - 0.5)

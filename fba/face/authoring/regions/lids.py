@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.easing import smoothstep
 from fba.face.authoring.regions._lid_clearance import Profile, bridged, edge_length, freed
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, Opening, measure, slid
@@ -19,7 +20,7 @@ from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
 from fba.face.authoring.surface.motion_limits import guarded
 from fba.face.authoring.surface.unfold import relaxed
-from fba.face.authoring.surface.weights import smooth_step, smoothed, without_hem
+from fba.face.authoring.surface.weights import smoothed, without_hem
 from fba.face.model import Part
 
 STEP = 128
@@ -124,7 +125,7 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     )
     opposite = surface.distances(stays, 4 * REACH * es)
     with np.errstate(invalid="ignore"):
-        share *= smooth_step(np.nan_to_num(opposite / (away + opposite), nan=1.0) / OWN_SIDE)
+        share *= smoothstep(np.nan_to_num(opposite / (away + opposite), nan=1.0) / OWN_SIDE)
     # walking along edges makes the distances uneven
     pinned = np.zeros(len(surface), dtype=bool)
     pinned[own] = pinned[stays] = True

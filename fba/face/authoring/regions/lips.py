@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
@@ -26,7 +27,7 @@ from fba.face.authoring.surface.motion_limits import (
     values_between,
 )
 from fba.face.authoring.surface.unfold import eased_field
-from fba.face.authoring.surface.weights import region, smooth_step, spread, without_hem
+from fba.face.authoring.surface.weights import region, spread, without_hem
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
@@ -181,7 +182,7 @@ def _inward(marks: Landmarks) -> Float64:
     field = spread(
         marks.surface, marks.lips, fixed, inner[fixed][:, None].astype(np.float64), slack=1.0, harmonic=True
     )
-    return smooth_step(field[:, 0])
+    return smoothstep(field[:, 0])
 
 
 def _linear(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:

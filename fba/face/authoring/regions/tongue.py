@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64
+from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, limits
 from fba.face.authoring.surface.motion_limits import caps, guarded, straight
-from fba.face.authoring.surface.weights import smooth_step
 from fba.face.model import Part
 from fba.face.points import DIRECTIONS, TONGUE_ROLL
 from fba.parameters import faps
@@ -40,7 +40,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
         if not 0 < middle < 1:
             return "the tongue's body (6.2) is not between its root and its tip"
         share = np.where(
-            length < middle, smooth_step(length / middle), smooth_step((1 - length) / (1 - middle))
+            length < middle, smoothstep(length / middle), smoothstep((1 - length) / (1 - middle))
         )
     elif fap == 45:
         share = length
@@ -62,7 +62,7 @@ def _roll(marks: Landmarks, points: Float64) -> Motion:
     x, y = points[:, 0] - middle[0], points[:, 1] - middle[1]
     root, tip = float(points[:, 2].min()), float(points[:, 2].max())
     along = (
-        smooth_step((points[:, 2] - root) / max(left[2] - root, 1e-9)) if tip > root else np.ones(len(points))
+        smoothstep((points[:, 2] - root) / max(left[2] - root, 1e-9)) if tip > root else np.ones(len(points))
     )
     shifts = np.zeros((len(values), len(points), 3))
     for k, value in enumerate(values):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Bool, Float64
+from fba.easing import smoothstep
 from fba.face.authoring.shapes._shapes import Shapes
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, by_part, limits, tables
@@ -94,7 +95,7 @@ class Mixer:
         # what the sculptor adds is shared out, so that it shows once when all of the group move
         holds = {fap: np.abs(self.weight(fap)) for fap in group}
         total = np.sum(list(holds.values()), axis=0)
-        shown = _eased(total / FULL_WEIGHT)
+        shown = smoothstep(total / FULL_WEIGHT)
         for fap in group:
             share = (holds[fap] / np.where(total > 1e-6, total, 1.0) * shown)[:, None]
             down, up = (
@@ -160,7 +161,7 @@ class Mixer:
         """(V, 3) for one step of a group: faded out of its region, and exact at all feature points."""
         region = next(region for region in REGIONS if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
-        step = step * _eased(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
+        step = step * smoothstep(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
         rest, *_ = np.linalg.lstsq(self.coupling, self._steps(group) - step[self.vertices], rcond=1e-6)
         return np.asarray(step + self.weights @ rest)
 
@@ -178,12 +179,6 @@ class Mixer:
             return None
         step = field * self.unit[fap] / along
         return guarded_tables(self.base, fap, step, step)
-
-
-def _eased(share: Float64) -> Float64:
-    """From 0 to 1 without a corner at either end."""
-    inside = np.clip(share, 0.0, 1.0)
-    return np.asarray(inside * inside * (3 - 2 * inside))
 
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
+from fba.easing import smoothstep
 from fba.errors import ModelError
 from fba.face.model import FaceModel, Part
 
@@ -40,8 +41,7 @@ class Shapes:
         self.morphs = {shape: checked(model.parts, shape, moved) for shape, moved in morphs.items()}
         middle = float(np.nanmean(model.points[:, 0]))
         width = max(2 * BLEND * model.fapu.ES * 1024, 1e-9)
-        share = np.clip((model.vertices[:, 0].astype(np.float64) - middle) / width + 0.5, 0.0, 1.0)
-        self._left = share * share * (3 - 2 * share)
+        self._left = smoothstep((model.vertices[:, 0].astype(np.float64) - middle) / width + 0.5)
         self.halves = [half for shape in self.morphs for half in self._halves(shape)]
 
     def field(self, half: Half) -> Float64:

@@ -60,13 +60,6 @@ def region(near: Float64, far: Float64, reach: float, share: float = 0.8) -> Boo
         return (near < reach) & (near < share * (near + far))
 
 
-def smooth_step(x: Float64) -> Float64:
-    """0 below 0, 1 above 1, level at both."""
-    t = np.clip(x, 0.0, 1.0)
-    result: Float64 = t * t * (3 - 2 * t)
-    return result
-
-
 def without_hem(field: Float64, hem: float) -> Float64:
     """A field with what is below `hem` taken off, 1 staying 1: far vertices that barely move rest."""
     result: Float64 = np.sign(field) * np.maximum(np.abs(field) - hem, 0.0) / (1 - hem)

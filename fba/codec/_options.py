@@ -1,0 +1,68 @@
+"""`EncoderOptions`: how an animation is encoded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from fba.codec._plane import slots
+from fba.codec.settings import QUANT_MAX
+from fba.parameters import BAP_STEP_TABLES
+
+PRESETS = ("reference",)
+
+
+@dataclass(frozen=True)
+class EncoderOptions:
+    """How to encode.
+
+    fap_quant, bap_quant: 0..31. A FAP's quantiser step is the standard's table step times fap_quant, a
+        BAP's the table step times bap_pred_scale[bap_quant]; 0 sends values unquantised. Default 1.
+    intra_period: the most seconds from one I plane to the next; None: I planes only where one is needed.
+    start_codes: write a plane start code before every I plane after the first, and all ranges with each, so
+        that a decoder can start there or resume after damage.
+    bap_steps: "iso" or "visage", the table of BAP steps; the decoder must be given the same.
+    preset: "reference", ranges that fit the data.
+    unsent: what a decoder does with a FAP that is not sent, where the animation does not say so itself
+        (`FaceTrack.interpolated`): "keep" its last value (mask type 1) or "interpolate" it from others
+        (mask type 2).
+    gender: suggested_gender, 1 male.
+    clamp: limit values that no range can carry to the codable range, instead of raising RangeError: I
+        planes stop at the end of the widest range, and P planes after them catch up.
+
+    Raises ValueError for any other value.
+    """
+
+    fap_quant: int = 1
+    bap_quant: int = 1
+    intra_period: Fraction | float | None = None
+    start_codes: bool = False
+    bap_steps: str = "iso"
+    preset: str = "reference"
+    unsent: str = "keep"
+    gender: int = 0
+    clamp: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("fap_quant", "bap_quant"):
+            value = getattr(self, name)
+            if not isinstance(value, (int, np.integer)) or not 0 <= value <= QUANT_MAX:
+                raise ValueError(f"{name} must be an integer in 0..{QUANT_MAX}, not {value!r}")
+        if self.intra_period is not None and not (self.intra_period > 0 and math.isfinite(self.intra_period)):
+            raise ValueError(f"intra_period must be a positive number of seconds, not {self.intra_period!r}")
+        for name, allowed in (
+            ("bap_steps", BAP_STEP_TABLES),
+            ("preset", PRESETS),
+            ("unsent", ("keep", "interpolate")),
+            ("gender", (0, 1)),
+        ):
+            if getattr(self, name) not in allowed:
+                said = ", ".join(map(str, allowed))
+                raise ValueError(f"{name} must be one of {said}, not {getattr(self, name)!r}")
+
+    def quant(self, part: int) -> int:
+        """The quantiser of a part: `slots.FACE_BIT` or `slots.BODY_BIT`."""
+        return self.fap_quant if part == slots.FACE_BIT else self.bap_quant

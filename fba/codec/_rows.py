@@ -1,0 +1,79 @@
+"""Arrays that grow at their end: rows of numbers, and masks that are mostly the same from frame to frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fba.arrays import Array, Bool
+
+
+class Rows:
+    """An array (T, *shape) that grows by an eighth at a time.
+
+    count: rows there are from the start, all zeros. in_place: the memory is enlarged where it lies, which
+    needs half as much of it, but makes older views invalid; else they stay as they are.
+    """
+
+    def __init__(
+        self, shape: tuple[int, ...], dtype: type[np.generic], count: int = 0, *, in_place: bool
+    ) -> None:
+        self.count = count
+        self._in_place = in_place
+        self._array: Array = np.zeros((count, *shape), dtype=dtype)
+
+    def append(self, rows: Array | bool | None, count: int) -> None:
+        """Append `count` rows: those given, one value for all of them, or zeros."""
+        need = self.count + count
+        if need > len(self._array):
+            self._resize(max(need, self.count + self.count // 8))
+        if rows is not None:
+            self._array[self.count : need] = rows
+        self.count = need
+
+    def view(self) -> Array:
+        """All rows, read-only, without a copy."""
+        if self._in_place and self.count < len(self._array):
+            self._resize(self.count)
+        view = self._array[: self.count]
+        view.flags.writeable = False
+        return view
+
+    def _resize(self, count: int) -> None:
+        shape = (count, *self._array.shape[1:])
+        if self._in_place:
+            self._array.resize(shape, refcheck=False)
+        else:
+            larger = np.zeros(shape, dtype=self._array.dtype)
+            larger[: self.count] = self._array[: self.count]
+            self._array = larger
+
+
+class Masks:
+    """Masks bool (T, columns): one row for all frames until a block has another, as most streams never do."""
+
+    def __init__(self, columns: int, count: int, *, in_place: bool) -> None:
+        self.any = False
+        """Whether a bit is set anywhere."""
+        self._in_place = in_place
+        self._row: Bool = np.zeros(columns, dtype=np.bool_)
+        self._count = count
+        self._rows: Rows | None = None
+
+    def append(self, mask: Bool | None, count: int) -> None:
+        """Append `count` times one row, bool (columns,), or zeros."""
+        row = mask if mask is not None else np.zeros_like(self._row)
+        self.any = self.any or bool(row.any())
+        if not self._count:
+            self._row = row
+        elif self._rows is None and not np.array_equal(row, self._row):
+            self._rows = Rows(self._row.shape, np.bool_, in_place=self._in_place)
+            self._rows.append(self._row, self._count)
+        if self._rows is not None:
+            self._rows.append(row, count)
+        self._count += count
+
+    def view(self) -> Bool:
+        """All masks, read-only."""
+        if self._rows is not None:
+            return self._rows.view()
+        return np.broadcast_to(self._row, (self._count, len(self._row)))
