@@ -1,4 +1,4 @@
-"""Write a file whole or not at all: a temporary file beside the target, renamed over it at the end."""
+"""Write a file completely or not at all: a temporary file beside it is renamed over it at the end."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import re
 import secrets
 import stat
 from collections.abc import Iterator
+from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from fba.errors import FbaError, FormatError
 
-Path = str | os.PathLike[str]
+PathLike = str | os.PathLike[str]
 
 _OPEN_FILE = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,9})")
 _STANDARD = {"/dev/stdin": 0, "/dev/stdout": 1, "/dev/stderr": 2}
@@ -24,7 +25,7 @@ _unfinished: set[str] = set()
 
 
 @contextlib.contextmanager
-def atomic(path: Path) -> Iterator[BinaryIO]:
+def atomic(path: PathLike) -> Iterator[BinaryIO]:
     """A binary file to write to; the target appears, or changes, only when the block ends well.
 
     Whatever leaves the block early (an exception, Ctrl-C) removes the temporary file and leaves an
@@ -51,6 +52,39 @@ def atomic(path: Path) -> Iterator[BinaryIO]:
             raise FormatError(f"could not be written: {_reason(error)}", path=name) from error
 
 
+@contextlib.contextmanager
+def atomic_path(path: PathLike) -> Iterator[Path]:
+    """Yields the name of a temporary file beside the target: for encoders that want a name, not an open file.
+
+    It is renamed to the target where the block ends well, and removed where it does not. Raises FormatError
+    where the target cannot be written, or is a device or a pipe.
+    """
+    name, mode, direct = check_target(path)
+    if direct:
+        raise FormatError("is a device or a pipe; give the name of a file to write", path=path)
+    target = Path(name)
+    with temporary_beside(name, target.suffix, path) as (temporary_name, handle):
+        os.close(handle)
+        temporary = Path(temporary_name)
+        yield temporary
+        try:
+            if mode is not None:
+                temporary.chmod(stat.S_IMODE(mode))
+            temporary.replace(target)
+        except OSError as error:
+            raise write_error(path, error) from error
+
+
+def write_error(path: PathLike, error: BaseException, what: str = "could not be written") -> FbaError:
+    """The error to raise where writing failed: `what`, the reason, and what to do where the disk is full."""
+    if isinstance(error, FbaError):
+        return error
+    reason = _reason(error) or type(error).__name__
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        reason += "; make room, or write to another disk"
+    return FormatError(f"{what}: {reason}", path=path)
+
+
 class Target(NamedTuple):
     """Where a file is written.
 
@@ -63,7 +97,7 @@ class Target(NamedTuple):
     direct: bool
 
 
-def check_target(path: Path) -> Target:
+def check_target(path: PathLike) -> Target:
     """Where a file of that name is written.
 
     Raises FormatError where it cannot be written: a folder, a file or a folder that is write-protected, no
@@ -116,7 +150,7 @@ def _descriptor(name: str) -> int | None:
 
 
 @contextlib.contextmanager
-def temporary_beside(target: str, suffix: str, name: Path) -> Iterator[tuple[str, int]]:
+def temporary_beside(target: str, suffix: str, name: PathLike) -> Iterator[tuple[str, int]]:
     """A new file in the target's folder, and its open handle: gone when the block ends, unless renamed.
 
     A block that never ends, because Ctrl-C came while it was being entered, leaves it to the end of the
@@ -168,5 +202,5 @@ def _directly(name: str) -> Iterator[BinaryIO]:
         raise FormatError(f"could not be written: {reason}", path=name) from error
 
 
-def _reason(error: Exception) -> str:
+def _reason(error: BaseException) -> str:
     return (error.strerror if isinstance(error, OSError) else None) or str(error)

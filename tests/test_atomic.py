@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fba.atomic import atomic
-from fba.atomic_path import written
+from fba.atomic import atomic, atomic_path
 from fba.errors import DisplayError, FormatError
 
 
@@ -47,7 +46,7 @@ def test_whatever_interrupts_leaves_the_old_file(
     assert os.listdir(tmp_path) == ["a"]
 
 
-@pytest.mark.parametrize("writer", ["fba.atomic import atomic as w", "fba.atomic_path import written as w"])
+@pytest.mark.parametrize("writer", ["fba.atomic import atomic as w", "fba.atomic import atomic_path as w"])
 def test_an_interruption_just_when_the_temporary_file_appears(tmp_path: Path, writer: str) -> None:
     code = f"""
 import os
@@ -154,7 +153,10 @@ def test_an_open_file_is_written_to_where_it_stands(tmp_path: Path) -> None:
     with path.open("ab") as file:
         put(f"/dev/fd/{file.fileno()}", b"two ")
         put(f"/dev/fd/{file.fileno()}", b"three")
-        with pytest.raises(FormatError, match="is a device or a pipe"), written(f"/dev/fd/{file.fileno()}"):
+        with (
+            pytest.raises(FormatError, match="is a device or a pipe"),
+            atomic_path(f"/dev/fd/{file.fileno()}"),
+        ):
             pass
     assert path.read_bytes() == b"one two three"
     assert os.listdir(tmp_path) == ["a"]

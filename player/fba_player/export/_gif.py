@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import UInt8
-from fba.atomic_path import PathLike, cannot, written
+from fba.atomic import PathLike, atomic_path, write_error
 from fba_player.sound.pyav import import_av
 
 SMOOTH = Fraction(25)
@@ -45,7 +45,7 @@ class Gif:
         self._path, self._size, self._rate = Path(path), size, rate
         self._numbers: list[int] = []
         self._keep = contextlib.ExitStack()
-        self._temporary = self._keep.enter_context(written(path))
+        self._temporary = self._keep.enter_context(atomic_path(path))
         self._pictures = self._keep.enter_context(tempfile.SpooledTemporaryFile(IN_MEMORY))  # noqa: SIM115
         self._colours, self._into, self._palette = self._graph("palettegen=stats_mode=full", 1)
 
@@ -54,7 +54,7 @@ class Gif:
         try:
             self._pictures.write(np.ascontiguousarray(pixels[..., :3]).data)
         except OSError as error:
-            raise cannot(self._path, error, "its pictures could not be kept") from error
+            raise write_error(self._path, error, "its pictures could not be kept") from error
         self._into[0].push(self._frame(pixels, "rgba", number))
         self._numbers.append(number)
 
@@ -69,7 +69,7 @@ class Gif:
             with self._av.open(str(self._temporary), "w", format="gif", options=options) as container:
                 self._encode(container, palette, times)
         except self._av.error.FFmpegError as error:
-            raise cannot(self._path, error) from error
+            raise write_error(self._path, error) from error
         if self.stopped:
             self.abort()
         self._keep.close()

@@ -9,8 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from fba.arrays import UInt8
-from fba.atomic import atomic
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike, atomic
 from fba.errors import UnsupportedError
 
 PICTURES = (".png", ".jpg", ".jpeg")

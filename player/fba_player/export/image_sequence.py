@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from fba.arrays import UInt8
-from fba.atomic_path import PathLike, cannot
+from fba.atomic import PathLike, write_error
 from fba.errors import FormatError, Remedy, UnsupportedError
 from fba_player.export.image_files import check_picture, write_picture
 from fba_player.export.recorder import FILMS
@@ -55,7 +55,7 @@ class Numbered:
         except FileNotFoundError:
             return []
         except OSError as error:
-            raise cannot(self.folder, error, "cannot be looked into") from error
+            raise write_error(self.folder, error, "cannot be looked into") from error
         pattern = re.compile(f"{re.escape(self._before)}(\\d+){re.escape(self._after)}")
         numbers = [int(found[1]) for name in names if (found := pattern.fullmatch(name))]
         return sorted(number for number in numbers if self.path(number).exists())
@@ -102,7 +102,7 @@ class Sequence:
         try:
             names.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise cannot(names.folder, error, "the folder cannot be made") from error
+            raise write_error(names.folder, error, "the folder cannot be made") from error
 
     def write(self, pixels: UInt8, number: int) -> None:
         """A picture, uint8 (H, W, 4)."""

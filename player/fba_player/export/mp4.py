@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fba.arrays import UInt8
-from fba.atomic_path import PathLike, cannot, written
+from fba.atomic import PathLike, atomic_path, write_error
 from fba.errors import DisplayError
 from fba_player.sound.pyav import av_version, import_av
 from fba_player.sound.soundtrack import FilmedSound, Soundtrack
@@ -57,7 +57,7 @@ class Mp4:
             if soundtrack is not None:
                 self._keep.callback(soundtrack.close)
             name = _encoder(self._av)
-            temporary = self._keep.enter_context(written(path))
+            temporary = self._keep.enter_context(atomic_path(path))
             with self._failures():
                 options = {"movflags": "+faststart"}  # plays while it is still loading
                 self._container = self._av.open(str(temporary), "w", format="mp4", options=options)
@@ -114,7 +114,7 @@ class Mp4:
             yield
         except self._av.error.FFmpegError as error:
             if isinstance(error, OSError) and error.errno and 0 < error.errno < 200:
-                raise cannot(self._path, error) from error
+                raise write_error(self._path, error) from error
             width, height = self._size
             raise DisplayError(
                 f"{self._path}: the encoder failed at {width}x{height}, {self._rate} frames/s: {error}"

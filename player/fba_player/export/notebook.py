@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from fba.animation import Animation
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaError
 from fba_player.playback.timecode import clock_text
 from fba_player.view.camera import Camera

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from fba.arrays import UInt8
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba.errors import UnsupportedError
 from fba_player.sound.soundtrack import FilmedSound
 from fba_player.sound.switch_interval import PROMPT_THREADS

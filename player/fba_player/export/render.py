@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fba.animation import Animation
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba.errors import FbaError, RangeError, UnsupportedError
 from fba_player.export.image_files import PICTURES, check_picture, write_picture
 from fba_player.export.image_sequence import Numbered, Sequence, is_film, is_sequence

@@ -6,7 +6,6 @@ Panels read and change this; it knows no imgui and no OpenGL.
 from __future__ import annotations
 
 import math
-import os
 import time as wall
 import warnings
 from collections import deque
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fba.arrays import Float32, Float64
+from fba.atomic import PathLike
 from fba_player.playback.transport import Transport
 from fba_player.session._camera_controller import Viewpoint
 from fba_player.session.keys import by_name
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 Faps = Float32
 Baps = Float64
-PathLike = str | os.PathLike[str]
 Hook = Callable[[Faps, Baps], None]
 
 NOTICE_SECONDS = 4.0

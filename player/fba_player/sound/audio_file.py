@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Int16
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba.errors import FbaWarning, FormatError
 from fba_player.sound.pyav import av_version, import_av
 

@@ -16,7 +16,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba.errors import FbaWarning
 from fba_player.playback.transport import Transport
 from fba_player.sound._device_clock import SoundClock

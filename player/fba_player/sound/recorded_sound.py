@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Int16
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba_player.playback.transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound.audio_file import CHANNELS, SoundFile

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fba.arrays import Float32
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba.errors import FormatError
 from fba_player.sound.audio_file import open_sound
 from fba_player.sound.pyav import import_av

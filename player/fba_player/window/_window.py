@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import time as wall
 import warnings
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaWarning
 from fba_player.gl.context import import_moderngl
 from fba_player.gl.framebuffer import Target
@@ -28,7 +28,6 @@ from fba_player.window.display import HOW_WITHOUT, started_glfw
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
 
-PathLike = str | os.PathLike[str]
 
 LOST = (
     "OpenGL stopped working ({reason}): the graphics driver was reset, or has no memory left. Start the "

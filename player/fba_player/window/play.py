@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
-from fba.atomic_path import PathLike
+from fba.atomic import PathLike
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.session.source import Source
