@@ -75,6 +75,7 @@ class Report:
     findings: list[Finding] = field(default_factory=list)
 
     def line(self) -> str:
+        """The counts in one line."""
         return (
             f"{self.count} streams: {self.decoded} decoded whole, {self.refused} refused, of these "
             f"{self.salvaged} salvaged in part; {self.compared} compared with the independent reader; "

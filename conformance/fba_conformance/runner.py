@@ -31,13 +31,16 @@ class Vector:
 
     @property
     def name(self) -> str:
+        """The stream's file name."""
         return str(self.entry["stream"])
 
     @property
     def bap_steps(self) -> str:
+        """The table of BAP steps that the stream needs."""
         return str(self.entry.get("bap_steps", "iso"))
 
     def path(self, key: str) -> Path | None:
+        """The path of a file of the vector, None where it has none."""
         return self.folder / self.entry[key] if key in self.entry else None
 
 
@@ -53,12 +56,15 @@ class Result:
 
     @property
     def passed(self) -> bool:
+        """Whether it was decoded exactly, and encoded exactly where that was tried."""
         return self.decoded and self.encoded is not False
 
     def to_dict(self) -> dict[str, Any]:
+        """The verdict for JSON."""
         return {**asdict(self), "passed": self.passed}
 
     def line(self) -> str:
+        """The verdict in one line of text."""
         words = {True: "exact", False: "WRONG", None: "-"}
         text = f"{self.name}: decoded {words[self.decoded]}, encoded {words[self.encoded]}"
         return f"{text}: {self.message}" if self.message else text

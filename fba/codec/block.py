@@ -30,6 +30,7 @@ class Block:
     settings: PlaneSettings
 
     def frames(self) -> Iterator[Frame]:
+        """The frames one by one."""
         for position, index in enumerate(self.index.tolist()):
             one = slice(position, position + 1)
             bit, after = int(self.borders[position]), int(self.borders[position + 1])

@@ -53,6 +53,7 @@ class TimeCode:
 
     @property
     def total_seconds(self) -> int:
+        """Seconds since midnight."""
         return (self.hours * 60 + self.minutes) * 60 + self.seconds
 
 

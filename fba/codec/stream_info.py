@@ -72,6 +72,7 @@ class StreamInfo:
 
     @property
     def bits_per_second(self) -> float:
+        """Mean bit rate; 0 for a stream without duration."""
         return float(8 * self.size / self.duration) if self.duration else 0.0
 
     def to_dict(self) -> dict[str, Any]:

@@ -39,9 +39,11 @@ class Lazy:
         return f"Lazy({self._place!r})"
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
+        """What the function returns."""
         return self.load()(*arguments, **options)
 
     def load(self) -> Callable[..., Any]:
+        """The function, its module imported."""
         if self._function is None:
             module, _, name = self._place.partition(":")
             self._function = getattr(import_module(module), name)

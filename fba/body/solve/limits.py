@@ -36,6 +36,7 @@ class Limit:
 
     @property
     def name(self) -> str:
+        """Segment and motion, in words."""
         return f"{self.segment} {self.motion}"
 
 

@@ -30,7 +30,7 @@ LARGEST = 1e6
 
 
 def note_of(gltf: Gltf, clip: Clip) -> Value | None:
-    """This project's note at an animation: rate, first frame, body and face; None in files of others."""
+    """The note that fba writes at an animation: rate, first frame, body and face; None in files of others."""
     entries = gltf.document.elements(1 << 18, "animations")
     entry = entries[gltf.animations.index(clip)]
     extras = entry.get("extras")

@@ -40,6 +40,7 @@ class Eye:
 
     @property
     def gaze(self) -> Float64:
+        """Unit vector (3,) from the eye's centre to its pupil."""
         arm = self.pupil - self.centre
         result: Float64 = arm / np.linalg.norm(arm)
         return result
