@@ -12,6 +12,7 @@ from PIL import Image
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaError, FormatError, RangeError, UnsupportedError
 from fba.player import Offscreen, Scene, render
+from fba_player.export._gif import gif_rate
 from fba_player.export.render import film_rate
 from player_tracks import face_track
 
@@ -119,10 +120,24 @@ def test_absurd_lengths_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("rate", "film"),
-    [("25", "25"), ("1/16", "10"), ("4", "12"), ("250", "250/3"), ("30000/1001", "30000/1001"), ("10", "10")],
+    [
+        ("25", "25"),
+        ("1/16", "10"),
+        ("4", "12"),
+        ("250", "250/3"),
+        ("30000/1001", "30000/1001"),
+        ("10", "10"),
+        ("120", "120"),
+        ("121", "121/2"),
+    ],
 )
 def test_film_rate(rate: str, film: str) -> None:
     assert film_rate(Fraction(rate)) == Fraction(film)
+
+
+@pytest.mark.parametrize(("rate", "gif"), [("25", "25"), ("26", "13"), ("60", "20"), ("10", "10")])
+def test_gif_rate(rate: str, gif: str) -> None:
+    assert gif_rate(Fraction(rate)) == Fraction(gif)
 
 
 def test_pyav_missing_is_named(talking: Animation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -121,7 +121,7 @@ def test_playing_begins_with_the_first_i_plane_and_waits_for_what_is_late(wire: 
     now[0] += 0.1
     assert (player.time, player.waiting) == (pytest.approx(edge + 0.1), False)
     player.last()  # near the newest
-    assert player.behind == pytest.approx(BUFFER)
+    assert player.behind == pytest.approx(BUFFER) == pytest.approx(0.25)
     player.seek(0.1)  # and back, in what has arrived
     now[0] += 0.05
     assert player.time == pytest.approx(0.15)

@@ -207,6 +207,24 @@ def test_a_mark_set_in_passing_turns_back_at_once() -> None:
     assert player.time == pytest.approx(0.27)
 
 
+@pytest.mark.parametrize(("before", "after"), [(0.09, 0.27), (0.11, 0.82)])
+def test_a_mark_set_a_tenth_of_a_second_late_is_meant_for_now(before: float, after: float) -> None:
+    """A click lies a little before where the player is by then; what lies further back is passed already."""
+    player, clock = transport()
+    player.mark_in = 0.25
+    player.play()
+    clock.now += 0.8
+    player.mark_out = player.time - before
+    clock.now += 0.02
+    assert player.time == pytest.approx(after)
+
+
+@pytest.mark.parametrize(("off", "frame"), [(5e-7, 3), (2e-6, 2)])
+def test_a_time_a_millionth_of_a_frame_early_is_that_frames(off: float, frame: int) -> None:
+    timeline = transport()[0]._timeline
+    assert timeline.position((3 - off) / 10)[0] == frame
+
+
 def test_marks_stay_in_order_and_inside() -> None:
     player, _ = transport()
     player.mark_in = 1.0

@@ -152,10 +152,32 @@ def test_an_endless_take_ends() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rate", "wanted"), [("30", "30"), ("24000/1001", "24000/1001"), ("1", "25"), ("500", "25")]
+    ("rate", "wanted"),
+    [
+        ("30", "30"),
+        ("24000/1001", "24000/1001"),
+        ("1", "25"),
+        ("500", "25"),
+        ("5", "5"),
+        ("4", "25"),
+        ("120", "120"),
+        ("121", "25"),
+    ],
 )
 def test_the_rate_is_the_streams_where_it_is_one_for_motion(rate: str, wanted: str) -> None:
     assert take_rate(Fraction(rate)) == Fraction(wanted)
+
+
+@pytest.mark.parametrize(("pause", "between"), [(0.19, True), (0.21, False)])
+def test_a_take_is_interpolated_over_short_pauses_only(pause: float, between: bool) -> None:
+    """Where nothing was drawn for more than 0.2 s, nothing moved until the next picture."""
+    recorder = TakeRecorder(Fraction(100))
+    recorder.add(0.0, np.zeros(68, np.float32), np.zeros(296))
+    recorder.add(pause, np.full(68, 1000, np.float32), np.zeros(296))
+    face = recorder.take().face
+    assert face is not None
+    assert bool(face.values[10, 2]) == between
+    assert face.values[-1, 2] == 1000
 
 
 def test_a_take_comes_back_from_its_file(tmp_path: Path) -> None:

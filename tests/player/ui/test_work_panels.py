@@ -431,10 +431,10 @@ def test_a_take_that_is_not_saved_is_not_lost_by_one_key(
     session.leave()
     assert not session.closing
     assert [notice.kind for notice in session.notices()] == ["warning"]
-    clock.now += 60
+    clock.now += 6.5
     session.leave()
     assert not session.closing  # it was too long ago
-    clock.now += 1
+    clock.now += 5.5
     session.leave()
     assert session.closing
     session.closing = False
