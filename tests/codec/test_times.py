@@ -193,6 +193,19 @@ def test_rates_that_change_have_one_in_common(rates: tuple[FrameRate, ...], comm
     assert all(seen == copy for seen, copy in earlier)  # what was looked at did not change
 
 
+@pytest.mark.filterwarnings("ignore:.*the frame rate changes")
+def test_a_common_rate_holds_the_time_codes_too() -> None:
+    """60000/1001 frames/s would hold both rates, but not a frame at 8 s sharp."""
+    data = written(
+        replace(INTRA, frame_rate=FrameRate(30, 0, 1)),
+        replace(INTRA, frame_rate=FrameRate(60, 0, 1), time_code=TimeCode(0, 0, 8)),
+        PREDICTED,
+    )
+    animation = decode(data)
+    assert animation.rate == 60000
+    assert animation.index.tolist() == [0, 8 * 60000, 8 * 60000 + 1001]
+
+
 def test_masks_that_change_from_plane_to_plane() -> None:
     frames = FrameBuffer()
     tracks = [
