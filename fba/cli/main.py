@@ -21,17 +21,17 @@ from fba.compiled import compilation_listener
 from fba.errors import FbaError, FbaWarning, did_you_mean
 
 _COMMANDS = {
-    "info": "What a file holds: frames, rate, parameters, bits; every syntax element with --trace.",
+    "info": "Show what a file holds: frames, rate, parameters, bits; --trace lists every syntax element.",
     "encode": "Encode FAP, BAP or motion-capture files as an FBA stream.",
     "decode": "Decode FBA streams to FAP, BAP, EPF, BVH and glTF files.",
     "convert": "Convert a file into another format.",
     "play": "Play a file in a window.",
     "render": "Render a file to a picture or a video, without a window.",
-    "stats": "Where the bits of FBA streams go.",
+    "stats": "Show where the bits of FBA streams go.",
     "conformance": "Check this codec against test vectors.",
     "bench": "Measure the speed of this codec on a stream.",
-    "gait": "Make someone walk: stride, character; or find the steps in a walk.",
-    "model": "Look at face models, check, import, fit them to a person.",
+    "gait": "Generate a walk by stride and character, or find the steps in one.",
+    "model": "Inspect face models, check them, import them, fit them to a person.",
     "demo": "Encode the sample animation, print its size, and play it.",
 }
 

@@ -206,7 +206,7 @@ def from_option(command: Decorated) -> Decorated:
         "--from",
         "format",
         metavar="FORMAT",
-        help="Format of what is read, where neither content nor suffix say it: fap, bap, fba, bvh, gltf.",
+        help="Input format, if neither content nor suffix shows it: fap, bap, fba, bvh, gltf.",
     )(command)
 
 
@@ -293,7 +293,7 @@ def show_option(command: Decorated) -> Decorated:
         type=ShowType(),
         multiple=True,
         metavar="SWITCH[=VALUE]",
-        help="Again for more: wireframe, points, influence=FAP, skeleton[=only], grid, normals; shadows=off, "
+        help="Repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, normals; shadows=off, "
         "eyes=off, teeth=off, hair=off; background=grey or transparent.",
     )(command)
 
@@ -314,7 +314,7 @@ def json_option(command: Decorated) -> Decorated:
 
 def salvage_option(command: Decorated) -> Decorated:
     return click.option(
-        "--salvage", is_flag=True, help="Keep what can be read of damaged input, and say what was lost."
+        "--salvage", is_flag=True, help="Read the undamaged parts of damaged input, and list what was lost."
     )(command)
 
 

@@ -64,9 +64,7 @@ class OutputType(click.ParamType[Path]):
 
 
 def no_clobber_option(command: Command) -> Command:
-    return click.option(
-        "--no-clobber", is_flag=True, help="Stop with an error where a file to write exists already."
-    )(command)
+    return click.option("--no-clobber", is_flag=True, help="Fail if an output file already exists.")(command)
 
 
 @dataclass(frozen=True)
@@ -154,7 +152,7 @@ class Outputs:
 
 def to_option(command: Command) -> Command:
     return click.option(
-        "--to", metavar="FORMAT", help="Format to write, where OUT is - or has no suffix that says it."
+        "--to", metavar="FORMAT", help="Output format, if OUT is - or its suffix does not show it."
     )(command)
 
 

@@ -79,7 +79,7 @@ def sound_options(kind: str = "Sound") -> Callable[[Command], Command]:
             "--audio",
             type=click.Path(exists=True, dir_okay=False, path_type=Path),
             metavar="FILE",
-            help=f"{kind} from the first frame on. Default: the WAV of the same name beside the file.",
+            help=f"{kind}, from the first frame. Default: the WAV file of the same name beside the input.",
         ),
         click.option("--no-audio", is_flag=True, help="No sound."),
         click.option(
@@ -87,7 +87,7 @@ def sound_options(kind: str = "Sound") -> Callable[[Command], Command]:
             type=options.MomentType(),
             default=0.0,
             metavar="SECONDS",
-            help="The sound begins this much later; earlier where it is negative.",
+            help="Delay of the sound; negative: it begins earlier.",
         ),
     )
 

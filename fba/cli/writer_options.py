@@ -36,7 +36,7 @@ def writer_options(command: options.Decorated) -> options.Decorated:
                 type=click.Choice(["all", "moving"]),
                 help="BVH: all joints of the standard (default), or only what moves, and the limbs.",
             ),
-            click.option("--unit", type=click.Choice(list(UNITS)), help="BVH: of lengths; default: cm."),
+            click.option("--unit", type=click.Choice(list(UNITS)), help="BVH: unit of lengths; default: cm."),
             click.option(
                 "--mesh/--no-mesh",
                 default=None,

@@ -23,8 +23,7 @@ from fba.cli import options
 def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool) -> None:
     """Measure decoding and encoding of streams on one core: medians over several rounds.
 
-    A symbol is one coded value of one plane. How the codec compares with a textbook's is in the bench/
-    folder of the source.
+    A symbol is one coded value of one plane. The source's bench/ folder compares the codec with a textbook's.
     """
     each = options.EachFile(files)
     results = []

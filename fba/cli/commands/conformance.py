@@ -17,7 +17,7 @@ from fba.cli import options
     ),
 )
 @click.argument("folder", required=False, type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--verbose", "-v", is_flag=True, help="A line for every vector, not only for failures.")
+@click.option("--verbose", "-v", is_flag=True, help="Print a line for every vector, not only for failures.")
 @options.json_option
 def command(folder: Path | None, verbose: bool, as_json: bool) -> None:
     """Check this codec against test vectors: decoded values and encoded bytes, both exact.

@@ -45,9 +45,12 @@ _FOLDER_OR_FILE = OutputType(folders=True)
 )
 @click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=options.EXISTING)
 @click.option(
-    "--fap", type=_FOLDER_OR_FILE, metavar="OUT.fap", help="Where the FAPs go; a folder for several inputs."
+    "--fap",
+    type=_FOLDER_OR_FILE,
+    metavar="OUT.fap",
+    help="File for the FAPs; a folder if there are several inputs.",
 )
-@click.option("--bap", type=_FOLDER_OR_FILE, metavar="OUT.bap", help="Where the BAPs go; likewise.")
+@click.option("--bap", type=_FOLDER_OR_FILE, metavar="OUT.bap", help="File for the BAPs; likewise.")
 @click.option(
     "--epf", type=_FOLDER_OR_FILE, metavar="OUT.epf", help="How it was coded, for fba encode --epf; likewise."
 )
@@ -56,7 +59,7 @@ _FOLDER_OR_FILE = OutputType(folders=True)
     "--output",
     type=_FOLDER_OR_FILE,
     metavar="OUT.bvh|OUT.glb",
-    help="A file for other programs, its suffix says which; likewise.",
+    help="File for other programs, format by suffix; likewise.",
 )
 @to_option
 @no_clobber_option

@@ -36,10 +36,10 @@ COMPILING = "compiling for this machine, on the first run only: about a minute i
 @no_clobber_option
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
 def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
-    """Encode the sample animation, say how small it became, and play it.
+    """Encode the sample animation, print its size, and play it.
 
-    A script made the sample; it is not motion capture. Without a display, make a video and a picture of it
-    instead. The folder gets the sample files as well, hello.bvh and hello.fap.
+    A script made the sample; it is not motion capture. Without a display, a film and a picture are made
+    instead. The sample files hello.bvh and hello.fap are put into the folder as well.
     """
     from fba import player
     from fba.codec import EncoderOptions, encode, probe_stream

@@ -48,10 +48,15 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     "--bap-quant", type=click.IntRange(0, 31), default=1, show_default=True, help="bap_quant; 0: unquantised."
 )
 @click.option(
-    "--intra-period", type=options.PeriodType(), metavar="SECONDS", help="An I plane at least this often."
+    "--intra-period",
+    type=options.PeriodType(),
+    metavar="SECONDS",
+    help="Write an I plane at least this often.",
 )
 @click.option(
-    "--start-codes", is_flag=True, help="Start codes before I planes: points to seek to and resume at."
+    "--start-codes",
+    is_flag=True,
+    help="Write start codes before I planes, where a decoder can seek to or resume.",
 )
 @options.bap_steps_option
 @click.option("--preset", type=click.Choice(["reference"]), default="reference", show_default=True)
@@ -73,8 +78,7 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 @click.option(
     "--clamp/--no-clamp",
     default=None,
-    help="Bring values that cannot be coded as near as can be instead of failing; default: for motion "
-    "capture only.",
+    help="Limit values to the codable range instead of failing; default: for motion capture only.",
 )
 @click.option(
     "--epf", type=options.EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says."
@@ -104,16 +108,16 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     type=click.Choice(["source", "start", "middle"]),
     default="source",
     show_default=True,
-    help="Motion capture: what stands at the default place.",
+    help="Motion capture: what is placed at the default position.",
 )
 @click.option(
     "--limits",
     type=click.Choice(["off", "report", "clamp"]),
     default="off",
     show_default=True,
-    help="Say where joints go beyond normal human motion, or hold them within it.",
+    help="Report where joints exceed normal human motion, or clamp them to it.",
 )
-@click.option("--report", is_flag=True, help="Motion capture: how close each bone comes to the source's.")
+@click.option("--report", is_flag=True, help="Motion capture: print how far each bone is from the source's.")
 @options.salvage_option
 @options.json_option
 def command(
@@ -133,7 +137,7 @@ def command(
     """Encode FAP, BAP or motion-capture files as an FBA stream.
 
     A face file and a body file together become one stream. Ranges fit the data. A value that no range
-    can carry is an error, or with --clamp comes as near as it can.
+    can carry is an error; --clamp limits it to the codable range.
     """
     if epf is not None:
         _refuse_beside_epf()

@@ -43,8 +43,8 @@ DEFAULT_RATE = Fraction(30)
     help="From one contact of a foot to its next, two steps; sets the speed. Default: the character's own.",
 )
 @click.option("--character", default="normal", show_default=True, metavar="NAME", help="One of --list.")
-@click.option("--cycles", type=float, metavar="N", help="How many strides; default: 4.")
-@click.option("--seconds", type=float, metavar="SECONDS", help="How long, in place of --cycles.")
+@click.option("--cycles", type=float, metavar="N", help="Number of strides; default: 4.")
+@click.option("--seconds", type=float, metavar="SECONDS", help="Duration, instead of --cycles.")
 @options.fps_option("Frame rate; default: 30. With --find: that of a file without a header.")
 @options.from_option
 @click.option("--in-place", is_flag=True, help="Walk on the spot.")
@@ -58,7 +58,7 @@ DEFAULT_RATE = Fraction(30)
 @to_option
 @no_clobber_option
 @options.bap_steps_option
-@click.option("--list", "listed", is_flag=True, help="Print the characters that there are.")
+@click.option("--list", "listed", is_flag=True, help="List the characters.")
 @click.option(
     "--find",
     type=options.EXISTING,
@@ -82,7 +82,7 @@ def command(
     find: Path | None,
     as_json: bool,
 ) -> None:
-    """Make someone walk: body animation from four characteristic poses and a character.
+    """Generate a walk: body animation from four characteristic poses and a character.
 
     A foot on the ground does not move. For FBA streams, --bap-steps visage keeps it so: the standard's steps
     move the body by 64 mm at a time. Play and render with the same option.

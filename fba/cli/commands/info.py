@@ -39,9 +39,9 @@ def command(
     format: str | None,
     salvage: bool,
 ) -> None:
-    """What a file holds: frames, rate, parameters, bits. Reads any format, by content.
+    """Show what a file holds: frames, rate, parameters, bits. Any format is recognised by content.
 
-    --trace reads the stream a second time, bit by bit, with a decoder of its own: slow, and independent.
+    --trace reads the stream a second time, bit by bit, with an independent decoder. It is slow.
     """
     each = options.EachFile(files)
     if trace:

@@ -62,7 +62,7 @@ def _read(file: Path | None) -> FaceModel:
 @click.option("--default", is_flag=True, help="The built-in head.")
 @options.json_option
 def info(file: Path | None, default: bool, as_json: bool) -> None:
-    """What a face model holds: its parts, units, feature points and FAPs.
+    """Show what a face model holds: parts, units, feature points and FAPs.
 
     FILE: a .glb of this project, or anything that `fba model import` reads.
     """
@@ -86,10 +86,10 @@ def info(file: Path | None, default: bool, as_json: bool) -> None:
 )
 @options.json_option
 def validate(file: Path | None, default: bool, only: str | None, as_json: bool) -> None:
-    """Check a face model against the standard: is it a neutral face, does every FAP do what it must.
+    """Check a face model against the standard: its neutral face, and the effect of every FAP.
 
-    Every finding gives what was measured and what is expected. Exit code 1 if one of them is an error:
-    then streams would play wrongly; warnings are about looks, or what could not be checked.
+    Every finding gives the measured and the expected value. The exit code is 1 if streams would play
+    wrongly (errors); warnings concern looks, or what could not be checked.
     """
     from fba.cli import model_text
     from fba.face import checks
@@ -127,9 +127,12 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     type=SOURCE,
     help=f"Where the feature points are: {POINT_FILES}. Default: one of the mesh's name beside it.",
 )
-@click.option("--kind", type=click.Choice(KINDS), help="What IN is; found from its content where not given.")
+@click.option("--kind", type=click.Choice(KINDS), help="Kind of IN; default: recognised from its content.")
 @click.option(
-    "--unit", type=float, metavar="METRES", help="Metres per unit of IN. Default: judged by the pupils."
+    "--unit",
+    type=float,
+    metavar="METRES",
+    help="Metres per unit of IN. Default: estimated from the distance of the pupils.",
 )
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="Vertical axis.")
 @click.option(
@@ -151,11 +154,11 @@ def import_(
     kinds: tuple[str, ...],
     name: str | None,
 ) -> None:
-    """Make a face model of a mesh that knows nothing of FAPs, and write it as glTF.
+    """Turn a mesh into a face model that plays FAPs, and write it as glTF.
 
     Reads MakeHuman's base mesh (its folder, or base.obj), glTF heads with ARKit's shapes, OBJ, PLY and
-    Candide meshes with feature points, FDP files with their mesh. Every FAP that it can serve gets its
-    tables; which cannot, and why, is told.
+    Candide meshes with feature points, FDP files with their mesh. Every FAP that the mesh can show gets
+    tables; unsupported FAPs are listed with reasons.
     """
     from fba.face.importers import import_model
 
@@ -189,7 +192,8 @@ def import_(
     type=click.Choice(["auto", "carry", "author"]),
     default="auto",
     show_default=True,
-    help="How FAPs follow: bent with the surface, made anew, or whichever keeps the standard better.",
+    help="How FAP tables are made: carried over with the surface, authored anew, "
+    "or whichever meets the standard better.",
 )
 @click.option("--name", help="Name of the fitted model. Default: that of the file.")
 def fit(
@@ -201,7 +205,7 @@ def fit(
     tables: Any,
     name: str | None,
 ) -> None:
-    """Fit a face to a person of whom feature points are known, and write it as glTF.
+    """Fit a face to a person's feature points, and write it as glTF.
 
     POINTS is an FDP, CSV or JSON file in any unit and pose; points that it lacks are mirrored from the
     other side, or follow their surroundings. Of an Xface file without its mesh, the distances are used.

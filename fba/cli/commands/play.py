@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 )
 @click.option("--loop", is_flag=True, help="Start again at the end.")
 @click.option(
-    "--start", type=options.MomentType(), metavar="SECONDS", help="From when, in the file's own times."
+    "--start", type=options.MomentType(), metavar="SECONDS", help="Start time, in the file's own times."
 )
-@click.option("--paused", is_flag=True, help="Wait for the space key.")
+@click.option("--paused", is_flag=True, help="Start paused; the space key plays.")
 @click.option(
     "--interpolate/--no-interpolate",
     default=True,

@@ -61,7 +61,7 @@ class SheetType(click.ParamType[str | int]):
     "output.",
 )
 @click.option(
-    "--to", type=click.Choice(KINDS), help="What to write, where OUT is - or has no suffix that says it."
+    "--to", type=click.Choice(KINDS), help="Output format, if OUT is - or its suffix does not show it."
 )
 @no_clobber_option
 @click.option(
@@ -95,17 +95,15 @@ class SheetType(click.ParamType[str | int]):
     "expressions. --size is that of one picture.",
 )
 @click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
-@click.option("--frame", type=int, help="For a picture: which frame; -1 is the last.")
-@click.option("--time", type=options.MomentType(), metavar="SECONDS", help="For a picture: at what time.")
+@click.option("--frame", type=int, help="For a picture: number of the frame; -1 is the last.")
+@click.option("--time", type=options.MomentType(), metavar="SECONDS", help="For a picture: its time.")
 @click.option(
-    "--start", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: from when."
+    "--start", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: start time."
 )
-@click.option(
-    "--end", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: until when."
-)
+@click.option("--end", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: end time.")
 @scene_options.sound_options("Sound of an MP4,")
 @click.option("--transparent", is_flag=True, help="PNG without a background.")
-@click.option("--replace", is_flag=True, help="Numbered pictures that exist are overwritten.")
+@click.option("--replace", is_flag=True, help="Overwrite numbered pictures that exist.")
 @scene_options.scene_options(
     fps="Frame rate of the film; default: the input's own, or a part of it.",
     arrange="Several files: side by side (default), or the others as drawings over the first.",

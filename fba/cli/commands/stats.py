@@ -20,7 +20,7 @@ LONGEST = 1 << 16
 @options.bap_steps_option
 @options.json_option
 def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
-    """Where the bits of FBA streams go: I and P planes, mean and peak rates."""
+    """Show where the bits of FBA streams go: I and P planes, mean and peak rates."""
     from fba.codec import probe_stream
 
     rows = []
