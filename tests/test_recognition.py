@@ -103,3 +103,25 @@ def test_a_face_model_that_is_none() -> None:
 
     with pytest.raises(fba.ModelError, match="it seems to be BVH motion capture"):
         import_model(SAMPLES / "hello.bvh")
+
+
+@pytest.mark.parametrize(
+    ("head", "kind"),
+    [
+        (b"a,b\n1,2\n", ""),
+        (b"a,b\n1,2\n3,4\n", "a table (CSV)"),
+        (b"0 " * 59, ""),
+        (b"0 " * 60, "a FAP file"),
+        (b"1 " * 99, "a FAP file"),
+        (b"1 " * 100, "a BAP file"),
+        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nx y\n", "an OBJ mesh"),
+        (b"v 0 0 0\nv 1 0 0\n", ""),
+        (b"\0\0\1\xba\x44\0", "an MPEG program stream (video)"),
+        (b"\0\0\1\xba\x21\0", "an MPEG program stream (video)"),
+        (b"\0\0\1\xba\x04\0", "an FBA stream"),
+        (b"\x02\x50\1", "C3D motion capture"),
+        (b"\x07\x50\1", "C3D motion capture"),
+    ],
+)
+def test_where_one_kind_ends_and_another_begins(head: bytes, kind: str) -> None:
+    assert recognised(head) == kind

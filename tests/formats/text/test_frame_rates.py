@@ -21,6 +21,7 @@ from fba.formats.text.frame_rates import format_rate, parse_rate
         ("29.97", Fraction(30000, 1001)),
         (29.97, Fraction(30000, 1001)),
         ("23.976", Fraction(24000, 1001)),
+        ("23.98", Fraction(24000, 1001)),
         ("59.94", Fraction(60000, 1001)),
         ("2997/100", Fraction(2997, 100)),
         ("30000/1001", Fraction(30000, 1001)),

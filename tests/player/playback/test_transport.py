@@ -329,3 +329,12 @@ def test_text() -> None:
 )
 def test_clock_text(seconds: float, text: str) -> None:
     assert clock_text(seconds) == text
+
+
+@pytest.mark.parametrize(("mark", "time"), [(0.65, 0.65), (0.61, 0.61), (0.5, 0.7)])
+def test_an_end_set_just_behind_the_present_moment_is_reached_at_once(mark: float, time: float) -> None:
+    player, clock = transport(loop=False)
+    player.play()
+    clock.now += 0.7
+    player.mark_out = mark
+    assert player.time == pytest.approx(time)

@@ -1,0 +1,163 @@
+"""Mutation run: changes one decision of the code at a time and prints the changes that no test notices.
+
+    python tools/mutate.py              all mutants
+    python tools/mutate.py codec bvh    those whose file's path holds one of the words
+
+Every mutant is tried in a copy of the checkout, so the checkout itself is never changed. Exits with 1 where a
+mutant survives.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("fba", "player", "conformance", "tests")
+LIMIT = 300
+"""Seconds for the tests of one mutant; a mutant that never ends is found, too."""
+
+
+class Mutant(NamedTuple):
+    """One change: the text `old`, which stands once in the file, becomes `new`; `tests` are to notice it."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+CLOCK = "fba/codec/_clock.py"
+TIME_BASE = "fba/codec/_time_base.py"
+RANGES = "fba/codec/_ranges.py"
+HEADERS = "fba/codec/_headers.py"
+ENCODER = "fba/codec/_encoder.py"
+SETTINGS = "fba/codec/settings.py"
+BVH = "fba/formats/bvh/reader.py"
+RATES = "fba/formats/text/frame_rates.py"
+RECOGNITION = "fba/recognition.py"
+MATCHING = "fba/capture/matching.py"
+RETARGET = "fba/capture/retarget.py"
+PLANTING = "fba/capture/limbs/foot_planting.py"
+WEIGHTS = "fba/body/skin/skin_weights.py"
+TRANSPORT = "player/fba_player/playback/transport.py"
+
+TIMES_TEST = "tests/codec/test_codec_rules.py"
+RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
+BVH_TEST = "tests/formats/bvh/test_bvh_rates.py"
+TEXT_TEST = "tests/formats/text/test_frame_rates.py"
+RECOGNITION_TEST = "tests/test_recognition.py"
+CAPTURE_TEST = (
+    "tests/capture/test_capture_rules.py tests/capture/test_planting.py tests/capture/test_retargeting.py"
+)
+WEIGHTS_TEST = "tests/body/skin/test_skin_weights.py"
+TRANSPORT_TEST = "tests/player/playback/test_transport.py"
+
+MUTANTS = (
+    Mutant(CLOCK, "DEFAULT_RATE = Fraction(25)", "DEFAULT_RATE = Fraction(30)", TIMES_TEST),
+    Mutant(CLOCK, "math.ceil(now * rate)", "math.floor(now * rate)", TIMES_TEST),
+    Mutant(CLOCK, "total_seconds < now", "total_seconds <= now", TIMES_TEST),
+    Mutant(CLOCK, "* rate + Fraction(1, 2))", "* rate)", TIMES_TEST),
+    Mutant(CLOCK, "max(nearest, self.index)", "nearest", TIMES_TEST),
+    Mutant(CLOCK, "if not time_code.marker:", "if time_code.marker < 0:", TIMES_TEST),
+    Mutant(CLOCK, "np.cumsum(skips + 1)", "np.cumsum(skips)", TIMES_TEST),
+    Mutant(TIME_BASE, "or max(self._rates)", "or min(self._rates)", TIMES_TEST),
+    Mutant(TIME_BASE, "COMMON_RATE_MAX = 1_000_000", "COMMON_RATE_MAX = 1_000", TIMES_TEST),
+    Mutant(TIME_BASE, "math.lcm(self._exact.numerator", "math.gcd(self._exact.numerator", TIMES_TEST),
+    Mutant(TIME_BASE, "offset += Fraction(1, 2)", "offset += Fraction(0)", TIMES_TEST),
+    Mutant(SETTINGS, "sixteenths < 256 * 16", "sixteenths < 255 * 16", TIMES_TEST),
+    Mutant(SETTINGS, "for offset in (0, 1):", "for offset in (1, 0):", TIMES_TEST),
+    Mutant(SETTINGS, "RANGE_UNIT = 60", "RANGE_UNIT = 59", RANGES_TEST),
+    Mutant(HEADERS, "_HOURS = 32", "_HOURS = 24", TIMES_TEST),
+    Mutant(HEADERS, "index / rate + Fraction(1, 2))", "index / rate)", TIMES_TEST),
+    Mutant(HEADERS, "seconds * rate + Fraction(1, 2))", "seconds * rate)", TIMES_TEST),
+    Mutant(HEADERS, "if all(sent):", "if any(sent):", RANGES_TEST),
+    Mutant(HEADERS, "syntax.MASK_KEEP", "syntax.MASK_INTERPOLATE", RANGES_TEST),
+    Mutant(HEADERS, "else syntax.MASK_NONE", "else syntax.MASK_KEEP", RANGES_TEST),
+    Mutant(RANGES, "limit + (step - 1) // 2", "limit", RANGES_TEST),
+    Mutant(RANGES, "RANGE_CODE_MAX, 0) + 1", "RANGE_CODE_MAX, 0)", RANGES_TEST),
+    Mutant(RANGES, "(step - 1) // 2", "step // 2", RANGES_TEST),
+    Mutant(RANGES, "<= RANGE_CODE_MAX", "< RANGE_CODE_MAX", RANGES_TEST),
+    Mutant(RANGES, "amounts > _ROUNDED_AMOUNT_MAX", "amounts >= _ROUNDED_AMOUNT_MAX", RANGES_TEST),
+    Mutant(RANGES, "np.maximum(held, wanted)", "wanted", RANGES_TEST),
+    Mutant(ENCODER, "> SKIP_MAX", ">= SKIP_MAX", RANGES_TEST),
+    Mutant(BVH, "r.denominator > 1", "r.denominator < 1", BVH_TEST),
+    Mutant(BVH, "> tolerance / 5", "> tolerance", BVH_TEST),
+    Mutant(BVH, "if value > 1:", "if value > 99:", BVH_TEST),
+    Mutant(RATES, '("23.976", "23.98",', '("23.976",', TEXT_TEST),
+    Mutant(RATES, "if rate <= 0:", "if rate < 0:", TEXT_TEST),
+    Mutant(RECOGNITION, "CSV_LINES = 3", "CSV_LINES = 2", RECOGNITION_TEST),
+    Mutant(RECOGNITION, "MASK_BITS, BODY_BITS = 60", "MASK_BITS, BODY_BITS = 70", RECOGNITION_TEST),
+    Mutant(RECOGNITION, "60, 100", "60, 300", RECOGNITION_TEST),
+    Mutant(RECOGNITION, "max(len(lines) // 2, 2)", "max(len(lines), 2)", RECOGNITION_TEST),
+    Mutant(RECOGNITION, "head[4] >> 6 == 1", "head[4] >> 6 == 3", RECOGNITION_TEST),
+    Mutant(RECOGNITION, "head[4] >> 4 == 2", "head[4] >> 4 == 15", RECOGNITION_TEST),
+    Mutant(RECOGNITION, "range(2, 8)", "range(3, 8)", RECOGNITION_TEST),
+    Mutant(MATCHING, "FEWEST = 5", "FEWEST = 6", CAPTURE_TEST),
+    Mutant(MATCHING, "FEWEST = 5", "FEWEST = 4", CAPTURE_TEST),
+    Mutant(MATCHING, "2 * count >= len(names) > 1", "2 * count > len(names) > 1", CAPTURE_TEST),
+    Mutant(MATCHING, "found.setdefault(joint, number)", "found[joint] = number", CAPTURE_TEST),
+    Mutant(PLANTING, "STEPS = 4", "STEPS = 1", CAPTURE_TEST),
+    Mutant(PLANTING, "ROUNDS = 2", "ROUNDS = 0", CAPTURE_TEST),
+    Mutant(RETARGET, "FOREARM_SHARE = 0.5", "FOREARM_SHARE = 0.0", CAPTURE_TEST),
+    Mutant(RETARGET, "CLAVICLE_SHARE = 0.5", "CLAVICLE_SHARE = 0.1", CAPTURE_TEST),
+    Mutant(WEIGHTS, "LEAST = 0.012", "LEAST = 0.0", WEIGHTS_TEST),
+    Mutant(WEIGHTS, "LEAST = 0.012", "LEAST = 0.02", WEIGHTS_TEST),
+    Mutant(WEIGHTS, "WEIGHT_TOLERANCE = 1e-3", "WEIGHT_TOLERANCE = 1e-2", WEIGHTS_TEST),
+    Mutant(TRANSPORT, "AT_ONCE = 0.1", "AT_ONCE = 0.0", TRANSPORT_TEST),
+    Mutant(TRANSPORT, "AT_ONCE = 0.1", "AT_ONCE = 1.0", TRANSPORT_TEST),
+    Mutant(TRANSPORT, "BUFFER = 0.25", "BUFFER = 0.05", TRANSPORT_TEST),
+)
+
+
+def main(words: list[str]) -> int:
+    """Runs the mutants whose files hold one of the words; 1 where any survives, else 0."""
+    chosen = [one for one in MUTANTS if not words or any(word in one.file for word in words)]
+    survivors = 0
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder)
+        for name in FOLDERS:
+            shutil.copytree(ROOT / name, copy / name)
+        shutil.copy(ROOT / "pyproject.toml", copy)
+        for number, mutant in enumerate(chosen, 1):
+            outcome = tried(mutant, copy)
+            survivors += outcome != "dies"
+            change = f"{mutant.file}: {mutant.old} -> {mutant.new}"
+            print(f"{number}/{len(chosen)} {outcome}: {change}", flush=True)
+    print(f"{len(chosen) - survivors} of {len(chosen)} mutants die")
+    return int(survivors > 0)
+
+
+def tried(mutant: Mutant, copy: Path) -> str:
+    """Whether a test notices a mutant: "dies", "SURVIVES", or "is out of date" where its text is gone."""
+    path = copy / mutant.file
+    text = path.read_text(encoding="utf-8")
+    if mutant.old not in text:
+        return "is out of date"
+    path.write_text(text.replace(mutant.old, mutant.new, 1), encoding="utf-8")
+    roots = (copy, copy / "player", copy / "conformance")
+    try:
+        command = [sys.executable, "-m", "pytest", "-n", "0", "-q", "-x", "-p", "no:cacheprovider"]
+        done = subprocess.run(
+            [*command, *mutant.tests.split()],
+            cwd=copy,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, roots))},
+            capture_output=True,
+            timeout=LIMIT,
+            check=False,
+        )
+        failed = done.returncode == 1
+    except subprocess.TimeoutExpired:
+        failed = True
+    finally:
+        path.write_text(text, encoding="utf-8")
+    return "dies" if failed else "SURVIVES"
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
