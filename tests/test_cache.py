@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 
 from fba.body.model import BodyModel
-from fba.body.skin._moving_normals import rings
+from fba.body.skin._moving_normals import normal_rings
 from fba.cache import MOST_FILES, kept, key_of
 
 
@@ -140,11 +140,11 @@ def test_a_key_tells_kinds_and_shapes_apart() -> None:
 def test_neighbours_out_of_range_are_not_believed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))
     body = BodyModel.default()
-    first = rings(body.vertices, body.normals, body.triangles)
+    first = normal_rings(body.vertices, body.normals, body.triangles)
     (path,) = (tmp_path / "fba").iterdir()
     path.unlink()
     wrong: list[npt.NDArray[Any]] = [np.full_like(first[0], len(body.vertices)), first[1]]
     kept(path.stem, (first[0].shape, first[1].shape), lambda: wrong, [np.int32, np.float32])
-    again = rings(body.vertices, body.normals, body.triangles)
+    again = normal_rings(body.vertices, body.normals, body.triangles)
     assert (again[0] == first[0]).all()
     assert (again[1] == first[1]).all()

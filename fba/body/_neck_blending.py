@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from fba.body.model import BodyPart
-from fba.body.skin.skin_weights import INFLUENCES, strongest
+from fba.body.skin.skin_weights import INFLUENCES, strongest_weights
 from fba.cache import kept, key_of
 from fba.easing import smoothstep
 
@@ -129,7 +129,7 @@ def _nearest(tree: Any, dense: Float64, places: Float64, skull: int, below: Bool
     alone = np.where(below[:, None], 0.0, smoothstep((away[:, :1] - NEAR) / (FAR - NEAR)))
     found *= 1 - alone
     found[:, skull] += alone[:, 0]
-    return strongest(found)
+    return strongest_weights(found)
 
 
 def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]:

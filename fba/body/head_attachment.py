@@ -11,7 +11,7 @@ from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
 from fba.body.skin.skinning import Skinner
 from fba.errors import ModelError
-from fba.mesh.meshes import float_rows
+from fba.mesh.meshes import checked_rows
 
 SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""
@@ -39,7 +39,7 @@ class HeadOnBody:
         eyes: npt.ArrayLike,
         skull: Bool | None = None,
     ) -> None:
-        places = float_rows(vertices, (-1, 3), "a face on a body: vertices")
+        places = checked_rows(vertices, (-1, 3), "a face on a body: vertices")
         self._skull = skull_of(body)
         self.place = placement(body, eyes)
         """float64 (4, 4): the face's frame into the body's, as modelled."""

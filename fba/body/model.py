@@ -15,7 +15,7 @@ from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import checked_weights
 from fba.errors import ModelError
-from fba.mesh.meshes import Material, Meshes, joined, mesh_arrays
+from fba.mesh.meshes import Material, Meshes, join_rows, mesh_arrays
 
 if TYPE_CHECKING:
     from fba.body.skin.skinning import Skinner
@@ -187,12 +187,12 @@ class BodyModel(Meshes[BodyPart]):
     @cached_property
     def joints(self) -> Int32:
         """int32 (V, 4): the joints that carry each vertex; read-only."""
-        return joined([part.joints for part in self.parts])
+        return join_rows([part.joints for part in self.parts])
 
     @cached_property
     def weights(self) -> Float32:
         """float32 (V, 4): how far they carry it; read-only."""
-        return joined([part.weights for part in self.parts])
+        return join_rows([part.weights for part in self.parts])
 
 
 def is_rigid(matrix: Float64) -> bool:

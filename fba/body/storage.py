@@ -19,9 +19,9 @@ from fba.body.skeleton import MAX_JOINTS, Skeleton
 from fba.body.skin.skin_weights import INFLUENCES
 from fba.errors import ModelError
 from fba.gltf.document import Document
-from fba.gltf.part_materials import Looks, material_of
+from fba.gltf.part_materials import PartWriter, read_material
 from fba.gltf.scene import Gltf, Primitive
-from fba.gltf.values import Value, located, optional
+from fba.gltf.values import Value, locating_errors, optional_member
 from fba.gltf.writer import Builder
 from fba.source import Path
 
@@ -65,7 +65,7 @@ def build(model: BodyModel) -> Builder:
     columns = inverse.transpose(0, 2, 1).reshape(-1, 16)
     skin = {"joints": list(range(len(skeleton))), "skeleton": 0, "inverseBindMatrices": builder.data(columns)}
     builder.add("skins", skin)
-    looks = Looks(builder)
+    looks = PartWriter(builder)
     parts = []
     for part in model.parts:
         primitive = looks.primitive(part)
@@ -126,7 +126,7 @@ def read_body(document: Document) -> BodyModel:
     """The body in an opened document."""
     from fba.gltf.reader import read_document
 
-    content = optional(document.root.get("extensions"), NAME)
+    content = optional_member(document.root.get("extensions"), NAME)
     if content is None:
         raise document.root.error(f"brings no extension {NAME}, so it is no body model of this project")
     version = content.member("version").integer(0, 1 << 30)
@@ -137,7 +137,7 @@ def read_body(document: Document) -> BodyModel:
     skin = gltf.skins[where.index(len(gltf.skins), "skin")]
     if len(skin.joints) > MAX_JOINTS:
         raise where.error(f"{len(skin.joints)} joints, more than the {MAX_JOINTS} that are read")
-    with located(where), np.errstate(all="ignore"):
+    with locating_errors(where), np.errstate(all="ignore"):
         skeleton, bind, order = _skeleton(gltf, skin.joints)
         _check_bind(skin.inverse_bind[order], bind, skeleton.names)
     row = np.empty(len(order), dtype=np.int32)
@@ -147,7 +147,7 @@ def read_body(document: Document) -> BodyModel:
     eyes = content.get("eyes")
     places = None if eyes is None else [each.numbers(3, -LARGEST, LARGEST) for each in eyes.elements(2)]
     name = content.get("name")
-    with located(content), np.errstate(all="ignore"):
+    with locating_errors(content), np.errstate(all="ignore"):
         return BodyModel(
             parts=parts,
             skeleton=skeleton,
@@ -220,7 +220,7 @@ def _part(entry: Value, gltf: Gltf, skin: Value, row: Int32, document: Document)
         raise where.error(f"must be carried by skin {skin.data}")
     primitive = gltf.meshes[node.mesh].primitives[0]
     document.budget.charge(len(primitive.positions) * 200 + len(primitive.triangles) * 36, entry)
-    with located(entry):
+    with locating_errors(entry):
         joints, weights = _carried(primitive, row)
         return BodyPart(
             name=node.name,
@@ -232,7 +232,7 @@ def _part(entry: Value, gltf: Gltf, skin: Value, row: Int32, document: Document)
             normals=primitive.normals,
             texcoords=primitive.texcoords[0] if primitive.texcoords else None,
             colours=primitive.colours,
-            material=material_of(entry, gltf, primitive.material),
+            material=read_material(entry, gltf, primitive.material),
         )
 
 

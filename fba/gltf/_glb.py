@@ -14,7 +14,7 @@ MAX_BYTES = 1 << 30
 """Largest file, container or buffer that is read."""
 
 
-def split(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
+def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
     """JSON text and binary chunk (None where there is none) of a container.
 
     data: all bytes of the file. file: its name for messages. Raises ModelError where the container is
@@ -61,7 +61,7 @@ def _chunks(data: memoryview, file: str) -> list[tuple[bytes, memoryview]]:
     return found
 
 
-def join(text: bytes, binary: bytes) -> bytes:
+def join_container(text: bytes, binary: bytes) -> bytes:
     """A container of JSON text and bytes, both padded to whole words as the format asks.
 
     Raises ModelError where the whole would be longer than `MAX_BYTES`.

@@ -7,7 +7,7 @@ import warnings
 from fba.errors import FbaWarning
 from fba.gltf.document import Document
 from fba.gltf.scene import Material
-from fba.gltf.values import Value, optional
+from fba.gltf.values import Value, optional_member
 
 PICTURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the pictures that a glTF file may hold."""
@@ -29,11 +29,11 @@ def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
     name = entry.get("name")
     look = entry.get("pbrMetallicRoughness")
     colour, metallic, roughness, texture = (
-        optional(look, key)
+        optional_member(look, key)
         for key in ("baseColorFactor", "metallicFactor", "roughnessFactor", "baseColorTexture")
     )
     red, green, blue, alpha = (1.0,) * 4 if colour is None else colour.numbers(4, 0.0, 1.0)
-    coordinates = optional(texture, "texCoord")
+    coordinates = optional_member(texture, "texCoord")
     return Material(
         name=f"material {number}" if name is None else name.text(),
         colour=(red, green, blue, alpha),

@@ -80,7 +80,7 @@ def parse_document(data: bytes, file: str, folder: str | None = None) -> Documen
     binary: memoryview | None = None
     text = memoryview(data)
     if data[:4] == glb.MAGIC:
-        text, binary = glb.split(data, file)
+        text, binary = glb.split_container(data, file)
     elif data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
         kind = but_recognised(data[:HEAD_BYTES])
         raise ModelError(f"{file}: is no glTF 2.0: neither a .glb container nor the JSON of a .gltf{kind}")

@@ -25,7 +25,7 @@ class MeshPart(Mesh, Protocol):
     def material(self) -> Material: ...
 
 
-class Looks:
+class PartWriter:
     """Writes parts as primitives of a document; materials and textures once each."""
 
     def __init__(self, builder: Builder) -> None:
@@ -82,7 +82,7 @@ class Looks:
         return {"name": material.name, "pbrMetallicRoughness": look}
 
 
-def material_of(entry: Value, gltf: Gltf, index: int | None) -> Material:
+def read_material(entry: Value, gltf: Gltf, index: int | None) -> Material:
     """The material of a part. entry: its entry in our extension, which keeps a colour that the colours of
     vertices replace. index: the document's material, or None."""
     given = entry.get("colour")

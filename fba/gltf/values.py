@@ -150,7 +150,7 @@ class Value:
 
 
 @contextlib.contextmanager
-def located(value: Value) -> Iterator[None]:
+def locating_errors(value: Value) -> Iterator[None]:
     """Give errors of the data model their place in the file."""
     try:
         yield
@@ -160,7 +160,7 @@ def located(value: Value) -> Iterator[None]:
         raise value.error(str(error)) from error
 
 
-def optional(value: Value | None, key: str) -> Value | None:
+def optional_member(value: Value | None, key: str) -> Value | None:
     """Member `key` of a value that may be missing itself."""
     return None if value is None else value.get(key)
 

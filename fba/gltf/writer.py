@@ -12,7 +12,7 @@ from fba.arrays import Array, Floating
 from fba.atomic import atomic
 from fba.errors import ModelError
 from fba.gltf._accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
-from fba.gltf._glb import MAX_BYTES, join
+from fba.gltf._glb import MAX_BYTES, join_container
 from fba.gltf._materials import media_type
 from fba.gltf.document import MAX_JSON
 from fba.gltf.packed import pack
@@ -151,7 +151,7 @@ class Builder:
             raise ModelError(
                 f"the file would have {len(text)} bytes of JSON, more than the {MAX_JSON} allowed"
             )
-        return join(text, b"".join(chunks))
+        return join_container(text, b"".join(chunks))
 
     def save(self, path: Path) -> None:
         """Write the file, whole or not at all. Raises ModelError as `glb`, FormatError as `atomic`."""

@@ -52,7 +52,7 @@ def mesh_arrays(
 
     where: begins messages. ModelError for other shapes, indices out of range, numbers not finite.
     """
-    places = float_rows(vertices, (-1, 3), f"{where}: vertices")
+    places = checked_rows(vertices, (-1, 3), f"{where}: vertices")
     count = len(places)
     corners = np.array(triangles)
     if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
@@ -67,18 +67,18 @@ def mesh_arrays(
     arrays["normals"] = (
         vertex_normals(places, corners)
         if normals is None
-        else unit_rows(float_rows(normals, (count, 3), f"{where}: normals"))
+        else normalise_rows(checked_rows(normals, (count, 3), f"{where}: normals"))
     )
     if texcoords is not None:
-        arrays["texcoords"] = float_rows(texcoords, (count, 2), f"{where}: texture coordinates")
+        arrays["texcoords"] = checked_rows(texcoords, (count, 2), f"{where}: texture coordinates")
     if colours is not None:
-        arrays["colours"] = float_rows(colours, (count, 4), f"{where}: colours")
+        arrays["colours"] = checked_rows(colours, (count, 4), f"{where}: colours")
     for array in arrays.values():
         array.flags.writeable = False
     return arrays
 
 
-def float_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
+def checked_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
     """A float32 copy of finite numbers; shape: rows, -1 for any number, and columns. Else ModelError."""
     array = np.array(values, dtype=np.float32)
     if array.ndim != 2 or array.shape[1] != shape[1] or (shape[0] >= 0 and len(array) != shape[0]):
@@ -90,7 +90,7 @@ def float_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Floa
     return array
 
 
-def unit_rows(normals: Float32) -> Float32:
+def normalise_rows(normals: Float32) -> Float32:
     """The same with length 1; those that have it already stay exactly as they are."""
     length = np.linalg.norm(normals.astype(np.float64), axis=1)
     off = np.abs(length - 1.0) > NORMAL_TOLERANCE
@@ -125,17 +125,17 @@ class Meshes(Generic[Part]):
     @cached_property
     def vertices(self) -> Float32:
         """float32 (V, 3): the model as it rests, all parts in order, metres; read-only."""
-        return joined([part.vertices for part in self.parts])
+        return join_rows([part.vertices for part in self.parts])
 
     @cached_property
     def normals(self) -> Float32:
         """float32 (V, 3): unit normals of the model as it rests; read-only."""
-        return joined([part.normals for part in self.parts if part.normals is not None])
+        return join_rows([part.normals for part in self.parts if part.normals is not None])
 
     @cached_property
     def triangles(self) -> Int32:
         """int32 (F, 3): indices into `vertices`; read-only."""
-        return joined([part.triangles + np.int32(self.starts[part.name]) for part in self.parts])
+        return join_rows([part.triangles + np.int32(self.starts[part.name]) for part in self.parts])
 
     @cached_property
     def starts(self) -> dict[str, int]:
@@ -151,7 +151,7 @@ class Meshes(Generic[Part]):
         raise ModelError(f"no part {name!r}; there are {', '.join(part.name for part in self.parts)}")
 
 
-def joined(arrays: Sequence[npt.NDArray[Number]]) -> npt.NDArray[Number]:
+def join_rows(arrays: Sequence[npt.NDArray[Number]]) -> npt.NDArray[Number]:
     """All rows, one array after the other; read-only."""
     rows = np.concatenate(arrays)
     rows.flags.writeable = False

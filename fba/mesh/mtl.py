@@ -7,7 +7,7 @@ import warnings
 
 from fba.errors import FbaWarning, ModelError
 from fba.mesh.meshes import Material
-from fba.mesh.text_files import beside, number, whole, words
+from fba.mesh.text_files import find_beside, parse_number, read_bytes, read_words
 
 MAX_PICTURE = 1 << 27
 """Largest picture, in bytes."""
@@ -21,7 +21,7 @@ def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
     Kd is the colour (sRGB, as writers put it there), Ns the shine, map_Kd the picture: PNG or JPEG
     beside the file, others are left out with an FbaWarning. Raises ModelError naming the line.
     """
-    file = beside(path, library)
+    file = find_beside(path, library)
     found: dict[str, Material] = {}
     if file is None:
         warnings.warn(f"{path}: its materials {library!r} do not lie beside it", FbaWarning, stacklevel=4)
@@ -33,17 +33,17 @@ def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
         if name is not None:
             found[name] = Material(name, (1.0, 1.0, 1.0) if picture else colour, rough, picture or None)
 
-    for where, tokens in words(file):
+    for where, tokens in read_words(file):
         if len(tokens) < 2:
             continue
         if tokens[0] == "newmtl":
             finish()
             name, colour, rough, picture = " ".join(tokens[1:]), (0.8, 0.8, 0.8), 0.6, b""
         elif tokens[0] == "Kd" and len(tokens) >= 4:
-            r, g, b = (min(max(number(t, where, "a colour"), 0.0), 1.0) ** 2.2 for t in tokens[1:4])
+            r, g, b = (min(max(parse_number(t, where, "a colour"), 0.0), 1.0) ** 2.2 for t in tokens[1:4])
             colour = (r, g, b)
         elif tokens[0] == "Ns":
-            rough = max(0.05, (2.0 / (max(number(tokens[1], where, "Ns"), 0.0) + 2.0)) ** 0.25)
+            rough = max(0.05, (2.0 / (max(parse_number(tokens[1], where, "Ns"), 0.0) + 2.0)) ** 0.25)
         elif tokens[0] == "map_Kd":
             picture = _picture(file, tokens[-1], where)
     finish()
@@ -51,12 +51,12 @@ def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
 
 
 def _picture(file: os.PathLike[str], name: str, where: str) -> bytes:
-    path = beside(file, name)
+    path = find_beside(file, name)
     if path is None:
         warnings.warn(f"{where}: the picture {name!r} does not lie beside it", FbaWarning, stacklevel=5)
         return b""
     try:
-        content = whole(path, MAX_PICTURE)
+        content = read_bytes(path, MAX_PICTURE)
     except ModelError as error:
         warnings.warn(f"{where}: {error}", FbaWarning, stacklevel=5)
         return b""

@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float32
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
+from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
 
 
 def read_obj(path: str | os.PathLike[str]) -> Polygons:
@@ -41,7 +41,7 @@ class _Reader:
     def read(self) -> Polygons:
         handlers = {"v": self._vertex, "vt": self._texcoord, "f": self._face}
         pending = ""
-        for line, text in lines(self.path):
+        for line, text in read_lines(self.path):
             if text.endswith("\\"):
                 pending += text[:-1] + " "
                 if len(pending) > MAX_CORNERS:
@@ -93,7 +93,7 @@ class _Reader:
                 return found
         except ValueError:
             pass
-        return [number(token, self.where, what) for token in tokens]
+        return [parse_number(token, self.where, what) for token in tokens]
 
     def _vertex(self, tokens: list[str]) -> None:
         if len(self.positions) >= 3 * MAX_VERTICES:
@@ -136,7 +136,7 @@ class _Reader:
         return place
 
     def _signed(self, token: str, what: str) -> int:
-        return whole_number(token, self.where, f"the number of a {what}")
+        return parse_integer(token, self.where, f"the number of a {what}")
 
 
 def _linear(colour: Float32) -> Float32:

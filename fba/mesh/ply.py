@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int64
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, whole, whole_number
+from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, read_bytes
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
@@ -44,7 +44,7 @@ def read_ply(path: str | os.PathLike[str]) -> Polygons:
     `MAX_VERTICES` vertices.
     """
     name = os.fspath(path)
-    return _Reader(name, whole(name, MAX_BYTES)).read()
+    return _Reader(name, read_bytes(name, MAX_BYTES)).read()
 
 
 class _Reader:
@@ -118,7 +118,7 @@ class _Reader:
             if tokens[0] == "format" and len(tokens) > 1 and tokens[1] in ORDERS:
                 order = ORDERS[tokens[1]]
             elif tokens[0] == "element" and len(tokens) == 3:
-                count = whole_number(tokens[2], where, f"the number of {tokens[1][:20]}")
+                count = parse_integer(tokens[2], where, f"the number of {tokens[1][:20]}")
                 most = {"vertex": MAX_VERTICES, "face": MAX_FACES}.get(tokens[1], MAX_FACES)
                 if not 0 <= count <= most:
                     raise ModelError(f"{where}: {count} of element {tokens[1][:20]}; at most {most} are read")

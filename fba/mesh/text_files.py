@@ -22,7 +22,7 @@ MAX_TEXT = 1 << 26
 """Largest file of feature points, weights or settings, in bytes."""
 
 
-def lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
+def read_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
     """Line numbers from 1 and lines of a text file, without their ends, read one by one.
 
     UTF-8, else Latin-1; UTF-16 as its byte order mark says is refused, as are zero bytes: such a file is
@@ -54,9 +54,9 @@ def lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
             yield number, text.rstrip("\r\n")
 
 
-def words(path: str | os.PathLike[str]) -> Iterator[tuple[str, list[str]]]:
-    """The words of each line that has any before a "#", and its place for messages; errors as `lines`."""
-    for line, text in lines(path):
+def read_words(path: str | os.PathLike[str]) -> Iterator[tuple[str, list[str]]]:
+    """Each line's position for messages, and its words without comments (#). Errors as `read_lines`."""
+    for line, text in read_lines(path):
         tokens = text.split("#", 1)[0].split()
         if tokens:
             yield f"{os.fspath(path)}:{line}", tokens
@@ -69,7 +69,7 @@ def _opened(name: str) -> tuple[BinaryIO, int]:
         raise ModelError(str(error)) from error
 
 
-def whole(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
+def read_bytes(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
     """All bytes of a file; ModelError where it cannot be read or is larger than `limit`."""
     name = os.fspath(path)
     file, size = _opened(name)
@@ -82,7 +82,7 @@ def whole(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
             raise ModelError(f"{name}: cannot be read: {error.strerror or error}") from error
 
 
-def number(token: str, where: str, what: str) -> float:
+def parse_number(token: str, where: str, what: str) -> float:
     """A finite number, else ModelError naming the place."""
     try:
         value = float(token)
@@ -93,7 +93,7 @@ def number(token: str, where: str, what: str) -> float:
     return value
 
 
-def whole_number(token: str, where: str, what: str) -> int:
+def parse_integer(token: str, where: str, what: str) -> int:
     """A whole number, else ModelError naming the place."""
     try:
         # int() takes underscores, other scripts' digits and numbers of any length
@@ -104,7 +104,7 @@ def whole_number(token: str, where: str, what: str) -> int:
     raise ModelError(f"{where}: {what} must be a whole number, not {token[:40]!r}")
 
 
-def beside(path: str | os.PathLike[str], name: str) -> Path | None:
+def find_beside(path: str | os.PathLike[str], name: str) -> Path | None:
     """A file named in another one, looked for beside it only, or None.
 
     Names come from files of strangers: folders in them are dropped, so none reaches outside.

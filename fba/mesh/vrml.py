@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, lines, number, whole_number
+from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
 
 TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]|[^\s,\[\]{}"]+')
 LISTS = ("point", "coordIndex", "texCoordIndex")
@@ -38,7 +38,7 @@ class _Reader:
         inner = ""  # "Coordinate" or "TextureCoordinate", whichever was named last
         key: str | None = None  # the number list being read
         last = ""
-        for number_, text in lines(self.path):
+        for number_, text in read_lines(self.path):
             self.line = number_
             if number_ == 1 and not text.startswith("#VRML"):
                 raise ModelError(f"{self.path}:1: a VRML file begins with '#VRML', not {text[:20]!r}")
@@ -79,9 +79,9 @@ class _Reader:
     def _number(self, values: list[float], token: str, key: str) -> None:
         where = f"{self.path}:{self.line}"
         if key in ("point", "texcoord"):
-            values.append(number(token, where, "a coordinate"))
+            values.append(parse_number(token, where, "a coordinate"))
         else:
-            values.append(whole_number(token, where, "an index"))
+            values.append(parse_integer(token, where, "an index"))
         if len(values) > MAX_CORNERS:
             raise ModelError(f"{where}: more than {MAX_CORNERS} numbers in one list")
 

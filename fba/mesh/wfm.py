@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import MAX_FACES, MAX_VERTICES, number, whole_number, words
+from fba.mesh.text_files import MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_words
 
 
 def read_wfm(path: str | os.PathLike[str]) -> Polygons:
@@ -19,12 +19,14 @@ def read_wfm(path: str | os.PathLike[str]) -> Polygons:
     line.
     """
     name = os.fspath(path)
-    rows = words(name)
+    rows = read_words(name)
     vertices = _table(rows, name, "vertices", MAX_VERTICES)
     faces = _table(rows, name, "faces", MAX_FACES)
-    positions = np.array([[number(t, where, "a coordinate") for t in tokens] for where, tokens in vertices])
+    positions = np.array(
+        [[parse_number(t, where, "a coordinate") for t in tokens] for where, tokens in vertices]
+    )
     corners = np.array(
-        [[whole_number(t, where, "a vertex") for t in tokens] for where, tokens in faces], dtype=np.int64
+        [[parse_integer(t, where, "a vertex") for t in tokens] for where, tokens in faces], dtype=np.int64
     )
     for (where, _), triangle in zip(faces, corners, strict=True):
         if triangle.min() < 0 or triangle.max() >= len(positions):
@@ -46,7 +48,7 @@ def _table(
     where, tokens = next(rows, (path, []))
     if len(tokens) != 1:
         raise ModelError(f"{where}: the number of {what} is expected here, alone on its line")
-    count = whole_number(tokens[0], where, f"the number of {what}")
+    count = parse_integer(tokens[0], where, f"the number of {what}")
     if not 1 <= count <= most:
         raise ModelError(f"{where}: {count} {what}; a face has 1 to {most}")
     found: list[tuple[str, list[str]]] = []

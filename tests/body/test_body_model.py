@@ -21,7 +21,7 @@ from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart
 from fba.body.storage import build, read_body
 from fba.errors import FormatError, ModelError
-from fba.gltf._glb import join, split
+from fba.gltf._glb import join_container, split_container
 from fba.gltf.document import parse_document
 from fba.gltf.reader import read_document
 from fba.gltf.surfaces import surfaces
@@ -205,7 +205,7 @@ def test_unturned_joints_are_the_default_posture() -> None:
 
 def test_joints_in_another_order() -> None:
     """Files by other hands: the skin may list its joints in any order."""
-    text, binary = split(build(rod()).glb(), "rod.glb")
+    text, binary = split_container(build(rod()).glb(), "rod.glb")
     root = json.loads(bytes(text))
     assert binary is not None
     data = bytearray(binary)
@@ -222,7 +222,7 @@ def test_joints_in_another_order() -> None:
         size = accessor["count"] * 4
         joints_ = np.frombuffer(bytes(data[start : start + size]), np.uint8)
         data[start : start + size] = np.array([order.index(n) for n in range(3)], np.uint8)[joints_].tobytes()
-    again = read_body(parse_document(join(json.dumps(root).encode(), bytes(data)), "rod.glb"))
+    again = read_body(parse_document(join_container(json.dumps(root).encode(), bytes(data)), "rod.glb"))
     matrices = random_pose(rod(), 4)
     np.testing.assert_allclose(again.skin(matrices), rod().skin(matrices), atol=1e-5)
 
@@ -249,11 +249,11 @@ def file() -> bytes:
 
 
 def changed(place: str, value: Any) -> bytes:
-    text, binary = split(file(), "rod.glb")
+    text, binary = split_container(file(), "rod.glb")
     root = json.loads(bytes(text))
     put(root, place, value)
     assert binary is not None
-    return join(json.dumps(root).encode(), bytes(binary))
+    return join_container(json.dumps(root).encode(), bytes(binary))
 
 
 BODY = "extensions/FBA_body"
@@ -292,13 +292,13 @@ def test_what_is_wrong_in_a_file_is_named(place: str, value: Any, message: str) 
 
 
 def test_vertices_without_joints() -> None:
-    text, binary = split(file(), "rod.glb")
+    text, binary = split_container(file(), "rod.glb")
     root = json.loads(bytes(text))
     for key in ("JOINTS_0", "WEIGHTS_0"):
         del root["meshes"][0]["primitives"][0]["attributes"][key]
     assert binary is not None
     with pytest.raises(ModelError, match=r"parts\[0\]: its vertices have no joints"):
-        read_body(parse_document(join(json.dumps(root).encode(), bytes(binary)), "rod.glb"))
+        read_body(parse_document(join_container(json.dumps(root).encode(), bytes(binary)), "rod.glb"))
 
 
 def test_truncated_and_scrambled_files() -> None:
@@ -308,7 +308,7 @@ def test_truncated_and_scrambled_files() -> None:
     for length in range(0, len(file()), len(file()) // 40):
         with pytest.raises(ModelError):
             read_body(parse_document(file()[:length], "rod.glb"))
-    text, binary = split(file(), "rod.glb")
+    text, binary = split_container(file(), "rod.glb")
     assert binary is not None
     for _ in range(300):
         root = json.loads(bytes(text))
@@ -319,7 +319,9 @@ def test_truncated_and_scrambled_files() -> None:
         else:
             mutate(root, source)
         try:
-            body = read_body(parse_document(join(json.dumps(root).encode(), bytes(blob)), "rod.glb"))
+            body = read_body(
+                parse_document(join_container(json.dumps(root).encode(), bytes(blob)), "rod.glb")
+            )
             body.skin(body.bind)
             found["read"] += 1
         except ModelError:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from fba.body import BapSolver
 from fba.body.head_attachment import HeadOnBody, placement
 from fba.body.model import BodyModel
-from fba.body.skin.skin_weights import strongest
+from fba.body.skin.skin_weights import strongest_weights
 from fba.errors import ModelError
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
@@ -187,7 +187,7 @@ def test_four_joints_of_many_fade_in_without_a_step() -> None:
     dense = np.stack(
         [np.full(61, 0.3), np.full(61, 0.25), np.full(61, 0.2), np.full(61, 0.13), shares], axis=1
     )
-    joints, weights = strongest(dense / dense.sum(axis=1, keepdims=True))
+    joints, weights = strongest_weights(dense / dense.sum(axis=1, keepdims=True))
     found = np.zeros((61, 5))
     for slot in range(4):
         np.add.at(found, (np.arange(61), joints[:, slot]), weights[:, slot])

@@ -25,7 +25,7 @@ from shoulders import sloping
 
 from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart, Material
-from fba.body.skin.skin_weights import strongest
+from fba.body.skin.skin_weights import strongest_weights
 from fba.body.solve.bind_pose import FINGERS
 from fba.face.model import FaceModel, point_row
 from fba.mesh.meshes import vertex_normals
@@ -188,7 +188,7 @@ def model() -> BodyModel:
     spine = [name[0] == "v" or name == "sacroiliac" for name in bones.names]
     parts = []
     for name, piece in found.items():
-        joints, weights = strongest(piece.weights, spine)
+        joints, weights = strongest_weights(piece.weights, spine)
         roughness = {"skin": 0.55, "neck": 0.55, "cloth": 0.95, "shoe": 0.6}[piece.kind]
         parts.append(
             BodyPart(

@@ -20,7 +20,7 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int64
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skeleton import Skeleton
-from fba.body.skin.skin_weights import strongest
+from fba.body.skin.skin_weights import strongest_weights
 from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
 from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
@@ -29,7 +29,7 @@ from fba.gltf.values import Value
 from fba.mesh.meshes import vertex_normals
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons, triangulate
-from fba.mesh.text_files import whole
+from fba.mesh.text_files import read_bytes
 
 METRES = 0.1
 """Metres per unit of the base mesh."""
@@ -118,7 +118,7 @@ class _At:
 
 
 def _json(path: Path) -> Value:
-    return Value(parse_json(memoryview(whole(_existing(path))), path.name), path.name)
+    return Value(parse_json(memoryview(read_bytes(_existing(path))), path.name), path.name)
 
 
 def _existing(path: Path) -> Path:
@@ -259,7 +259,7 @@ def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPar
     head = above & (skull[body] > WHOLE).all(axis=1)
     throat = above & ~head
     spine = [name[0] == "v" or name == "sacroiliac" for name in default.names]
-    joints, strong = strongest(weights, spine)
+    joints, strong = strongest_weights(weights, spine)
     normals = vertex_normals(vertices, body)
     eyes = _triangles(mesh, "helper-l-eye", "helper-r-eye")
     chosen = (

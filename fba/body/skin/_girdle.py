@@ -27,7 +27,9 @@ LEAST = 0.02
 """Vertices that the arm carries by less, or by all but less, are not between."""
 
 
-def girdle(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32) -> Girdle:
+def find_girdle(
+    skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32
+) -> Girdle:
     """What the compiled loop needs to turn both shoulder girdles; nothing where the skeleton has none.
 
     Its first fields have a row for each side. joints: the joint that carries the girdle, those of collar

@@ -19,7 +19,7 @@ MAKING = 1
 """Counts up with every change of what is found: what was kept before is then made anew."""
 
 
-def rings(vertices: Float32, normals: Float32, triangles: Integer) -> tuple[Int32, Float32]:
+def normal_rings(vertices: Float32, normals: Float32, triangles: Integer) -> tuple[Int32, Float32]:
     """Four neighbours of each vertex, (V, 4), -1 where they are of no use, and numbers (V, 3).
 
     With t = v[0] - v[2] and u = v[1] - v[3] of the neighbours, x t + y u + z (t x u) is the normal of the

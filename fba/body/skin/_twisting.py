@@ -22,7 +22,9 @@ LEAST = 0.02
 SMALL = 1e-3
 
 
-def twists(skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32) -> Twisting:
+def find_twists(
+    skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32
+) -> Twisting:
     """What the compiled loop needs to wring a body's arms; nothing where the skeleton has no arms.
 
     Of its fields, each bone has rows `starts[b]` to `starts[b + 1]`: the vertices (`rows`) along it, and by

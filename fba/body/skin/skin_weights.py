@@ -45,7 +45,7 @@ def checked_weights(
     return which, share
 
 
-def strongest(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int32, Float32]:
+def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int32, Float32]:
     """Joints and weights (V, 4) of dense weights (V, J).
 
     Of more than four joints, what the fifth has is taken from all, so that weights fade in and out over the
@@ -53,7 +53,7 @@ def strongest(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int3
     as one, as vertebrae do. Those give way first, the greatest of them taking over what others carry.
     """
     if alike is not None:
-        dense = _thinned(dense, np.asarray(alike, dtype=bool))
+        dense = _thin_chain(dense, np.asarray(alike, dtype=bool))
     joints = dense.shape[1]
     if joints < INFLUENCES:
         dense = np.pad(dense, ((0, 0), (0, INFLUENCES - joints)))
@@ -68,7 +68,7 @@ def strongest(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int3
     return order[:, :INFLUENCES].astype(np.int32), share.astype(np.float32)
 
 
-def _thinned(dense: Float64, alike: Bool) -> Float64:
+def _thin_chain(dense: Float64, alike: Bool) -> Float64:
     """The same weights with fewer of those that move alike, in all no more than there is room for."""
     dense = np.maximum(dense - LEAST, 0.0)
     dense /= np.maximum(dense.sum(axis=1, keepdims=True), 1e-12)

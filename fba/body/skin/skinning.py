@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32
 from fba.body.skeleton import Skeleton
-from fba.body.skin._girdle import girdle
-from fba.body.skin._moving_normals import rings
-from fba.body.skin._twisting import twists
+from fba.body.skin._girdle import find_girdle
+from fba.body.skin._moving_normals import normal_rings
+from fba.body.skin._twisting import find_twists
 from fba.mesh.meshes import result_array
 
 METHODS = ("dual", "linear")
@@ -56,12 +56,12 @@ class Skinner:
         self._vertices, self._upright = self._modelled.copy(), self._upright_modelled.copy()
         self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
         self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
-        self._twists = twists(skeleton, bind, self._modelled, self._joints, self._weights)
-        self._girdle = girdle(skeleton, bind, self._modelled, self._joints, self._weights)
+        self._twists = find_twists(skeleton, bind, self._modelled, self._joints, self._weights)
+        self._girdle = find_girdle(skeleton, bind, self._modelled, self._joints, self._weights)
         self._wrung = self._vertices.copy()
         self._wrung_modelled = True
         faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
-        self._around, self._numbers = rings(self._modelled, self._upright_modelled, faces)
+        self._around, self._numbers = normal_rings(self._modelled, self._upright_modelled, faces)
         self._scratch = np.empty((len(bind), 12), dtype=np.float32)
         self._lock = threading.Lock()
 
@@ -111,8 +111,8 @@ class Skinner:
         placed = out[None] if single else out
         turned = placed[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
-            vertices = _usable(vertices, self._vertices)
-            upright = self._upright if upright is None else _usable(upright, self._upright)
+            vertices = _as_writable(vertices, self._vertices)
+            upright = self._upright if upright is None else _as_writable(upright, self._upright)
             mesh = (vertices, upright, self._joints, self._weights, self._counts, self._around, self._numbers)
             wrung = vertices
             if method == "dual" and len(self._twists.rows):
@@ -159,7 +159,7 @@ class Skinner:
         return frames, array.ndim == 3
 
 
-def _usable(array: Float32, room: Float32) -> Float32:
+def _as_writable(array: Float32, room: Float32) -> Float32:
     """The array as compiled code takes it: itself, or a copy in `room`."""
     if array.dtype == np.float32 and array.flags.c_contiguous and array.flags.writeable:
         return array

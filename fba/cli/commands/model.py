@@ -226,7 +226,7 @@ def _points(path: Path, model: FaceModel) -> Float64:
     from fba.face.importers.points.fdp import load_fdp
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
-    from fba.mesh.text_files import beside
+    from fba.mesh.text_files import find_beside
 
     if path.suffix.lower() in (".json", ".csv"):
         return read_points(path).points
@@ -234,7 +234,7 @@ def _points(path: Path, model: FaceModel) -> Float64:
     if fdp.format != "xface":
         return fdp.points
     meshes = sorted({mesh.rpartition("_")[0] for mesh, _ in fdp.vertices.values()})
-    absent = [name for name in meshes if beside(path, name) is None]
+    absent = [name for name in meshes if find_beside(path, name) is None]
     if not (absent and fdp.distances):
         return xface_points(fdp)
     from fba.face.calibration import points_of_distances

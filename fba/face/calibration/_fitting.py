@@ -141,9 +141,9 @@ def _checked(points: npt.ArrayLike) -> Float64:
 
 
 def _on_their_sides(points: Float64) -> Float64:
-    from fba.face.importers.points.fdp_data import sides
+    from fba.face.importers.points.fdp_data import repair_sides
 
-    right, swaps, wrong = sides(points)
+    right, swaps, wrong = repair_sides(points)
     changed = [f"{a} and {b} have changed places" for a, b in swaps]
     changed += [f"{one} is on the other side" for one in wrong]
     if changed:

@@ -19,10 +19,10 @@ from fba.face.gltf._tables import read_tables
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
 from fba.gltf.document import Document
-from fba.gltf.part_materials import material_of
+from fba.gltf.part_materials import read_material
 from fba.gltf.reader import read_document
 from fba.gltf.scene import Gltf
-from fba.gltf.values import Budget, Value, located, optional
+from fba.gltf.values import Budget, Value, locating_errors, optional_member
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
 MAX_PARTS = 1000
@@ -32,7 +32,7 @@ LARGEST = float(np.finfo(np.float32).max)
 
 def read_model(document: Document) -> FaceModel:
     """The face in an opened glTF document. Raises ModelError naming the place of what is wrong."""
-    content = optional(document.root.get("extensions"), NAME)
+    content = optional_member(document.root.get("extensions"), NAME)
     if content is None:
         raise document.root.error(
             f"brings no extension {NAME}, so it is no face model of this project; a plain glTF head with "
@@ -48,7 +48,7 @@ def read_model(document: Document) -> FaceModel:
         _fap(name, value)
         value.number()
     fit = content.get("fit")
-    with located(content), np.errstate(all="ignore"):  # absurd sizes overflow; no harm comes of it
+    with locating_errors(content), np.errstate(all="ignore"):  # absurd sizes overflow; no harm comes of it
         return FaceModel(
             parts=parts,
             points=points,
@@ -87,7 +87,7 @@ def _part(entry: Value, where: Value, gltf: Gltf, number: int, budget: Budget) -
     primitive = gltf.meshes[node.mesh].primitives[0]
     # copies here and in the joined arrays of the face
     budget.charge(len(primitive.positions) * 120 + len(primitive.triangles) * 36, entry)
-    with located(entry):
+    with locating_errors(entry):
         return Part(
             name=node.name,
             kind=entry.member("kind").choice(*PART_KINDS),
@@ -96,7 +96,7 @@ def _part(entry: Value, where: Value, gltf: Gltf, number: int, budget: Budget) -
             normals=primitive.normals,
             texcoords=primitive.texcoords[0] if primitive.texcoords else None,
             colours=primitive.colours,
-            material=material_of(entry, gltf, primitive.material),
+            material=read_material(entry, gltf, primitive.material),
         )
 
 
@@ -117,7 +117,7 @@ def _points(content: Value, parts: tuple[Part, ...]) -> tuple[Float64, Int32]:
 
 
 def _fit(value: Value) -> InterpolationTable:
-    with located(value):
+    with locating_errors(value):
         return InterpolationTable.from_dict(value.data)
 
 

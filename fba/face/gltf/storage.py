@@ -14,7 +14,7 @@ from fba.face.gltf.morphs import displacements
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
 from fba.gltf.document import open_document
-from fba.gltf.part_materials import Looks
+from fba.gltf.part_materials import PartWriter
 from fba.gltf.writer import Builder
 from fba.parameters import faps
 from fba.source import Path
@@ -49,7 +49,7 @@ def build(model: FaceModel) -> Builder:
     builder.add("scenes", {"nodes": [0]})
     nodes = list(range(1, len(model.parts) + 1))
     builder.add("nodes", {"name": HEAD, "children": nodes})
-    looks = Looks(builder)
+    looks = PartWriter(builder)
     primitives = [looks.primitive(part) for part in model.parts]
     targets = _targets(builder, model)
     for part, primitive, moved in zip(model.parts, primitives, targets, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.assembly.model import finished
+from fba.face.importers.assembly.model import finish_import
 from fba.face.importers.assembly.pieces import Piece
 from fba.face.importers.assembly.polygon_parts import make_part
 from fba.face.importers.mesh import READERS, import_mesh
@@ -85,6 +85,6 @@ def _xface(
         start += len(shape.vertices)
     known = [n for n, p in zip(names(), points, strict=True) if np.isfinite(p).all()]
     numbers = {point: number for point, number in numbers.items() if point in known and point in row_of()}
-    return finished(
+    return finish_import(
         pieces, points, numbers, path=file, unit=unit, up=up, kinds=chosen, name=name or Path(fdp.path).stem
     )

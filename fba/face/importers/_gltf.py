@@ -11,8 +11,8 @@ import numpy as np
 from fba.arrays import Float32
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names
-from fba.face.importers.assembly.model import finished, turned
-from fba.face.importers.assembly.pieces import Piece, assembled
+from fba.face.importers.assembly.model import finish_import, turn_upright
+from fba.face.importers.assembly.pieces import Piece, assemble
 from fba.face.importers.points.points_file import GivenPoints, given_points
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.text_files import MAX_VERTICES
@@ -42,9 +42,9 @@ def import_gltf(
     if given is None:
         from fba.face.importers.assembly.landmarks import find_points
 
-        upright, _ = turned(pieces, np.full((len(names()), 3), np.nan), up)
-        found = find_points(assembled(upright, kinds), os.fspath(path))
-        return finished(
+        upright, _ = turn_upright(pieces, np.full((len(names()), 3), np.nan), up)
+        found = find_points(assemble(upright, kinds), os.fspath(path))
+        return finish_import(
             upright, found, {}, path=path, unit=unit, kinds=kinds, name=name,
             notes={"feature points": "found by the shapes of the head, not given"},
         )  # fmt: skip
@@ -58,7 +58,7 @@ def import_gltf(
                     f"{path}: feature point {point} is vertex {vertex}, but there are {len(everything)}"
                 )
             places[row] = everything[vertex]
-    return finished(pieces, places, given.vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
+    return finish_import(pieces, places, given.vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
 
 
 def gltf_pieces(path: str | os.PathLike[str]) -> tuple[list[Piece], bool]:

@@ -12,17 +12,17 @@ import numpy as np
 from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError, Remedy
 from fba.face.feature_points import names, row_of
-from fba.face.importers.assembly.model import finished
+from fba.face.importers.assembly.model import finish_import
 from fba.face.importers.assembly.pieces import Piece
 from fba.face.importers.assembly.polygon_parts import make_part
-from fba.face.importers.points.fdp_data import sides
+from fba.face.importers.points.fdp_data import repair_sides
 from fba.face.importers.points.points_file import GivenPoints, given_points
 from fba.face.model import FaceModel, Material
 from fba.mesh.mtl import read_mtl
 from fba.mesh.obj import read_obj
 from fba.mesh.ply import read_ply
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import lines
+from fba.mesh.text_files import read_lines
 from fba.mesh.wfm import read_wfm
 
 READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
@@ -51,7 +51,7 @@ def import_mesh(
     given = given_points(points) if points is not None else _beside(path)
     pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {})
     places, vertices = _places(polygons, given, os.fspath(path))
-    return finished(pieces, places, vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
+    return finish_import(pieces, places, vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
 
 
 def polygon_pieces(polygons: Polygons, materials: Mapping[str, Material]) -> list[Piece]:
@@ -105,7 +105,7 @@ def _places(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64,
             raise ModelError(
                 f"{path}: feature point {name} is vertex {vertex}, but the mesh has {len(polygons.vertices)}"
             )
-    places, swaps, mirrored = sides(_brought(given.points, places, list(vertices), path))
+    places, swaps, mirrored = repair_sides(_brought(given.points, places, list(vertices), path))
     for a, b in swaps:
         found = {b: vertices.pop(a, None), a: vertices.pop(b, None)}
         vertices |= {name: vertex for name, vertex in found.items() if vertex is not None}
@@ -154,7 +154,7 @@ def _brought(said: Float64, placed: Float64, chosen: list[str], path: str) -> Fl
 
 def _materials(path: str | os.PathLike[str]) -> dict[str, Material]:
     found: dict[str, Material] = {}
-    for line, text in lines(path):
+    for line, text in read_lines(path):
         if text.startswith("mtllib") and line < 10000:
             found |= read_mtl(path, text[6:].strip())
     return found

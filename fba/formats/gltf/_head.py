@@ -17,7 +17,7 @@ from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._joints import Clip, adopt, move
 from fba.formats.gltf._morph_targets import Targets, targets
 from fba.formats.gltf._pose import nearest_rotation
-from fba.gltf.part_materials import Looks
+from fba.gltf.part_materials import PartWriter
 from fba.gltf.writer import Builder
 
 HEAD_NODE = "head"
@@ -109,7 +109,7 @@ class HeadParts:
             self.bound.append((node, at))
         return found
 
-    def meshes(self, slots: dict[str, int], looks: Looks, skin: bool, hang: dict[str, int]) -> list[int]:
+    def meshes(self, slots: dict[str, int], looks: PartWriter, skin: bool, hang: dict[str, int]) -> list[int]:
         """The parts; the nodes that belong to the scene itself.
 
         slots: where in the skin's list the joints of parts of their own are. skin: whether the parts are

@@ -21,7 +21,7 @@ from fba.formats.gltf.writer import CHUNK, MARK, MOST_FRAMES
 from fba.formats.text.frame_rates import parse_rate
 from fba.gltf import Animation as Clip
 from fba.gltf import Channel, Gltf
-from fba.gltf.values import Value, optional
+from fba.gltf.values import Value, optional_member
 from fba.parameters import BAP_COUNT, baps
 
 VERSION = 1
@@ -34,7 +34,7 @@ def note_of(gltf: Gltf, clip: Clip) -> Value | None:
     entries = gltf.document.elements(1 << 18, "animations")
     entry = entries[gltf.animations.index(clip)]
     extras = entry.get("extras")
-    held = optional(extras, MARK) if extras is not None and isinstance(extras.data, dict) else None
+    held = optional_member(extras, MARK) if extras is not None and isinstance(extras.data, dict) else None
     ours = held is not None and isinstance(held.data, dict) and ("root" in held.data or "face" in held.data)
     return held if ours else None
 

@@ -99,7 +99,7 @@ def _person(
 ) -> list[int]:
     from fba.body import BapSolver, Skeleton
     from fba.body.model import BodyModel
-    from fba.gltf.part_materials import Looks
+    from fba.gltf.part_materials import PartWriter
 
     person = (body or BodyModel.default()) if mesh else body
     skeleton = Skeleton.default() if person is None else person.skeleton
@@ -136,7 +136,7 @@ def _person(
             joints.append(eye)
         bound += [matrix for _, matrix in head.bound]
     _skin(builder, joints, np.array(bound), nodes[0])
-    looks = Looks(builder)
+    looks = PartWriter(builder)
     roots = [nodes[0]]
     for part in person.parts:
         if part.kind == "neck" and head is not None and head.on is not None and head.on.brings_neck:
@@ -177,13 +177,13 @@ def _head(
     """A face by itself, in its own frame."""
     from fba.face.model import FaceModel
     from fba.formats.gltf._head import HeadParts
-    from fba.gltf.part_materials import Looks
+    from fba.gltf.part_materials import PartWriter
 
     face = model or FaceModel.default()
     head = HeadParts(builder, clip, face, _shown(animation, face), None)
     node = head.turn(None, np.eye(4), always=True)
     hang = {"": node, **head.joints(node, np.eye(4))}
-    head.meshes({}, Looks(builder), False, hang)
+    head.meshes({}, PartWriter(builder), False, hang)
     _note_face(builder, animation, note, face, head)
     return [node]
 

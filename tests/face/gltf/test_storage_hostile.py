@@ -19,7 +19,7 @@ from fba.errors import FbaWarning, FormatError, ModelError
 from fba.face.gltf._reading import read_model
 from fba.face.gltf.storage import build, load
 from fba.face.model import FaceModel
-from fba.gltf._glb import join, split
+from fba.gltf._glb import join_container, split_container
 from fba.gltf.document import parse_document
 from json_places import REMOVED, put
 from stored_models import assert_same, face
@@ -31,7 +31,7 @@ def file() -> bytes:
 
 
 def document() -> tuple[Any, bytes]:
-    text, binary = split(file(), "head.glb")
+    text, binary = split_container(file(), "head.glb")
     assert binary is not None
     return json.loads(bytes(text)), bytes(binary)
 
@@ -44,7 +44,7 @@ def changed(place: str, value: Any) -> bytes:
     """The good file with one value of its JSON replaced, or removed where `value` is `REMOVED`."""
     root, binary = document()
     put(root, place, value)
-    return join(json.dumps(root).encode(), binary)
+    return join_container(json.dumps(root).encode(), binary)
 
 
 FACE = "extensions/FBA_face"
@@ -128,7 +128,7 @@ def packed_again(which: str, content: bytes) -> bytes:
     view |= {"byteOffset": len(binary), "byteLength": len(content)}
     binary += content
     root["buffers"][0]["byteLength"] = len(binary)
-    return join(json.dumps(root).encode(), binary)
+    return join_container(json.dumps(root).encode(), binary)
 
 
 def planes(values: list[float], kind: str) -> bytes:
@@ -188,7 +188,7 @@ def test_packed_zeros_cannot_fill_the_memory() -> None:
         {"part": 0, "borders": list(range(4096)), "count": count, "vertices": view, "displacements": view}
     ]
     with pytest.raises(ModelError, match=r"tables\[0\].*: the file unpacks to more than 1024 MiB"):
-        read(join(json.dumps(root).encode(), binary))
+        read(join_container(json.dumps(root).encode(), binary))
 
 
 def test_files_that_are_no_faces(tmp_path: Path) -> None:
@@ -227,7 +227,7 @@ def damaged_json(rng: random.Random) -> bytes:
             holder.insert(key, copy.deepcopy(rng.choice(holder)))
         else:
             holder[key] = copy.deepcopy(rng.choice(list(holder.values())))
-    return join(json.dumps(root).encode(), binary)
+    return join_container(json.dumps(root).encode(), binary)
 
 
 def _walk(rng: random.Random, value: Any) -> Iterator[tuple[Any, Any]]:

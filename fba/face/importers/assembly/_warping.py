@@ -19,7 +19,7 @@ SMOOTHING = 0.1
 """How little the bending minds single points: some lie at one place on the adult head, apart on another."""
 
 
-def warped(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
+def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
     """All points: the adult head's, bent to those found, each then on the nearest surface of its kind."""
     from scipy.interpolate import RBFInterpolator
     from scipy.spatial import cKDTree

@@ -11,7 +11,7 @@ from fba.arrays import Bool, Float64, Int32
 from fba.face.importers.assembly.pieces import Piece
 
 
-def outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece], int]:
+def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece], int]:
     """The pieces with the skin facing away from the centre of the head, and how many triangles turned.
 
     Within the skin, triangles that run against their neighbours are turned first. When the skin was

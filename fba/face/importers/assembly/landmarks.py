@@ -17,7 +17,7 @@ from fba.errors import ModelError, Remedy
 from fba.face.authoring.shapes.shape_names import canonical, fap_of
 from fba.face.eyeball import sphere
 from fba.face.importers.assembly._profile import profile_points
-from fba.face.importers.assembly._warping import warped
+from fba.face.importers.assembly._warping import warp_points
 from fba.face.importers.assembly.pieces import Piece
 from fba.parameters import faps
 
@@ -47,7 +47,7 @@ def find_points(pieces: Sequence[Piece], path: str) -> Float64:
     for name, side in (("3.5", "left"), ("3.6", "right")):
         found[name] = eyes[side][2]
     found |= profile_points(skin[0].part, found)
-    return warped(pieces, found | _tongue(pieces, found))
+    return warp_points(pieces, found | _tongue(pieces, found))
 
 
 def _tongue(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> dict[str, Float64]:

@@ -12,9 +12,9 @@ import numpy as np
 from fba.arrays import Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.assembly._winding import outward
+from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.default_materials import with_looks
-from fba.face.importers.assembly.pieces import Piece, assembled, moved
+from fba.face.importers.assembly.pieces import Piece, assemble, shift_pieces
 from fba.face.model import FaceModel
 
 PUPILS = 0.062
@@ -28,7 +28,7 @@ FREE = ("7.1", "11.5")
 EYES = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
 
 
-def turned(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
+def turn_upright(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
     """Pieces and points of a file whose vertical axis is "y" or "z", with y up."""
     if up not in AXES:
         raise OptionError(f"up must be one of {', '.join(AXES)}, not {up!r}")
@@ -45,7 +45,7 @@ def turned(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piec
     return result, points @ matrix.T
 
 
-def finished(
+def finish_import(
     pieces: Sequence[Piece],
     points: Float64,
     vertices: Mapping[str, int],
@@ -64,15 +64,15 @@ def finished(
     """
     if not pieces:
         raise ModelError(f"{os.fspath(path)}: there are no triangles in it")
-    pieces, points = turned(pieces, points, up)
+    pieces, points = turn_upright(pieces, points, up)
     size, how = metres_per_unit(points, unit)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
     middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else 0.0
     origin = pupils.mean(axis=0) if np.isfinite(pupils).all() else np.zeros(3)
-    parts = [moved(piece, size, -origin * size) for piece in assembled(pieces, kinds, middle=middle)]
+    parts = [shift_pieces(piece, size, -origin * size) for piece in assemble(pieces, kinds, middle=middle)]
     # a point in the middle of the head, behind the pupils or the lids
     eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
-    parts, over = outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
+    parts, over = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
     placed = (points - origin) * size
     parts = with_looks(parts, placed)
     bound = bound_by_number(parts, vertices)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError
 from fba.face.importers.assembly._kinds import DROPPED, checked_kinds, kind_of
-from fba.face.importers.assembly.polygon_parts import shell_labels
+from fba.face.importers.assembly.polygon_parts import vertex_components
 from fba.face.model import Part
 
 EYE_ROUND = 0.1
@@ -24,7 +24,7 @@ EYE_SIZES = (0.02, 0.12)
 class Piece:
     """A piece of a mesh file, not yet a part.
 
-    part: name and geometry; its kind does not count before `assembled`. material: the material's name in
+    part: name and geometry; its kind does not count before `assemble`. material: the material's name in
     the file. origin: int32 (V,), its vertices' numbers in the file, -1 where they have none. morphs:
     float32 (V, 3) displacements by the name of a shape.
     """
@@ -35,7 +35,7 @@ class Piece:
     morphs: Mapping[str, Float32] = field(default_factory=dict)
 
 
-def assembled(
+def assemble(
     pieces: Sequence[Piece], kinds: Mapping[str, str] | None = None, *, middle: float = 0.0
 ) -> tuple[Piece, ...]:
     """Parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and lower.
@@ -67,7 +67,7 @@ def assembled(
     return _joined_by_kind([(p, kind or "other") for p, kind in guessed], middle)
 
 
-def moved(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
+def shift_pieces(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
     """The piece scaled, then shifted."""
     vertices = piece.part.vertices.astype(np.float64) * scale + np.asarray(shift)
     part = replace(piece.part, vertices=vertices.astype(np.float32))
@@ -86,7 +86,8 @@ def _with_eyes(
     tall = max(float(np.ptp(heights)), 1e-9)
     round_: list[tuple[int, int, Float64, float]] = []
     labels = [
-        shell_labels(piece.part.triangles, len(piece.part.vertices), piece.part.vertices) for piece in pieces
+        vertex_components(piece.part.triangles, len(piece.part.vertices), piece.part.vertices)
+        for piece in pieces
     ]
     for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
         sizes = np.bincount(label)
@@ -156,7 +157,7 @@ def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], bool]) -> list[Pi
     result = []
     for piece in pieces:
         vertices = piece.part.vertices
-        label = shell_labels(piece.part.triangles, len(vertices), vertices)
+        label = vertex_components(piece.part.triangles, len(vertices), vertices)
         mask = np.zeros(len(vertices), dtype=np.bool_)
         for shell in range(int(label.max()) + 1):
             inside = label == shell

@@ -67,7 +67,7 @@ def make_part(
     return Source(part, origin)
 
 
-def shells(polygons: Polygons) -> list[Bool]:
+def polygon_components(polygons: Polygons) -> list[Bool]:
     """Masks bool (F,) of the polygons of each connected shell, by lowest vertex number."""
     sizes = np.diff(polygons.starts)
     first = np.repeat(polygons.corners[polygons.starts[:-1]], sizes)
@@ -76,7 +76,7 @@ def shells(polygons: Polygons) -> list[Bool]:
     return [of_face == shell for shell in np.unique(of_face)]
 
 
-def shell_labels(triangles: Int32, count: int, vertices: Float32) -> Intp:
+def vertex_components(triangles: Int32, count: int, vertices: Float32) -> Intp:
     """(count,) shell of each vertex, vertices at the same place taken as one (seams of textures)."""
     _, same = np.unique(vertices, axis=0, return_inverse=True)
     place = same.reshape(-1)

@@ -11,10 +11,10 @@ from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import beside, number, whole_number, words
+from fba.mesh.text_files import find_beside, parse_integer, parse_number, read_words
 
 
-def fitted(path: Path, base: Float64) -> Polygons:
+def fit_clothes(path: Path, base: Float64) -> Polygons:
     """The mesh of an .mhclo file, placed on a base mesh (V, 3), in the base mesh's units.
 
     Each line after `verts` is either one vertex of the base, or three vertices, their weights and an
@@ -25,13 +25,13 @@ def fitted(path: Path, base: Float64) -> Polygons:
     mesh = None
     rows: list[Float64] = []
     reading = False
-    for where, tokens in words(path):
+    for where, tokens in read_words(path):
         if tokens[0] == "obj_file" and len(tokens) > 1:
-            mesh = beside(path, tokens[1])
+            mesh = find_beside(path, tokens[1])
         elif tokens[0] in ("x_scale", "y_scale", "z_scale") and len(tokens) == 4:
             axis = "xyz".index(tokens[0][0])
             ends = [_vertex(token, base, where) for token in tokens[1:3]]
-            rest = number(tokens[3], where, "a distance")
+            rest = parse_number(tokens[3], where, "a distance")
             if rest <= 0:
                 raise ModelError(f"{where}: the distance of {tokens[0]} must be positive, not {tokens[3]}")
             scale[axis] = abs(base[ends[0], axis] - base[ends[1], axis]) / rest
@@ -50,7 +50,7 @@ def fitted(path: Path, base: Float64) -> Polygons:
 
 
 def _vertex(token: str, base: Float64, where: str) -> int:
-    index = whole_number(token, where, "a vertex of the base mesh")
+    index = parse_integer(token, where, "a vertex of the base mesh")
     if not 0 <= index < len(base):
         raise ModelError(f"{where}: vertex {index} of the base mesh does not exist; it has {len(base)}")
     return index
@@ -62,8 +62,8 @@ def _place(tokens: list[str], base: Float64, scale: Float64, where: str) -> Floa
     if len(tokens) < 6:
         raise ModelError(f"{where}: one vertex, or three and their weights, are needed, not {len(tokens)}")
     corners = [_vertex(token, base, where) for token in tokens[:3]]
-    weights = [number(token, where, "a weight") for token in tokens[3:6]]
-    offset = [number(token, where, "an offset") for token in tokens[6:9]] or [0.0, 0.0, 0.0]
+    weights = [parse_number(token, where, "a weight") for token in tokens[3:6]]
+    offset = [parse_number(token, where, "an offset") for token in tokens[6:9]] or [0.0, 0.0, 0.0]
     if len(offset) != 3:
         raise ModelError(f"{where}: an offset has three numbers, not {len(offset)}")
     return np.asarray(weights @ base[corners] + np.array(offset) * scale, dtype=np.float64)

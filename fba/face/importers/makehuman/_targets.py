@@ -11,7 +11,7 @@ import numpy as np
 from fba.arrays import Float32, Float64
 from fba.errors import ModelError
 from fba.face.importers.makehuman.makehuman import EYES, METRES, MakeHumanHead, eye_pieces
-from fba.mesh.text_files import number, whole_number, words
+from fba.mesh.text_files import parse_integer, parse_number, read_words
 
 FOLDERS = ("expression-units", "targets/expression/units/caucasian", "../targets/expression/units/caucasian")
 """Where MakeHuman's expression units lie, seen from the base mesh."""
@@ -24,15 +24,15 @@ def read_target(path: str | os.PathLike[str], vertices: int) -> Float64:
     """
     moved = np.zeros((vertices, 3))
     seen = 0
-    for where, tokens in words(path):
+    for where, tokens in read_words(path):
         if len(tokens) != 4:
             raise ModelError(
                 f"{where}: a vertex and three numbers are expected, not {' '.join(tokens)[:60]!r}"
             )
-        vertex = whole_number(tokens[0], where, "a vertex")
+        vertex = parse_integer(tokens[0], where, "a vertex")
         if not 0 <= vertex < vertices:
             raise ModelError(f"{where}: vertex {vertex} does not exist; the base mesh has {vertices}")
-        moved[vertex] = [number(token, where, "a coordinate") for token in tokens[1:]]
+        moved[vertex] = [parse_number(token, where, "a coordinate") for token in tokens[1:]]
         seen += 1
     if not seen:
         raise ModelError(f"{os.fspath(path)}: moves no vertex")

@@ -21,12 +21,12 @@ from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.default_materials import LOOKS
-from fba.face.importers.assembly.polygon_parts import Source, make_part, shells
-from fba.face.importers.makehuman._mhclo import fitted
+from fba.face.importers.assembly.polygon_parts import Source, make_part, polygon_components
+from fba.face.importers.makehuman._mhclo import fit_clothes
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import Polygons
-from fba.mesh.text_files import beside, whole
+from fba.mesh.text_files import find_beside, read_bytes
 
 METRES = 0.1
 """Metres per unit of the base mesh."""
@@ -175,7 +175,7 @@ def _skin(base: Polygons) -> Source:
 
 def _eyes(file: Path, base: Polygons) -> list[Source]:
     """Left and right eyeball, of the fitted eyes where they are there."""
-    clothes = beside(file, EYES)
+    clothes = find_beside(file, EYES)
     if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
         return [
@@ -187,9 +187,11 @@ def _eyes(file: Path, base: Polygons) -> list[Source]:
 
 def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
     """Left and right eyeball of the eyes in an .mhclo file, fitted to a base mesh (V, 3)."""
-    eyes = fitted(clothes, base)
-    picture = beside(clothes, "brown_eye.png")
-    material = Material("eye", (1.0, 1.0, 1.0), 0.1, whole(picture)) if picture is not None else LOOKS["eye"]
+    eyes = fit_clothes(clothes, base)
+    picture = find_beside(clothes, "brown_eye.png")
+    material = (
+        Material("eye", (1.0, 1.0, 1.0), 0.1, read_bytes(picture)) if picture is not None else LOOKS["eye"]
+    )
     sources = []
     for name, side in (("left eye", 1.0), ("right eye", -1.0)):
         source = make_part(eyes, _eyeball(eyes, side), name, "eye", scale=METRES, material=material)
@@ -200,7 +202,7 @@ def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
 def _eyeball(eyes: Polygons, side: float) -> Bool:
     """The faces of one eyeball; the transparent cornea before it, a shell of its own, is left out."""
     best = None
-    for faces in shells(eyes):
+    for faces in polygon_components(eyes):
         vertices = eyes.vertices[eyes.used(faces)]
         if vertices[:, 0].mean() * side > 0 and (best is None or vertices[:, 2].max() < best[0]):
             best = (float(vertices[:, 2].max()), faces)

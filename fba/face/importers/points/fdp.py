@@ -14,9 +14,9 @@ import numpy as np
 from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp_data import Fdp, on_their_sides
+from fba.face.importers.points.fdp_data import Fdp, repair_sides_with_warning
 from fba.face.importers.points.xface import load_xface, xface_points
-from fba.mesh.text_files import number, whole, whole_number, words
+from fba.mesh.text_files import parse_integer, parse_number, read_bytes, read_words
 
 
 def read_fdp(path: str | os.PathLike[str]) -> Float64:
@@ -35,7 +35,7 @@ def read_fdp(path: str | os.PathLike[str]) -> Float64:
 def load_fdp(path: str | os.PathLike[str]) -> Fdp:
     """All that an FDP file says, points put right as `read_fdp` does; ModelError where damaged."""
     name = os.fspath(path)
-    if whole(name)[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
+    if read_bytes(name)[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         return load_xface(name)
     return _load_text(name)
 
@@ -45,7 +45,7 @@ def _load_text(path: str) -> Fdp:
     vertices: dict[str, tuple[str, int]] = {}
     strange: list[str] = []
     header = False
-    for where, tokens in words(path):
+    for where, tokens in read_words(path):
         if not header:
             if len(tokens) < 2 or not tokens[0].startswith("1."):
                 raise ModelError(
@@ -64,10 +64,10 @@ def _load_text(path: str) -> Fdp:
             point = tokens[0]
             if np.isfinite(points[row_of()[point]]).any():
                 raise ModelError(f"{where}: feature point {point} comes twice")
-            points[row_of()[point]] = [number(token, where, "a coordinate") for token in tokens[1:4]]
+            points[row_of()[point]] = [parse_number(token, where, "a coordinate") for token in tokens[1:4]]
             if len(tokens) == 5:
                 mesh, _, vertex = tokens[4].partition(".")
-                index = whole_number(vertex, where, "the vertex in MESH.VERTEX")
+                index = parse_integer(vertex, where, "the vertex in MESH.VERTEX")
                 if index >= 0:
                     vertices[point] = (mesh, index)
     if not np.isfinite(points).any():
@@ -78,4 +78,4 @@ def _load_text(path: str) -> Fdp:
             FbaWarning,
             stacklevel=4,
         )
-    return Fdp(path, "text", on_their_sides(points, path, stacklevel=4), vertices)
+    return Fdp(path, "text", repair_sides_with_warning(points, path, stacklevel=4), vertices)

@@ -61,9 +61,9 @@ class Fdp:
     influences: tuple[Influence, ...] = ()
 
 
-def on_their_sides(points: Float64, path: str, *, stacklevel: int = 2) -> Float64:
+def repair_sides_with_warning(points: Float64, path: str, *, stacklevel: int = 2) -> Float64:
     """Points on the wrong side mirrored, changed places changed back; an FbaWarning names them."""
-    right, swaps, mirrored = sides(points)
+    right, swaps, mirrored = repair_sides(points)
     changed = [f"{a} and {b} have changed places" for a, b in swaps]
     changed += [f"{name} is on the other side" for name in mirrored]
     if changed:
@@ -76,7 +76,7 @@ def on_their_sides(points: Float64, path: str, *, stacklevel: int = 2) -> Float6
     return right
 
 
-def sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[str]]:
+def repair_sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[str]]:
     """Points (84, 3) on their sides of the face; the pairs that had changed places, and those mirrored.
 
     As they are where most pairs have no left and right in x: then the axes are others than the standard's.

@@ -16,7 +16,7 @@ from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.points.fdp import load_fdp
 from fba.face.importers.points.xface import xface_points
-from fba.mesh.text_files import lines, number, whole, whole_number
+from fba.mesh.text_files import parse_integer, parse_number, read_bytes, read_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def read_points(path: str | os.PathLike[str]) -> GivenPoints:
     suffix = os.path.splitext(name)[1].lower()
     if suffix == ".json":
         try:
-            content = json.loads(whole(name))
+            content = json.loads(read_bytes(name))
         except (ValueError, RecursionError) as error:
             raise ModelError(f"{name}: is not JSON: {error}") from error
         if isinstance(content, dict) and isinstance(content.get("points"), dict):
@@ -86,7 +86,7 @@ def _from_csv(path: str) -> GivenPoints:
     points = np.full((len(names()), 3), np.nan)
     vertices: dict[str, int] = {}
     first = True
-    for line, text in lines(path):
+    for line, text in read_lines(path):
         where = f"{path}:{line}"
         bare = text.split("#", 1)[0].strip()
         if not bare:
@@ -102,9 +102,9 @@ def _from_csv(path: str) -> GivenPoints:
         if name in vertices or np.isfinite(points[row_of()[name]]).any():
             raise ModelError(f"{where}: feature point {name} comes twice")
         if len(tokens) == 2:
-            vertices[name] = whole_number(tokens[1], where, "a vertex")
+            vertices[name] = parse_integer(tokens[1], where, "a vertex")
         elif len(tokens) == 4:
-            points[row_of()[name]] = [number(token, where, "a coordinate") for token in tokens[1:]]
+            points[row_of()[name]] = [parse_number(token, where, "a coordinate") for token in tokens[1:]]
         else:
             raise ModelError(f"{where}: 'name,x,y,z' or 'name,vertex' is expected, not {bare[:60]!r}")
     return _filled(GivenPoints(points, vertices), path)

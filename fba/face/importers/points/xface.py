@@ -10,8 +10,8 @@ import numpy as np
 from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp_data import Fdp, Influence, XfaceMesh, on_their_sides
-from fba.mesh.text_files import beside, number, whole, whole_number
+from fba.face.importers.points.fdp_data import Fdp, Influence, XfaceMesh, repair_sides_with_warning
+from fba.mesh.text_files import find_beside, parse_integer, parse_number, read_bytes
 from fba.mesh.vrml import read_vrml
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
@@ -22,7 +22,7 @@ NEUTRAL = "Rest"
 
 def load_xface(path: str) -> Fdp:
     """An Xface file; positions are NaN until `xface_points` looks them up. ModelError where damaged."""
-    data = whole(path)
+    data = read_bytes(path)
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise ModelError(f"{path}: declares a DOCTYPE or entities, which Xface files have no need of")
     try:
@@ -36,7 +36,7 @@ def load_xface(path: str) -> Fdp:
         {}
         if units is None
         else {
-            name: number(units.get(name, ""), path, f"{name} of <fapu>")
+            name: parse_number(units.get(name, ""), path, f"{name} of <fapu>")
             for name in DISTANCES
             if name in units.attrib
         }
@@ -56,9 +56,9 @@ def load_xface(path: str) -> Fdp:
         name, mesh_name = element.get("name", ""), element.get("affects", "")
         if name not in row_of():
             raise ModelError(f"{where}: there is no feature point {name[:40]!r}")
-        index = whole_number(element.get("index", ""), where, "index, the vertex of the point,")
+        index = parse_integer(element.get("index", ""), where, "index, the vertex of the point,")
         inside = [
-            whole_number(token, where, "an index of a vertex")
+            parse_integer(token, where, "an index of a vertex")
             for block in element.findall("indices")
             for token in (block.text or "").split()
         ]
@@ -68,10 +68,10 @@ def load_xface(path: str) -> Fdp:
         vertices.setdefault(name, (mesh_name, index))
         for influence in element.findall("influence"):
             # these files count FAPs from 0
-            fap = whole_number(influence.get("fap", ""), where, "fap of <influence>") + 1
+            fap = parse_integer(influence.get("fap", ""), where, "fap of <influence>") + 1
             if not FIRST_LOW_LEVEL_FAP <= fap <= FAP_COUNT:
                 raise ModelError(f"{where}: fap {fap - 1} of <influence> does not exist (counted from 0)")
-            weight = number(influence.get("weight", ""), where, "weight of <influence>")
+            weight = parse_number(influence.get("weight", ""), where, "weight of <influence>")
             shape = influence.get("type", "")
             influences.append(Influence(fap, shape, weight, mesh_name, index, tuple(inside)))
     if not vertices:
@@ -91,7 +91,7 @@ def xface_submeshes(fdp: Fdp) -> dict[str, tuple[Path, int]]:
         file, _, place = submesh.rpartition("_")
         if not file or not place.isascii() or not place.isdigit() or len(place) > 6:
             raise ModelError(f"{fdp.path}: {submesh[:40]!r} is not named FILE_NUMBER, as a submesh is")
-        mesh = beside(fdp.path, file)
+        mesh = find_beside(fdp.path, file)
         if mesh is None:
             missing.add(file)
         else:
@@ -118,4 +118,4 @@ def xface_points(fdp: Fdp) -> Float64:
                 "which does not exist; is it the mesh this file was made for?"
             )
         points[row_of()[name]] = shapes[place].vertices[vertex]
-    return on_their_sides(points, fdp.path, stacklevel=4)
+    return repair_sides_with_warning(points, fdp.path, stacklevel=4)
