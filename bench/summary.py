@@ -166,7 +166,7 @@ ROWS = (
     ),
     Row(
         "the same",
-        "rest position and every FAP; its irises, lips and tongue rest otherwise than the standard's",
+        "rest position and every FAP; irises, lips and tongue rest in other positions than the standard's",
         "{errors} errors, {warnings} warnings",
         "test_results.py::test_validation[MakeHuman]",
         "fba model validate base.obj",

@@ -93,7 +93,7 @@ def print_model(model: FaceModel) -> None:
     for key, text in model.notes.items():
         click.echo(f"  {key:<8} {text}")
     if model.fit is not None:
-        click.echo("  FIT      its own; unsent FAPs follow from sent ones by it")
+        click.echo("  FIT      its own table, by which unsent FAPs are estimated")
     bound = int((model.bound >= 0).sum())
     click.echo(
         f"  points   {len(model.points) - len(model.missing)} of {len(model.points)}, {bound} on a vertex"
@@ -159,7 +159,7 @@ def print_findings(name: str, findings: Sequence[Finding]) -> None:
             table.add_row(Text(finding.severity, style=style), *map(Text, cells))
         Console(width=None if Console().is_terminal else 160, highlight=False).print(table)
     counts = f"{_count(len(errors), 'error')}, {_count(len(warnings), 'warning')}"
-    click.echo(f"{name}: {counts if findings else 'as the standard wants it'}")
+    click.echo(f"{name}: {counts if findings else 'meets the standard'}")
 
 
 def _count(number: int, word: str) -> str:

@@ -164,7 +164,7 @@ def writer_of(path: Path, to: str | None) -> Format:
     from fba.formats import writer_for
 
     if path == STANDARD and to is None:
-        raise click.UsageError("say with --to in which format to write to standard output, as in --to fap")
+        raise click.UsageError("name the format for standard output with --to, as in --to fap")
     return writer_for(path, to)
 
 

@@ -65,7 +65,7 @@ def _fap(text: str) -> tuple[int, int]:
     else:
         raise click.UsageError(
             f"--fap {text}: there is no FAP {name!r}{_near(name, list(numbers))}; "
-            f"they have names, or numbers {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}"
+            f"give a name or a number {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}"
         )
     try:
         value = int(amount)

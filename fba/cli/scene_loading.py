@@ -42,7 +42,7 @@ def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Show
     bap_steps, fps, salvage = how.bap_steps, how.fps, how.salvage
     name = "standard input" if str(file) == "-" else file.name
     if str(file) == "-" and sys.stdin.isatty():
-        raise click.UsageError("- is standard input, which is the keyboard here: pipe a stream into it")
+        raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
         animation = options.read_input(
             file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, said=said, format=how.format
@@ -54,7 +54,7 @@ def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Show
         while len(head) < 4 and (more := source.read1(1 << 16)):  # type: ignore[attr-defined]
             head += more
         if not head:
-            raise FormatError("is empty: it ended before its first byte", path=name)
+            raise FormatError("is empty", path=name)
         if not head.startswith(STREAMS):
             return _spooled(head, source, name, how), False
         from fba_player.playback.live import LiveAnimation, wait_for
@@ -105,7 +105,7 @@ def voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | 
     """
     found = _voice(files, sound, without)
     if found is None and sound.audio_offset:
-        raise click.UsageError("--audio-offset moves a sound, and there is none: give one with --audio")
+        raise click.UsageError("--audio-offset needs a sound: give one with --audio")
     return found
 
 

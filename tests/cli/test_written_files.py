@@ -97,7 +97,7 @@ def test_another_body_and_axes(run: Run, tmp_path: Path, stream: Path) -> None:
         (["--fap", "a.fap", "--unit", "m"], "--unit says how to write --output; give that too"),
         (["--fap", "a.fap", "--to", "bvh"], "--to says how to write --output"),
         (["-o", "a.fba"], "fba convert and fba encode write them"),
-        (["-o", "."], "say with --to what to write there"),
+        (["-o", "."], "name the format with --to"),
         ([], "--fap, --bap, --epf, --output"),
     ],
 )

@@ -155,7 +155,7 @@ def _targets(
             targets.append(_Target(flag, place, f".{name}", writing))
     if output is not None:
         if output != STANDARD and output.is_dir() and to is None:
-            raise click.UsageError(f"{output} is a folder; say with --to what to write there, as in --to bvh")
+            raise click.UsageError(f"{output} is a folder; name the format with --to, as in --to bvh")
         writing = writer_of(output, to)
         if writing.name == "fba":
             others = options.as_typed("fba convert and fba encode")

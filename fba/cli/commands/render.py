@@ -234,7 +234,7 @@ class _Target:
             return _Target(output, pictures.folder, "", pictures)
         path = OutputType().convert(output, None, None)
         if path == STANDARD and to is None:
-            raise click.UsageError(f"say with --to what to write to standard output: {', '.join(KINDS)}")
+            raise click.UsageError(f"name the format for standard output with --to: {', '.join(KINDS)}")
         return _Target(output, path, f".{to}" if to is not None else path.suffix.lower())
 
     @property
