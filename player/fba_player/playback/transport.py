@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import time as wall
 from collections.abc import Callable
-from typing import Protocol
 
 from fba_player.playback.playhead import Motion
 from fba_player.playback.timecode import clock_text, timecode
@@ -23,28 +22,12 @@ AT_ONCE = 0.1
 """A mark set so shortly (s) before where the player is was meant to be there."""
 
 
-class Played(Times, Protocol):
-    """The frames of a performance that is played."""
-
-    interpolate: bool
-    """Whether what is shown between two frames lies between them."""
-
-    @property
-    def growing(self) -> bool:
-        """Whether more frames may arrive."""
-
-    @property
-    def arrived(self) -> int:
-        """Changes whenever some did, and when no more will."""
-
-
 class Transport:
     """The position in a performance.
 
     timeline: gives the start, the end and the frames' own times; it may grow (`fba_player.playback.live`).
-    clock: seconds
-    from any origin, never going back; the process's monotonic clock by default, see `use_clock`. Times are
-    seconds of the animation.
+    clock: seconds from any origin, never going back; the process's monotonic clock by default, see
+    `use_clock`. Times are seconds of the animation.
 
     Starts paused at the first frame. At the end it goes back to the start where `loop` is set, else it
     stops on the last frame. Marks narrow both down: `mark_out` is where it turns back or stops, `mark_in`
@@ -55,7 +38,7 @@ class Transport:
     """
 
     def __init__(
-        self, timeline: Played, *, loop: bool = True, clock: Callable[[], float] = wall.monotonic
+        self, timeline: Times, *, loop: bool = True, clock: Callable[[], float] = wall.monotonic
     ) -> None:
         self._timeline = timeline
         self._clock = clock

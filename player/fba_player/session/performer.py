@@ -11,6 +11,8 @@ import numpy as np
 from fba.animation import Animation
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.playback.timeline import Timeline
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
 from fba_player.session.puppet import Baps, Faps, Puppet
 from fba_player.session.takes import TakeRecorder, Takes, take_rate
 
@@ -31,7 +33,8 @@ class Performer:
 
     def __init__(self, session: Session, folder: str | os.PathLike[str] | None = None) -> None:
         self.session = session
-        self.puppet = Puppet(getattr(getattr(session.scene, "model", None), "definitions", None))
+        scene = session.scene
+        self.puppet = Puppet(scene.model.definitions if isinstance(scene, Scene | CompareScene) else None)
         self.takes = Takes(folder)
         self._recorder: TakeRecorder | None = None
         self._shown: Timeline | None = None

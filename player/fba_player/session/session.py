@@ -12,13 +12,14 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
 from fba_player.playback.transport import Transport
+from fba_player.scene.scene import Scene
 from fba_player.session._camera_controller import Viewpoint
 from fba_player.session.keys import by_name
 from fba_player.session.source import Source
@@ -101,8 +102,7 @@ class Session:
         clock: Callable[[], float] = wall.monotonic,
     ) -> None:
         self.scene = scene
-        timeline: Any = scene.timeline
-        self.transport = transport or Transport(timeline)
+        self.transport = transport or Transport(scene.timeline)
         self.source = source or Source(scene)
         self.size = size
         self.scale = scale
@@ -216,24 +216,23 @@ class Session:
 
     def view(self, time: float) -> View:
         """What is drawn at a time, after `before_frame`."""
-        timeline: Any = self.scene.timeline
-        of: Callable[[Faps, Baps], View] | None = getattr(self.scene, "of", None)
-        if not self.before_frame or of is None:
-            return self.scene.at(time)
-        faps, baps = timeline.faps(time).copy(), timeline.baps(time).copy()
+        scene = self.scene
+        if not self.before_frame or not isinstance(scene, Scene):
+            return scene.at(time)
+        faps, baps = scene.timeline.faps(time).copy(), scene.timeline.baps(time).copy()
         for hook in tuple(self.before_frame):
             hook(faps, baps)
         self.values = (faps, baps)
-        return of(faps, baps)
+        return scene.of(faps, baps)
 
     def toggle_view(self) -> None:
         """Feature points and bones instead of the figure, or back; nothing where there is no such view."""
-        if hasattr(self.scene, "view"):
+        if isinstance(self.scene, Scene):
             self.scene.view = "figure" if self.scene.view == "points" else "points"
 
     def switch_table(self) -> Mapping[str, Switch]:
-        """The scene's switches by name; empty where it has none."""
-        return SWITCHES if hasattr(self.scene, "switches") else {}
+        """The scene's switches by name."""
+        return SWITCHES
 
     def switch_key(self, switch: Switch) -> str:
         """The key of a switch; "" where it has none, or where the window needs that key itself."""

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 
 from fba.animation import Animation
 from fba.errors import FbaError
+from fba_player.playback.live import LiveAnimation
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
 from fba_player.session.timeline_trace import trace_of_motion, trace_of_planes
 
 if TYPE_CHECKING:
@@ -44,9 +47,10 @@ class Source:
         self._probed: StreamInfo | None = None
         self._own: StreamInfo | None = None
         self._of = ("animation", 0)
-        animation = getattr(scene, "animation", None)
-        several = hasattr(scene, "scenes")
-        self._live: Callable[[], StreamInfo] | None = None if several else getattr(animation, "info", None)
+        animation: object = scene.animation if isinstance(scene, Scene) else None
+        self._live: Callable[[], StreamInfo] | None = None
+        if isinstance(animation, LiveAnimation):
+            self._live = animation.info
         self._told = -REFRESH
         self._traced: StreamInfo | None = None
         self._trace: Trace | None = None
@@ -63,10 +67,9 @@ class Source:
         if self._probed is not None:
             return self._probed
         own, timeline, now = self._own, self._scene.timeline, wall.monotonic()
-        if own is None or own.frames != timeline.frames:
-            growing = bool(getattr(timeline, "growing", False))
-            if own is None or not growing or now - self._told >= REFRESH:
-                self._own, self._told = self._of_scene(), now
+        due = not timeline.growing or now - self._told >= REFRESH
+        if own is None or (own.frames != timeline.frames and due):
+            self._own, self._told = self._of_scene(), now
         assert self._own is not None
         return self._own
 
@@ -97,7 +100,7 @@ class Source:
 
         if self._live is not None:
             return self._live()
-        animation, times = getattr(self._scene, "animation", None), self._scene.timeline
+        animation, times = self._animation(), self._scene.timeline
         if isinstance(animation, Animation) and len(animation) == times.frames:
             return StreamInfo.of_animation(animation, *self._of)
         return StreamInfo(
@@ -112,6 +115,9 @@ class Source:
             body=None,
         )
 
+    def _animation(self) -> object:
+        return self._scene.animation if isinstance(self._scene, Scene | CompareScene) else None
+
     def _probe(self) -> None:
         from fba.formats import format_of, probe
 
@@ -124,7 +130,7 @@ class Source:
         except (FbaError, OSError) as error:
             self.warnings.append(f"what the file holds cannot be read: {error}")
         trace = trace_of_planes(self.info)
-        animation = getattr(self._scene, "animation", None)
+        animation = self._animation()
         if trace is None and isinstance(animation, Animation):
             trace = trace_of_motion(animation)
         self._trace = trace

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from fba_player.playback.live import LiveAnimation
 from fba_player.playback.timecode import clock_text
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui._docks import EDGE
@@ -39,7 +42,9 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4 + taken, EDGE + 7
     name = session.source.name or session.scene.title
-    facts = getattr(getattr(session.scene, "animation", None), "message", "") or _facts(session)
+    scene = session.scene
+    animation: object = scene.animation if isinstance(scene, Scene) else None
+    facts = (animation.message if isinstance(animation, LiveAnimation) else "") or _facts(session)
     if imgui.calc_text_size(name + facts).x + x > room:
         facts = ""
     while name and imgui.calc_text_size(name).x + x > room:
@@ -120,7 +125,7 @@ def draw_notices(session: Session, display: tuple[float, float], above: float) -
 
 
 def _facts(session: Session) -> str:
-    if hasattr(session.scene, "scenes"):
+    if isinstance(session.scene, CompareScene):
         return ""  # each has its own
     info = session.source.info
     parts = [f"{session.scene.timeline.frames} frames", f"{float(session.scene.timeline.rate):g} frames/s"]

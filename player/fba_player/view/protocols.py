@@ -37,6 +37,17 @@ class Times(Protocol):
     def duration(self) -> Fraction:
         """From start to end."""
 
+    interpolate: bool
+    """Whether what is shown between two frames lies between them."""
+
+    @property
+    def growing(self) -> bool:
+        """Whether more frames may arrive."""
+
+    @property
+    def arrived(self) -> int:
+        """Changes whenever some did, and when no more will."""
+
     def time_of(self, frame: int) -> Fraction:
         """Exact time of a frame, counted from 0."""
 
@@ -83,7 +94,7 @@ class Showable(Protocol):
 
     @property
     def timeline(self) -> Times:
-        """When what is shown."""
+        """The frames and their times."""
 
     @property
     def switches(self) -> Switches:

@@ -13,6 +13,7 @@ from fba_player.gl.context import import_moderngl
 from fba_player.gl.framebuffer import Target
 from fba_player.gl.renderer import Renderer
 from fba_player.gl.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
+from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
 from fba_player.session.captures import Keeper
 from fba_player.session.controls import Controls
@@ -66,7 +67,7 @@ class Window:
     ) -> None:
         if size[0] < 1 or size[1] < 1:
             raise ValueError(f"a window must have at least 1x1 pixels, not {size[0]}x{size[1]}")
-        timeline: Any = scene.timeline
+        timeline = scene.timeline
         self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=camera, size=size)
         self.keeper = Keeper(self.session, folder)
         self.pictures = 0
@@ -81,7 +82,7 @@ class Window:
         self._problems: list[str] = []
         self._due, self._restless = SETTLES, False
         self._timeline = timeline
-        self._arrived: int = timeline.arrived
+        self._arrived = timeline.arrived
         self._doubted = False
         self._last = wall.perf_counter()
         self._glfw = started_glfw(self._problems)
@@ -105,10 +106,10 @@ class Window:
 
     def _doubt(self) -> None:
         """Say once that a stream that is arriving looks wrong with its BAP steps."""
-        doubt = getattr(getattr(self._timeline, "animation", None), "doubt", "")
-        if doubt and not self._doubted:
+        timeline = self._timeline
+        if isinstance(timeline, LiveTimeline) and timeline.animation.doubt and not self._doubted:
             self._doubted = True
-            self.session.say(doubt, "warning", WARNED)
+            self.session.say(timeline.animation.doubt, "warning", WARNED)
 
     def update(self) -> bool:
         """Handle the input and draw one picture, or wait where nothing moves. False once closed."""

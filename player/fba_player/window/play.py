@@ -6,10 +6,12 @@ import contextlib
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fba.animation import Animation
 from fba.atomic import PathLike
+from fba_player.export.render import as_scene
+from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.session.source import Source
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def play(
-    animation: Animation | Showable,
+    animation: Animation | LiveAnimation | Showable,
     *,
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),
@@ -58,7 +60,11 @@ def play(
     """
     if not math.isfinite(audio_offset):
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
-    scene: Any = animation if hasattr(animation, "timeline") else Scene(animation)
+    scene: Showable
+    if isinstance(animation, LiveAnimation):
+        scene = Scene(animation, timeline=LiveTimeline(animation))  # type: ignore[arg-type]
+    else:
+        scene = as_scene(animation)
     source = Source(scene, file, bap_steps=bap_steps, warnings=warnings)
     with Window(scene, title=title, size=size, camera=camera, loop=loop, source=source) as window:
         window.transport.set_speed(speed)

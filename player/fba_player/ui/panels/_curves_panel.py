@@ -7,6 +7,8 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels._curve_data import Columns, amount, parameter
@@ -44,7 +46,7 @@ class CurvesPanel(Panel):
 
     def draw(self, session: Session) -> None:
         """Draw it."""
-        names = getattr(session.scene, "names", ())
+        names = session.scene.names if isinstance(session.scene, CompareScene) else ()
         if len(names) > 1:
             self.which = chosen_name("##which", names, min(self.which, len(names) - 1))
         columns = self._known(session)
@@ -70,9 +72,11 @@ class CurvesPanel(Panel):
     def _known(self, session: Session) -> Columns:
         timeline = _timeline(session, self.which)
         if self._columns is None or self._of is not timeline:
-            later = getattr(session.scene.timeline, "later", (0,))[self.which]
-            scene = getattr(session.scene, "scenes", (session.scene,))[self.which]
-            self._columns = Columns(timeline, getattr(scene, "model", None), float(later))
+            scene: Any = session.scene
+            several = isinstance(scene, CompareScene)
+            later = scene.timeline.later[self.which] if several else 0
+            model = scene.scenes[self.which].model if several else scene.model
+            self._columns = Columns(timeline, model, float(later))
             self._of, self._begun = timeline, False
         if self._columns.advance():
             session.rolling.add(self.name)
@@ -105,9 +109,10 @@ class CurvesPanel(Panel):
 
 def _timeline(session: Session, which: int = 0) -> Any:
     """Of what is shown, or of one of several."""
-    scenes = getattr(session.scene, "scenes", None)
-    timeline = scenes[which].timeline if scenes else session.scene.timeline
-    return timeline if hasattr(timeline, "animation") else None
+    scene = session.scene
+    if isinstance(scene, CompareScene):
+        return scene.scenes[which].timeline
+    return scene.timeline if isinstance(scene, Scene) else None
 
 
 def _choose(session: Session, chosen: list[tuple[str, int]]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from fba.arrays import Float64
-from fba_player.scene.compare import ARRANGEMENTS
+from fba_player.scene.compare import ARRANGEMENTS, CompareScene
 from fba_player.scene.differences import Differences, Largest
 from fba_player.session.session import Session
 from fba_player.ui import theme
@@ -37,7 +37,7 @@ class DifferencesPanel(Panel):
 
     def available(self, session: Session) -> bool:
         """Where several performances are shown."""
-        return len(getattr(session.scene, "scenes", ())) > 1
+        return isinstance(session.scene, CompareScene) and len(session.scene.scenes) > 1
 
     def draw(self, session: Session) -> None:
         """Draw it."""

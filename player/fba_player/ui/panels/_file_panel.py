@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 
 from fba.codec import PartInfo, StreamInfo
 from fba_player.playback.timecode import clock_text
+from fba_player.scene.compare import CompareScene
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels.panel import Panel, facts, heading
@@ -49,7 +50,7 @@ class FilePanel(Panel):
 
 def _all(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
     """(heading, rows) of the panel."""
-    if hasattr(session.scene, "scenes"):
+    if isinstance(session.scene, CompareScene):
         return _several(session.scene)
     parts = [("", _about(session, info))]
     if info.plane_bits is not None:

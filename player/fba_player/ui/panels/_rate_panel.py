@@ -11,6 +11,8 @@ from imgui_bundle import imgui
 from fba.animation import Animation
 from fba.codec import StreamInfo
 from fba_player.playback.timecode import clock_text
+from fba_player.scene.compare import CompareScene
+from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels._bit_rates import Rates, columns, encoded, rates
@@ -48,7 +50,7 @@ class RatePanel(Panel):
 
     def available(self, session: Session) -> bool:
         """Where one performance is shown."""
-        return not hasattr(session.scene, "scenes")
+        return not isinstance(session.scene, CompareScene)
 
     def draw(self, session: Session) -> None:
         """Draw it."""
@@ -85,7 +87,7 @@ class RatePanel(Panel):
             return info, ""
         if session.source.looking:
             return None, "Reading..."
-        animation = getattr(session.scene, "animation", None)
+        animation = session.scene.animation if isinstance(session.scene, Scene) else None
         if not isinstance(animation, Animation):
             return None, "There are no planes."
         if self._would is None or self._would[0] is not animation:

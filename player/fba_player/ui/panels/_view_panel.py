@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
+from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui.panels.panel import Panel, heading, tooltip
 from fba_player.view.switches import Switch, Switches
@@ -18,7 +19,7 @@ class ViewPanel(Panel):
 
     def draw(self, session: Session) -> None:
         scene = session.scene
-        if hasattr(scene, "view"):
+        if isinstance(scene, Scene):
             heading("Shown as")
             for number, (name, text) in enumerate((("figure", "figure"), ("points", "points and bones"))):
                 if number:

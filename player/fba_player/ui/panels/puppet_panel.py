@@ -7,6 +7,7 @@ import shlex
 from imgui_bundle import imgui
 
 from fba.errors import FbaError
+from fba_player.scene.scene import Scene
 from fba_player.session.performer import Performer
 from fba_player.session.session import Session
 from fba_player.ui import theme
@@ -41,7 +42,7 @@ class PuppetPanel(Panel):
 
     def available(self, session: Session) -> bool:
         """Where a single figure is shown."""
-        return hasattr(session.scene, "of")
+        return isinstance(session.scene, Scene)
 
     def performer(self, session: Session) -> Performer:
         """What it moves."""
