@@ -54,7 +54,7 @@ class Gif:
         try:
             self._pictures.write(np.ascontiguousarray(pixels[..., :3]).data)
         except OSError as error:
-            raise write_error(self._path, error, "its pictures could not be kept") from error
+            raise write_error(self._path, error, "its pictures could not be stored") from error
         self._into[0].push(self._frame(pixels, "rgba", number))
         self._numbers.append(number)
 

@@ -1,4 +1,4 @@
-"""Pictures and films of what a window shows, kept as files in the current folder."""
+"""Screenshots and films of what a window shows, saved in the current folder."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ RATE = 30
 
 
 class Keeper:
-    """Fulfils the wishes of a session for pictures and films.
+    """Takes the screenshots and records the films that a session asks for.
 
-    folder: where they go, by default the current one. Names are the file's with the frame's number; none
-    is ever overwritten.
+    folder: where they are saved, by default the current one. They are named after the file shown, and
+    screenshots after the frame too; no file is ever overwritten.
     """
 
     def __init__(self, session: Session, folder: str | os.PathLike[str] | None = None) -> None:
@@ -38,18 +38,18 @@ class Keeper:
         return self._recorder is not None
 
     def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
-        """Keep a picture, uint8 (H, W, 4), as a PNG file; None where it failed, which the user is told."""
+        """Save a picture, uint8 (H, W, 4), as a PNG file; returns its path, or None where it fails."""
         path = self._name(f"-{self.session.transport.frame + 1:04d}", ".png")
         try:
             write_picture(path, pixels, transparent=transparent)
         except (OSError, FbaError) as error:
-            self.session.say(f"The picture could not be kept: {error}", "error", 8.0)
+            self.session.say(f"The picture could not be saved: {error}", "error", 8.0)
             return None
-        self.session.say(f"Kept as {path}")
+        self.session.say(f"Saved as {path}")
         return path
 
     def toggle_recording(self) -> None:
-        """Begin a film of what is seen, or finish it."""
+        """Start recording a film, or finish it."""
         if self._recorder is not None:
             self._finish()
             return
@@ -67,7 +67,7 @@ class Keeper:
         self.session.recording = 0.0
 
     def moment(self) -> None:
-        """The next picture shows where the transport is now."""
+        """Note the film's time, and mix its sound up to here: call before each picture is drawn."""
         if self._recorder is None:
             return
         self.session.recording = self.session.clock() - self._begun
@@ -75,7 +75,7 @@ class Keeper:
             self._sound.advance(self.session.recording)
 
     def picture(self, read: Callable[[], UInt8]) -> None:
-        """The picture of the last `moment` is there; `read` gives it, uint8 (H, W, 4), where it is needed."""
+        """Add the picture drawn after the last `moment`. read: returns it, uint8 (H, W, 4)."""
         seconds = self.session.recording
         if self._recorder is None or seconds is None or not self._recorder.wants(seconds):
             return
@@ -83,10 +83,10 @@ class Keeper:
             self._recorder.add(read(), seconds, wait=False)
         except (OSError, FbaError) as error:
             self._recorder = self._sound = self.session.recording = None
-            self.session.say(f"The film was given up: {error}", "error", 8.0)
+            self.session.say(f"Recording stopped: {error}", "error", 8.0)
 
     def close(self) -> Path | None:
-        """Finish a film that is still being made; raises what went wrong, as nobody can be told later."""
+        """Finish the film that is being recorded; returns its path. Raises FbaError, OSError."""
         if self._recorder is None:
             return None
         recorder, sound = self._recorder, self._sound
@@ -97,7 +97,7 @@ class Keeper:
         return recorder.close()
 
     def _heard(self) -> FilmSound | None:
-        """The sound of the film that begins; None where there is none, which the user is told if need be."""
+        """The sound for a new film; None, with a notice where that is unexpected, where there is none."""
         session = self.session
         if session.sound is None:
             return None
@@ -118,13 +118,13 @@ class Keeper:
         try:
             path = self.close()
         except (OSError, FbaError) as error:
-            self.session.say(f"The film was given up: {error}", "error", 8.0)
+            self.session.say(f"Recording stopped: {error}", "error", 8.0)
             return
         if path is not None:
-            self.session.say(f"Kept as {path}")
+            self.session.say(f"Saved as {path}")
 
     def _name(self, what: str, suffix: str) -> Path:
-        """A name that no file has."""
+        """A path that does not exist yet."""
         stem = Path(self.session.source.name or "fba").stem
         stem = re.sub(r"[^\w. -]", "_", stem)[:60].strip(" .") or "fba"
         path, number = self.folder / f"{stem}{what}{suffix}", 2

@@ -1,4 +1,4 @@
-"""What is going on in a window: what is shown, where it is, what the user has chosen and asked for.
+"""The state of a window: the scene, the transport, the camera, what the user has selected and asked for.
 
 Panels read and change this; it knows no imgui and no OpenGL.
 """
@@ -44,9 +44,9 @@ NOTICE_GOES = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A word to the user: text; kind "done", "warning" or "error"; until, on the session's clock.
+    """A message to the user: text; kind "done", "warning" or "error"; until, on the session's clock.
 
-    about: what it tells of; a newer word about the same takes its place.
+    about: its subject; a newer notice about the same subject replaces it.
     """
 
     text: str
@@ -169,7 +169,7 @@ class Session:
         if self.unsaved and self.clock() > self._asked:
             self._asked = self.clock() + LEAVING
             what = " and ".join(sorted(self.unsaved))
-            self.say(f"Not saved: {what}. Once more to close without", "warning", LEAVING, about="leave")
+            self.say(f"Unsaved: {what}. Close again to discard", "warning", LEAVING, about="leave")
             return
         self.closing = True
 

@@ -1,4 +1,4 @@
-"""Where what is shown comes from, and what its file holds."""
+"""The file behind a scene, and its stream information."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ REFRESH = 0.2
 class Source:
     """The file behind a scene.
 
-    path: None where there is none. bap_steps: with which it was decoded. warnings: what was said while it
-    was read. `info` is what it holds: at first what the scene itself tells, once `look` is done also
-    planes, bits and damage.
+    path: None where there is no file. bap_steps: the table of BAP steps it was decoded with. warnings: those
+    given while it was read. `info` describes its content: at first from the scene alone, once `look` is done
+    with planes, bits and damage too.
     """
 
     def __init__(

@@ -105,7 +105,7 @@ class Window:
             pass
 
     def _doubt(self) -> None:
-        """Say once that a stream that is arriving looks wrong with its BAP steps."""
+        """Warn once where an arriving stream looks as if it was made with another table of BAP steps."""
         timeline = self._timeline
         if isinstance(timeline, LiveTimeline) and timeline.animation.doubt and not self._doubted:
             self._doubted = True
@@ -242,7 +242,7 @@ class Window:
         return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
 
     def _picture(self, size: tuple[int, int]) -> None:
-        """Draw; what OpenGL then complains of that cannot be mended ends the player with a word."""
+        """Draw. Raises DisplayError on an OpenGL error that cannot be recovered from."""
         try:
             self._draw(size)
             problem = self._gl.error

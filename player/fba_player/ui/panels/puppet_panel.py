@@ -272,4 +272,4 @@ def _save(session: Session, performer: Performer, name: str) -> None:
         if steps == "iso" or performer.takes.last is None or performer.takes.last.body is None
         else f". Play it with: fba play {shlex.quote(str(path))} --bap-steps {steps}"
     )
-    session.say(f"Kept as {path}{how}", seconds=8.0 if how else 4.0)
+    session.say(f"Saved as {path}{how}", seconds=8.0 if how else 4.0)
