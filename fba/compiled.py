@@ -9,18 +9,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from types import FunctionType
 from typing import Any, TypeVar, cast
-
-try:
-    from numba import config, njit
-except ImportError:  # the codec runs anywhere Python and NumPy run
-    config = njit = None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _listeners: list[Callable[[], None]] = []
+
+
+@cache
+def _numba() -> Any:
+    """The package numba, imported at the first function; None where it is missing.
+
+    `fba --help` imports this module and compiles nothing: numba would double its time.
+    """
+    try:
+        import numba
+    except ImportError:  # the codec runs anywhere Python and NumPy run
+        return None
+    return numba
 
 
 def compiled(function: Function) -> Function:
@@ -34,11 +42,12 @@ def inlined(function: Function) -> Function:
 
 
 def _compiled(function: Function, **options: bool) -> Function:
-    if njit is None:
+    numba = _numba()
+    if numba is None:
         return function
     # Nobody calls these through C: numba's wrapper for that took a quarter of the time to compile.
-    dispatcher: Any = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
-    if not config.DISABLE_JIT:
+    dispatcher: Any = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+    if not numba.config.DISABLE_JIT:
         from fba._numba_cache import MachineCode
 
         dispatcher._cache = MachineCode(cast(FunctionType, function), announce_compilation)
@@ -62,7 +71,8 @@ def _call_by_type(dispatcher: Any, arguments: Any, named: Any) -> Any:
 
 def is_compiled() -> bool:
     """Whether the hot loops run as machine code in this process."""
-    return njit is not None and not config.DISABLE_JIT
+    numba = _numba()
+    return numba is not None and not numba.config.DISABLE_JIT
 
 
 @contextmanager
