@@ -1,4 +1,4 @@
-"""Body definition parameters: what a sender says of the body that its BAPs are to move.
+"""Body definition parameters: the joint centres of the body that a sender's BAPs are meant for.
 
 Three behaviours of a decoder (digest faces-and-emotions.md, 1.4): "simple" ignores the definition and moves
 its own generic body; "calibration" scales the generic body's segments to the joint centres that were sent;
@@ -155,7 +155,7 @@ def _share(old: Float64, parents: Int64, parent: int, number: int, below: int) -
 
 
 def _aside(offset: Float64, line: Float64, new_line: Float64) -> Float64:
-    """What of an offset is not along the line, at the scale of the new line."""
+    """The component of an offset across the line, at the scale of the new line."""
     length = float(line @ line)
     if length <= 1e-12:
         return np.zeros(3)

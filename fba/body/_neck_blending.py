@@ -1,4 +1,4 @@
-"""Which of a face's vertices a body's neck carries, and how far it hides them."""
+"""Weights with which a body's neck moves a face's vertices, and the vertices that the neck hides."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MAKING = 1
 
 
 class Carried(NamedTuple):
-    """How a neck carries a face."""
+    """Weights, offset and hidden vertices of a face on a body's neck."""
 
     offset: Float64
     """(3,) metres that the face is to be moved by, so that both necks are in one place."""
@@ -171,7 +171,7 @@ def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
 
 
 def _beyond(tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64) -> Bool:
-    """(V,) places nearest to the edge and past it."""
+    """(V,) mask of the positions beyond the edge."""
     away, rows = tree.query(places)
     number = np.full(len(anchors), -1)
     number[edge] = np.arange(len(edge))

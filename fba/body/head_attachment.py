@@ -94,7 +94,7 @@ class HeadOnBody:
         return turned
 
     def frame(self, matrices: npt.ArrayLike) -> Float64:
-        """(4, 4): the face's frame into the world, for what moves with the skull alone."""
+        """(4, 4): from the face's frame to the world, for whatever moves with the skull alone."""
         skull = np.asarray(matrices, dtype=np.float64)[self._skull]
         frame: Float64 = skull @ self._inverse[self._skull] @ self.place
         return frame

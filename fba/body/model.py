@@ -171,7 +171,7 @@ class BodyModel(Meshes[BodyPart]):
 
     @cached_property
     def skinner(self) -> Skinner:
-        """What `skin` uses; made on first use."""
+        """The `Skinner` that `skin` uses; made on first use."""
         from fba.body.skin.skinning import Skinner
 
         return Skinner(
@@ -191,12 +191,12 @@ class BodyModel(Meshes[BodyPart]):
 
     @cached_property
     def weights(self) -> Float32:
-        """float32 (V, 4): how far they carry it; read-only."""
+        """float32 (V, 4): weights of those joints; read-only."""
         return join_rows([part.weights for part in self.parts])
 
 
 def is_rigid(matrix: Float64) -> bool:
-    """Whether a matrix (4, 4) is a finite place and a rotation."""
+    """Whether a matrix (4, 4) is finite and combines a rotation and a translation only."""
     if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], (0, 0, 0, 1)):
         return False
     turn = matrix[:3, :3]

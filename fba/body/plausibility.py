@@ -50,7 +50,7 @@ _ROOT = ("vertical", "lateral", "frontal")
 
 @dataclass(frozen=True)
 class Motion:
-    """What `measure` finds in a motion.
+    """Measurements of a motion.
 
     beyond: share of the frames (0..1) in which a joint is `MARGIN` or more beyond all limits. travel: metres
     a second that the root goes; along: on the ground alone. carried: metres a second that the lowest foot
@@ -142,7 +142,7 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
 
 
 def _compared(now: Motion, other: Motion) -> tuple[str, ...]:
-    """What is wrong with `now` and not with the other reading of the same motion."""
+    """The faults of `now` that the other reading of the same motion does not have."""
     findings = []
     if now.beyond - other.beyond > BEYOND:
         findings.append(f"joints beyond human limits in {100 * now.beyond:.0f} % of frames")
@@ -161,7 +161,7 @@ def _compared(now: Motion, other: Motion) -> tuple[str, ...]:
 
 
 def _samples(count: int) -> Int64:
-    """Which of so many frames are looked at: all, or runs of successive ones."""
+    """Indices of the frames to examine: all of them, or runs of successive ones."""
     if count <= SAMPLES * RUN:
         return np.arange(count)
     starts = np.linspace(0, count - RUN, SAMPLES).astype(np.int64)

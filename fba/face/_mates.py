@@ -28,7 +28,7 @@ def donors() -> tuple[Intp, ...]:
 
 
 def fill(values: npt.NDArray[np.generic], sent: Bool) -> tuple[npt.NDArray[np.generic], Bool]:
-    """Values with the unsent ones copied from their relatives, and which are known now.
+    """Values in which unsent FAPs are copied from their mates, and a mask of the values now known.
 
     values: (..., 68). sent: bool (..., 68), True where the value was sent at some time. Returns new
     arrays of the same shapes.

@@ -1,4 +1,4 @@
-"""A face in fewer bytes: numbers rounded to what a file holds briefly and nobody can see."""
+"""A smaller file for a face: numbers rounded by less than can be seen."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SHADES = 65535
 
 
 def compact(model: FaceModel) -> FaceModel:
-    """The same face, displacements of tables rounded to 2**-20 of the largest, colours to 1/65535.
+    """The face with displacements rounded to 2**-20 of the largest and colours to multiples of 1/65535.
 
     A vertex then ends less than a millionth of the way beside where it was; files get a tenth smaller or
     more. Saving never does this by itself. Vertices that a FAP moves by less than the rounding stay in

@@ -27,7 +27,7 @@ MOUTH_GROUPS = (2, 6, 8)
 
 
 class Resolver:
-    """`resolve` for a track that comes in pieces; remembers what earlier pieces sent.
+    """`resolve` for a track in pieces; remembers what earlier pieces sent.
 
     model: a face that brings `definitions` or a `fit` of its own, or None.
     """
@@ -129,7 +129,7 @@ def resolve(track: FaceTrack, model: Any = None) -> Float32:
 
 @dataclass
 class _Held:
-    """The last values sent, and which ever were."""
+    """The last values sent, and masks of those ever sent."""
 
     values: Int32 = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=np.int32))
     sent: Bool = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))

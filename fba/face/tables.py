@@ -24,7 +24,7 @@ KINDS = ("rotation", "scale", "translation")
 
 @dataclass(frozen=True, eq=False)
 class FaceDefMesh:
-    """Vertices of one part that a FAP moves, and where to.
+    """Vertices of one part that a FAP moves, and their displacements.
 
     part: its name. borders: int32 (K,), K >= 2, FAP values in rising order, exactly one of them 0.
     vertices: int32 (N,), indices into the part's vertices, each once. displacements: float32
@@ -126,7 +126,7 @@ class FaceDefTransform:
 
 @dataclass(frozen=True, eq=False)
 class FaceDefTables:
-    """All that one FAP does. fap: its number, 3..68. ModelError for another, or a part listed twice."""
+    """The effect of one FAP. fap: its number, 3..68. ModelError for another, or a part listed twice."""
 
     fap: int
     meshes: tuple[FaceDefMesh, ...] = ()

@@ -76,7 +76,7 @@ def open_document(path: Path) -> Document:
 
 
 def parse_document(data: bytes, file: str, folder: str | None = None) -> Document:
-    """The same from bytes. file: name for messages. folder: where other files may lie, None for nowhere."""
+    """A document from bytes. file: name for messages. folder: where files it refers to may lie, or None."""
     binary: memoryview | None = None
     text = memoryview(data)
     if data[:4] == glb.MAGIC:
@@ -178,7 +178,7 @@ def _beside(uri: Value, folder: str | None, most: int) -> bytes:
 
 
 def _content(path: str, most: int, *, start: bool = False) -> bytes:
-    """All bytes of a file of at most `most`; with `start`, the first `most` of a longer one."""
+    """All bytes of a file of at most `most` bytes; with `start`, the first `most` bytes of a longer one."""
     file, size = open_source(path)
     with file:
         if size > most and not start:

@@ -18,7 +18,7 @@ LEVEL = 9
 
 
 def pack(array: Array) -> bytes:
-    """The bytes of an array of 32-bit numbers, in its own order, packed."""
+    """Compressed bytes of an array of 32-bit numbers, in its own order."""
     words = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).ravel()
     planes = words.view(np.uint8).reshape(-1, 4).T
     return zlib.compress(planes.tobytes(), LEVEL)

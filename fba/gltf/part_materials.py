@@ -15,7 +15,7 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 class MeshPart(Mesh, Protocol):
-    """A mesh with its looks: a part of a face or of a body."""
+    """A mesh with material, texture coordinates and colours: a part of a face or a body."""
 
     @property
     def texcoords(self) -> Float32 | None: ...
@@ -26,7 +26,7 @@ class MeshPart(Mesh, Protocol):
 
 
 class PartWriter:
-    """Writes parts as primitives of a document; materials and textures once each."""
+    """Writes parts as primitives of a document; each material and texture once."""
 
     def __init__(self, builder: Builder) -> None:
         self._builder = builder

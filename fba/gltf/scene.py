@@ -1,4 +1,4 @@
-"""What a glTF file holds, as plain arrays: meshes, nodes, skins, materials and animations."""
+"""Meshes, nodes, skins, materials and animations of a glTF file, as plain arrays."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A place in the scene's tree.
+    """A node of the scene's tree.
 
     parent: index, or None for a root. translation (3,), rotation (4,) quaternion x y z w, scale (3,), or
     None where the file gives a matrix instead. local: float64 (4, 4), to the parent's frame. world: float64

@@ -126,7 +126,7 @@ def _moved(linear: Float64, vectors: Float32) -> Float64:
 
 
 def _turned(linear: Float64, normals: Float32) -> Float32:
-    """Normals stand on surfaces: they turn by the inverse transposed, which copes with uneven scales."""
+    """Normals transformed by the inverse transpose, which keeps them upright under uneven scales."""
     cofactors = np.stack(
         [np.cross(linear[..., (i + 1) % 3, :], linear[..., (i + 2) % 3, :]) for i in range(3)], axis=-2
     )

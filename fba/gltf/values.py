@@ -14,7 +14,7 @@ MAX_TEXT = 1 << 16
 
 
 class Budget:
-    """Bytes that reading one file may still take, so that small files cannot ask for all the memory."""
+    """Memory that reading one file may still use, so that a small file cannot exhaust it."""
 
     def __init__(self, left: int) -> None:
         self._left = self._all = left
@@ -86,7 +86,7 @@ class Value:
         return data
 
     def index(self, count: int, what: str) -> int:
-        """A whole number below `count`, which names one of so many `what`."""
+        """A whole number below `count`: the index of a `what`."""
         if not count:
             raise self.error(f"names {what} {_short(self.data)}, but there are none")
         return self.integer(0, count - 1)
@@ -151,7 +151,7 @@ class Value:
 
 @contextlib.contextmanager
 def locating_errors(value: Value) -> Iterator[None]:
-    """Give errors of the data model their place in the file."""
+    """Adds the position in the file to errors raised by the data model."""
     try:
         yield
     except ModelError as error:

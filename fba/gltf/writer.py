@@ -1,4 +1,4 @@
-"""glTF 2.0 files written: arrays to accessors, sparse where that says the same in fewer bytes."""
+"""Writes glTF 2.0 files: arrays become accessors, sparse ones where that takes fewer bytes."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Builder:
         return self._accessor(corners, False, view, offset)
 
     def data(self, values: npt.ArrayLike, *, bounds: bool = False) -> int:
-        """Accessor of numbers that are no vertex attribute: keys, matrices, tables; (N, width) or (N,)."""
+        """Accessor of numbers other than vertex attributes (keys, matrices, tables), (N, width) or (N,)."""
         array = _native(values)
         array = array[:, None] if array.ndim == 1 else array
         view, offset = self._append(array, (None, None))
@@ -88,7 +88,7 @@ class Builder:
         return self._accessor(array, False, view, 0)
 
     def packed(self, array: Array) -> int:
-        """Buffer view of 32-bit numbers that no plain viewer needs, without loss in few bytes."""
+        """Buffer view of 32-bit numbers, compressed without loss, for data that other viewers do not need."""
         return self._blob(pack(array))
 
     def displacements(self, values: Floating) -> int:

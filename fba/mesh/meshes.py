@@ -1,4 +1,4 @@
-"""What meshes of faces and bodies have in common: their looks, their normals, and checks of their arrays."""
+"""Materials, vertex normals and checked arrays of the meshes of faces and bodies."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def mesh_arrays(
     texcoords: npt.ArrayLike | None,
     colours: npt.ArrayLike | None,
 ) -> dict[str, Float32 | Int32]:
-    """Checked, read-only copies of a mesh's arrays by name; normals are worked out where there are none.
+    """Checked, read-only copies of a mesh's arrays by name; missing normals are computed.
 
     where: begins messages. ModelError for other shapes, indices out of range, numbers not finite.
     """
@@ -79,7 +79,7 @@ def mesh_arrays(
 
 
 def checked_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
-    """A float32 copy of finite numbers; shape: rows, -1 for any number, and columns. Else ModelError."""
+    """A finite float32 copy of a given shape: rows (-1: any number) and columns. Else ModelError."""
     array = np.array(values, dtype=np.float32)
     if array.ndim != 2 or array.shape[1] != shape[1] or (shape[0] >= 0 and len(array) != shape[0]):
         wanted = f"({'V' if shape[0] < 0 else shape[0]}, {shape[1]})"
@@ -91,7 +91,7 @@ def checked_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Fl
 
 
 def normalise_rows(normals: Float32) -> Float32:
-    """The same with length 1; those that have it already stay exactly as they are."""
+    """The normals scaled to length 1, in place; those that already have it keep their exact values."""
     length = np.linalg.norm(normals.astype(np.float64), axis=1)
     off = np.abs(length - 1.0) > NORMAL_TOLERANCE
     if off.any():
@@ -101,7 +101,7 @@ def normalise_rows(normals: Float32) -> Float32:
 
 
 class Mesh(Protocol):
-    """A mesh with a name, as faces and bodies are made of."""
+    """A named mesh: a part of a face or a body."""
 
     @property
     def name(self) -> str: ...
@@ -118,13 +118,13 @@ Number = TypeVar("Number", bound=np.generic)
 
 
 class Meshes(Generic[Part]):
-    """A model of several meshes: `parts`; vertices of the whole model are counted through them in order."""
+    """A model of several meshes, `parts`. Vertex indices of the model run through the parts in order."""
 
     parts: tuple[Part, ...]
 
     @cached_property
     def vertices(self) -> Float32:
-        """float32 (V, 3): the model as it rests, all parts in order, metres; read-only."""
+        """float32 (V, 3): vertices of the model at rest, all parts in order, metres; read-only."""
         return join_rows([part.vertices for part in self.parts])
 
     @cached_property
@@ -152,14 +152,14 @@ class Meshes(Generic[Part]):
 
 
 def join_rows(arrays: Sequence[npt.NDArray[Number]]) -> npt.NDArray[Number]:
-    """All rows, one array after the other; read-only."""
+    """The rows of all arrays, concatenated; read-only."""
     rows = np.concatenate(arrays)
     rows.flags.writeable = False
     return rows
 
 
 def result_array(shape: tuple[int, ...], out: Float32 | None, normals: Float32 | None) -> Float32:
-    """The array that vertices go to: `out`, or a new one where None; both given arrays are checked.
+    """The array to write vertices to: `out`, or a new one if None. Both given arrays are checked.
 
     Raises ValueError where one is not a writable, C-contiguous float32 array of the shape, or they overlap.
     """

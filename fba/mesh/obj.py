@@ -83,7 +83,7 @@ class _Reader:
 
     @property
     def where(self) -> str:
-        """The place that is being read, for errors."""
+        """File and line being read, for error messages."""
         return f"{self.path}:{self.line}"
 
     def _numbers(self, tokens: list[str], what: str) -> list[float]:
@@ -140,5 +140,5 @@ class _Reader:
 
 
 def _linear(colour: Float32) -> Float32:
-    """sRGB as such files hold it -> linear light."""
+    """Linear light from the sRGB values that OBJ files hold."""
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).astype(np.float32)

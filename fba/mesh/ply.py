@@ -195,7 +195,7 @@ class _Reader:
         return {}, lists
 
     def _even_lists(self, element: _Element) -> dict[str, tuple[Int64, Int64]] | None:
-        """All rows at once where every list is as long as the first row's, as in a mesh of triangles."""
+        """All rows at once, if every list is as long as that of the first row, as in a mesh of triangles."""
         lengths = [(name, length) for name, _, length in element.properties if length]
         at, row = self.at, []
         for place, (_, kind, length) in enumerate(element.properties):

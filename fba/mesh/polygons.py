@@ -11,7 +11,7 @@ from fba.arrays import Bool, Float32, Float64, Int32
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """What an OBJ or PLY file holds.
+    """The polygons of a mesh file.
 
     vertices: float64 (V, 3), in the file's own units. texcoords: float64 (VT, 2), origin at the
     picture's top left, or None. starts: int32 (F + 1,), where each polygon begins in `corners`, the
@@ -56,7 +56,7 @@ class Triangles:
 
 
 def triangulate(polygons: Polygons, faces: Bool) -> Triangles:
-    """The chosen polygons as triangles; those of fewer than three corners vanish."""
+    """The chosen polygons cut into triangles; those of fewer than three corners are dropped."""
     sizes = np.diff(polygons.starts)
     chosen = np.flatnonzero(faces & (sizes >= 3))
     counts = sizes[chosen] - 2

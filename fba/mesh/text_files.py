@@ -1,4 +1,4 @@
-"""What all importers share: opening files, reading their lines, numbers that must be numbers, limits."""
+"""Text files of importers: opened, read by lines and words, numbers parsed, sizes limited."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def parse_integer(token: str, where: str, what: str) -> int:
 
 
 def find_beside(path: str | os.PathLike[str], name: str) -> Path | None:
-    """A file named in another one, looked for beside it only, or None.
+    """Path of a file that another file names, in the same folder; None if there is no such file.
 
     Names come from files of strangers: folders in them are dropped, so none reaches outside.
     """

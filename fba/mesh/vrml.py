@@ -24,7 +24,7 @@ def read_vrml(path: str | os.PathLike[str]) -> list[Polygons]:
 
 
 class _Reader:
-    """Reads names, brackets and number lists; all other nodes and fields are passed over."""
+    """Reads names, brackets and lists of numbers; skips all other nodes and fields."""
 
     def __init__(self, path: str) -> None:
         self.path = path

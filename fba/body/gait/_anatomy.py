@@ -1,4 +1,4 @@
-"""What walking needs of a skeleton: the bones of legs and arms, and where soles touch the ground."""
+"""The bones of legs and arms that a walk needs, and the points at which soles touch the ground."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Anatomy:
     pelvis: Float64
 
     @classmethod
-    def of(cls, skeleton: Skeleton) -> Anatomy:
+    def measure(cls, skeleton: Skeleton) -> Anatomy:
         """Measure a skeleton. ModelError where it lacks legs or arms, or cannot stand on them."""
         wanted = [ROOT, "sacroiliac"]
         for letter in "lr":
@@ -94,7 +94,7 @@ class Anatomy:
 
 
 class Writer:
-    """Angles and places -> BAPs, in one convention."""
+    """Writes angles and positions as BAPs, in one convention."""
 
     def __init__(self, frames: int, axes: str = "iso") -> None:
         from fba.parameters import BAP_COUNT

@@ -14,7 +14,7 @@ Interpolation = Literal["linear", "smooth"]
 
 
 def checked(interpolation: Interpolation) -> Interpolation:
-    """The same; ValueError on another word."""
+    """The given kind of interpolation; ValueError for an unknown one."""
     if interpolation not in ("linear", "smooth"):
         raise ValueError(f"interpolation must be linear or smooth, not {interpolation!r}")
     return interpolation

@@ -153,12 +153,12 @@ def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     skeleton = Skeleton.default() if skeleton is None else skeleton
-    anatomy = Anatomy.of(skeleton)
+    anatomy = Anatomy.measure(skeleton)
     count = len(animation)
     none = Gait(animation.rate, count, (), ())
     if count < 4:
         return none
-    curves = Curves.of(anatomy, BapSolver(skeleton, axes).pose(animation.body.values), animation.times)
+    curves = Curves.measure(anatomy, BapSolver(skeleton, axes).pose(animation.body.values), animation.times)
     contacts = {letter: curves.contacts(letter) for letter in "lr"}
     offs = {letter: curves.offs(letter) for letter in "lr"}
     order = sorted((frame, letter) for letter, frames in contacts.items() for frame in frames)

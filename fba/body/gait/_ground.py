@@ -1,4 +1,4 @@
-"""Where the feet are while they stand, and the legs that reach them.
+"""Positions of standing feet, and the legs that reach them.
 
 A foot lands on its heel, lies flat, and rises over the metatarsal joint while the toes stay flat: what
 touches does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3 and 4);

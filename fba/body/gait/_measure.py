@@ -1,4 +1,4 @@
-"""What a walk does: contacts, slip, depth under the ground, measured on the posed body."""
+"""Measurements of a walk on the posed body: contacts, slip, depth below the ground."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Soles:
 
     @property
     def deepest(self) -> float:
-        """Metres that the lowest point of all is under the ground; negative where it is above."""
+        """Depth of the lowest point below the ground, metres; negative above it."""
         return float(-self.points[..., 1].min())
 
     @property
@@ -54,16 +54,16 @@ class Soles:
 
     @property
     def carried(self) -> bool:
-        """Whether a foot is on the ground in every frame: what tells walking from running."""
+        """Whether a foot is on the ground in every frame, which distinguishes walking from running."""
         return bool(self.touching.any(axis=(0, 1)).all())
 
 
 def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Soles:
-    """Pose an animation's body and look at its feet. ValueError where it has no body track."""
+    """The feet of an animation's body in every frame. ValueError without a body track."""
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     skeleton = Skeleton.default() if skeleton is None else skeleton
-    anatomy = Anatomy.of(skeleton)
+    anatomy = Anatomy.measure(skeleton)
     return sole_points(anatomy, BapSolver(skeleton, axes).pose(animation.body.values))
 
 

@@ -123,7 +123,7 @@ class Plan:
         return ground.standing(side, self.place(side, phase), self.pitch(own), side.way * self._yaw)
 
     def _along(self, phase: Float64) -> Float64:
-        """(T, 3), the root's place over the ground, its height still 0."""
+        """(T, 3), the root's position along the ground, its height still 0."""
         pelvis, scale = self.character.pelvis, self.anatomy.scale
         result = np.zeros((*phase.shape, 3))
         result[..., 0] = -pelvis.sway * scale * np.sin(2.0 * np.pi * (phase - 0.02))
@@ -177,7 +177,7 @@ class Plan:
         )
 
     def root(self, phase: Float64) -> Float64:
-        """(T, 3), place of the root: as high as the standing leg is long, over the standing foot."""
+        """(T, 3), position of the root: over the standing foot, at the height that the standing leg gives."""
         root, wanted, limit = self._heights(phase)
         root[..., 1] = np.minimum(wanted, limit)
         return root
@@ -253,7 +253,7 @@ class Plan:
         return float(-np.degrees(limb_angles(plan.standing_leg(side, start).thigh)[0][0]))
 
     def leg(self, side: Side, phase: Float64, root: Float64) -> Leg:
-        """The leg at any phase, standing or swinging, under a root that is where it is (T, 3)."""
+        """The leg at any phase, standing or swinging, for positions (T, 3) of the root."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
         stands = own <= TOE_OFF
         yaw = side.way * self._yaw

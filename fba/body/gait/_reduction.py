@@ -1,4 +1,4 @@
-"""A walk kept as its characteristic poses, and made whole again by interpolation.
+"""A walk reduced to its characteristic poses, and restored by interpolation.
 
 Digest faces-and-emotions.md, 2.5: "from all joint angles at each frame to four sets at symmetric times".
 """
@@ -93,7 +93,7 @@ def reduce(animation: Animation, found: Gait | None = None, skeleton: Skeleton |
 
 
 def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
-    """How far two bodies are apart in the frames that both have, over the joints that turn in `one`.
+    """Differences of two bodies in their common frames, over the joints that turn in `one`.
 
     ValueError where rates differ, or no frame is in both.
     """

@@ -44,7 +44,7 @@ class Curves:
     reach: float
 
     @classmethod
-    def of(cls, anatomy: Anatomy, matrices: Float64, times: Float64) -> Curves:
+    def measure(cls, anatomy: Anatomy, matrices: Float64, times: Float64) -> Curves:
         number = anatomy.skeleton.number
         rate = (len(times) - 1) / max(float(times[-1] - times[0]), 1e-9)
         pelvis = matrices[:, number("sacroiliac")]

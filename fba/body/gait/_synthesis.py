@@ -51,7 +51,7 @@ def walk(
     """
     if not isinstance(character, Character):
         character = Character.named(character)
-    anatomy = Anatomy.of(Skeleton.default() if skeleton is None else skeleton)
+    anatomy = Anatomy.measure(Skeleton.default() if skeleton is None else skeleton)
     stride = _stride(stride, character, anatomy)
     rate = Fraction(rate)
     if rate <= 0:

@@ -100,7 +100,7 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
 
 
 class _At:
-    """Places of a rig's joints: each the middle of some vertices."""
+    """Positions of a rig's joints: each is the mean of several vertices."""
 
     def __init__(self, listed: Mapping[str, Value], vertices: Float64) -> None:
         self._listed = listed
@@ -122,19 +122,19 @@ def _json(path: Path) -> Value:
 
 
 def _existing(path: Path) -> Path:
-    """The same path; FormatError where there is no file."""
+    """The path, if there is a file; else FormatError."""
     if not path.is_file():
         raise FormatError("cannot be read: there is no such file", path=path)
     return path
 
 
 def _triangles(mesh: Polygons, *groups: str) -> Int64:
-    """(F, 3) the triangles of some groups."""
+    """int64 (F, 3): triangles of the named groups."""
     return triangulate(mesh, mesh.in_groups(*groups)).corners.astype(np.int64)
 
 
 def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _At]:
-    """Each bone's parent, and the places of the joints."""
+    """Each bone's parent, and the positions of the joints."""
     bones: dict[str, str | None] = {}
     for name, entry in rig.member("bones").members():
         parent = entry.get("parent")
@@ -158,7 +158,7 @@ def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
 
 
 def _places(at: _At, rig: Value) -> Float64:
-    """(J, 3) where the standard's joints are, metres."""
+    """(J, 3) positions of the standard's joints, metres."""
     default = Skeleton.default()
     places = np.full((len(default), 3), np.nan)
     for joint, start, end, share, _ in _rows():
@@ -177,7 +177,7 @@ def _places(at: _At, rig: Value) -> Float64:
 
 
 def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, places: Float64) -> Float64:
-    """(V, J) how far each of the standard's joints carries each vertex."""
+    """(V, J) weight of each of the standard's joints for each vertex."""
     default = Skeleton.default()
     given = {name: np.zeros(len(vertices)) for name in bones}
     for bone, listed in content.member("weights").members():
@@ -236,7 +236,7 @@ def _neckline() -> tuple[int, ...]:
 
 
 def _above(triangles: Int64, vertices: Float64) -> Bool:
-    """(F,) triangles above the neckline, where heads made of this mesh end too, so that both meet."""
+    """(F,) mask of the triangles above the neckline, where head models made of this mesh end too."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -30,7 +30,7 @@ LEAST = 0.02
 def find_girdle(
     skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32
 ) -> Girdle:
-    """What the compiled loop needs to turn both shoulder girdles; nothing where the skeleton has none.
+    """Tables of both shoulder girdles for the compiled loop; empty if the skeleton has none.
 
     Its first fields have a row for each side. joints: the joint that carries the girdle, those of collar
     bone and blade, and the shoulder. centre: where the collar bone turns. arm: unit vector along the upper

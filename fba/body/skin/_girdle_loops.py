@@ -68,7 +68,7 @@ def _relative(duals: Float32, one: int, other: int) -> tuple[float, float, float
 
 @inlined
 def _turn(duals: Float32, joint: int, angle: float, cx: float, cy: float, cz: float, centre: Float64) -> None:
-    """A joint first turned about a unit axis through a place."""
+    """Turns a joint about a unit axis through a point, before its own motion."""
     s, g = np.sin(0.5 * angle), np.cos(0.5 * angle)
     h, i, j = s * cx, s * cy, s * cz
     # The turn's dual part: a place p is kept by e = p x (h, i, j).
@@ -91,7 +91,7 @@ def straighten(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
     girdle: Girdle, out: Float32,
 ) -> None:  # fmt: skip
-    """Some vertices drawn towards where matrices would have them: see `fba.body.skin._girdle`."""
+    """Draws vertices towards their positions under linear skinning: see `fba.body.skin._girdle`."""
     for n in range(len(girdle.rows)):
         i, straight = girdle.rows[n], girdle.shares[n]
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]

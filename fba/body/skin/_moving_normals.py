@@ -20,7 +20,7 @@ MAKING = 1
 
 
 def normal_rings(vertices: Float32, normals: Float32, triangles: Integer) -> tuple[Int32, Float32]:
-    """Four neighbours of each vertex, (V, 4), -1 where they are of no use, and numbers (V, 3).
+    """Four neighbours of each vertex, (V, 4), -1 where none give a normal, and coefficients (V, 3).
 
     With t = v[0] - v[2] and u = v[1] - v[3] of the neighbours, x t + y u + z (t x u) is the normal of the
     mesh as modelled, for the three numbers x, y, z, and the same again after any rotation of the whole.
@@ -93,7 +93,7 @@ def _turns(ways: Float64, upright: Float64, starts: Int64) -> Float64:
 
 
 def _nearest(turn: Float64, wanted: float, other: Int64, centre: Int64, starts: Int64) -> Int64:
-    """Of each vertex the neighbour nearest to an angle; the vertex itself where none is within 60 degrees."""
+    """For each vertex the neighbour nearest to an angle; the vertex itself if none is within 60 degrees."""
     off = np.abs(np.mod(turn - wanted + np.pi, 2 * np.pi) - np.pi)
     order = np.lexsort((off, centre))
     best = order[starts]

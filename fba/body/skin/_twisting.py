@@ -25,7 +25,7 @@ SMALL = 1e-3
 def find_twists(
     skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32
 ) -> Twisting:
-    """What the compiled loop needs to wring a body's arms; nothing where the skeleton has no arms.
+    """Tables of the arms' twists for the compiled loop; empty if the skeleton has no arms.
 
     Of its fields, each bone has rows `starts[b]` to `starts[b + 1]`: the vertices (`rows`) along it, and by
     how much of the twists of its joint and of the next one they are turned beforehand (`shares`, two
@@ -84,7 +84,7 @@ def _carried(skeleton: Skeleton, joint: int, joints: Int32, weights: Float32) ->
 
 
 def _along(bind: Float64, pair: tuple[int, int], vertices: Float32) -> Float64:
-    """(V,) how far along a bone vertices are: 0 at its joint, 1 at the next."""
+    """(V,) positions of vertices along a bone: 0 at its joint, 1 at the next."""
     start, end = bind[pair[0], :3, 3], bind[pair[1], :3, 3]
     way = end - start
     place: Float64 = (vertices - start) @ way / max(float(way @ way), 1e-12)

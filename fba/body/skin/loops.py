@@ -307,7 +307,7 @@ def _linear_places(
 
 @compiled
 def _across(places: Float32, around: Int32, numbers: Float32, normals: Float32) -> None:
-    """Normals from the places of neighbours: see `rings`."""
+    """Normals from the positions of neighbours: see `normal_rings`."""
     for i in range(places.shape[0]):
         a, b, c, d = around[i, 0], around[i, 1], around[i, 2], around[i, 3]
         if a < 0:
@@ -327,7 +327,7 @@ def _across(places: Float32, around: Int32, numbers: Float32, normals: Float32) 
 
 @compiled
 def _shift(places: Float32, x: float, y: float, z: float) -> None:
-    """Places from the root's frame into the world: last, so that nothing above is lost to rounding."""
+    """Positions from the root's frame to the world; done last, so that large offsets cost no precision."""
     for i in range(places.shape[0]):
         places[i, 0] += x
         places[i, 1] += y

@@ -1,4 +1,4 @@
-"""Joints and weights of vertices: checked, and of many joints the few that a vertex has room for."""
+"""Joints and weights of vertices: checked, and reduced to the few joints that a vertex can have."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tu
 
 
 def _thin_chain(dense: Float64, alike: Bool) -> Float64:
-    """The same weights with fewer of those that move alike, in all no more than there is room for."""
+    """Weights in which joints of the chain give way, so that each vertex has at most `INFLUENCES` joints."""
     dense = np.maximum(dense - LEAST, 0.0)
     dense /= np.maximum(dense.sum(axis=1, keepdims=True), 1e-12)
     rooms = np.clip(INFLUENCES - (dense[:, ~alike] > 0).sum(axis=1), 1, INFLUENCES)

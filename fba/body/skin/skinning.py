@@ -1,4 +1,4 @@
-"""Vertices carried along with the joints of a skeleton."""
+"""Skinning: vertices moved by the joints of a skeleton."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Skinner:
         normals: Float32 | None = None,
         method: str = "dual",
     ) -> Float32:
-        """The same for other places (V, 3) of the vertices, and their normals (V, 3) where wanted."""
+        """As `skin`, for other rest positions (V, 3) of the vertices and, if wanted, their normals (V, 3)."""
         if normals is not None and upright is None:
             raise ValueError("normals are wanted, but not given as modelled")
         for array in (vertices, upright):
@@ -160,7 +160,7 @@ class Skinner:
 
 
 def _as_writable(array: Float32, room: Float32) -> Float32:
-    """The array as compiled code takes it: itself, or a copy in `room`."""
+    """The array itself if compiled code can take it, else a copy in `room`."""
     if array.dtype == np.float32 and array.flags.c_contiguous and array.flags.writeable:
         return array
     np.copyto(room, array)

@@ -1,4 +1,4 @@
-"""Whole turns: angles that leave what a stream can carry, brought back without changing the pose."""
+"""Angles wrapped into the range that a stream can carry, without changing the pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a modelled figure's joints stand, seen from the standard's default posture.
+"""Joint matrices of a modelled figure, relative to the standard's default posture.
 
 Models are made with their arms held off the sides or straight out. Bones tell how each joint is turned
 there against the default posture: arms at the sides, palms to the thighs, feet forward.
@@ -16,7 +16,7 @@ FINGERS = ("index", "middle", "ring", "pinky")
 
 
 def bind_matrices(places: Float64) -> Float64:
-    """float64 (J, 4, 4) for places (J, 3) of the default skeleton's joints in a figure, metres.
+    """Bind matrices, float64 (J, 4, 4), for positions (J, 3) of the default skeleton's joints, metres.
 
     The figure stands upright, feet flat, looking along +z. Limbs turn as their bones do; trunk and head
     stand in the figure as in the default posture.
@@ -74,7 +74,7 @@ def unposed(bind: Float64) -> Skeleton:
 
 
 def vertebrae(places: Float64, knots: Float64, neck: int) -> None:
-    """Fill in what is NaN in places (J, 3): vertebrae, and what else lies on the midline, along a spine.
+    """Fills in NaN rows of positions (J, 3): vertebrae and other joints of the midline, along a spine.
 
     knots: (K, 3), places along the figure's spine from the pelvis up to the base of the skull; knot number
     `neck` is where the neck begins. Joints stand between these three as they stand in the standard's body.
@@ -98,7 +98,7 @@ def chain(first: str, last: str) -> list[str]:
 
 
 def shares(height: Float64, joints_at: Float64, eased: int = 1) -> Float64:
-    """(V, K) how a chain of joints (K,) shares what lies at heights (V,): each moves what is above it.
+    """(V, K) weights of a chain of joints (K,) for vertices at heights (V,): each moves what is above it.
 
     eased: how often shares are spread over the neighbours in the chain. Two joints share a place at first,
     and two more each time; a vertex has room for four in all.
@@ -119,7 +119,7 @@ def shares(height: Float64, joints_at: Float64, eased: int = 1) -> Float64:
 
 
 def frame(direction: Float64, side: Float64) -> Float64:
-    """(3, 3) columns: the direction, what is left of the side across it, and both crossed."""
+    """(3, 3), orthonormal columns: the direction, the side made perpendicular to it, their cross product."""
     first = direction / max(float(np.linalg.norm(direction)), 1e-12)
     second = side - first * (first @ side)
     second = second / max(float(np.linalg.norm(second)), 1e-12)

@@ -1,4 +1,4 @@
-"""How far joints go: the limits of normal human motion, off by default, to report or to clamp by.
+"""Joint limits: the ranges of normal human motion, to report or clamp excesses. Off by default.
 
 The standard sets no limits to joints. `Limits.human()` is the table of typical limits of the digest
 bodies-and-gait.md, 5.7 (Table 4-1): there X is the subject's left, Z the long axis of the segment and
@@ -26,7 +26,7 @@ WHOLE = 360.0
 
 @dataclass(frozen=True)
 class Limit:
-    """What one segment may do in one way. baps: 0-based columns, whose sum lies in low..high, degrees."""
+    """The range of one motion of a segment. baps: 0-based columns whose sum lies in low..high, degrees."""
 
     segment: str
     motion: str
@@ -42,7 +42,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Excess:
-    """Where a motion leaves a limit: in how many frames, first in which, and by how many degrees at worst."""
+    """A motion beyond a limit: the number of frames, the first of them, and the largest excess in degrees."""
 
     limit: Limit
     frames: int
@@ -74,7 +74,7 @@ class Limits:
         return Limits(_iso())
 
     def check(self, values: npt.ArrayLike) -> tuple[Excess, ...]:
-        """Where BAPs (T, 296) or (296,), 1e-5 rad, leave the limits; empty where they do not.
+        """The limits that BAPs (T, 296) or (296,), 1e-5 rad, exceed; empty if they exceed none.
 
         Whole turns do not count. ValueError on another shape or values that are not finite.
         """
@@ -112,7 +112,7 @@ class Limits:
 
 @cache
 def widest() -> Float64:
-    """float64 (296, 2), degrees: what the human limits or the standard's ranges allow to each BAP alone.
+    """float64 (296, 2), degrees: the range that human limits or the standard allow each BAP by itself.
 
     Body turn, roll and tilt, which a person has no limits for, have half a turn either way (roll a quarter).
     """
@@ -137,7 +137,7 @@ def _frames(values: npt.ArrayLike) -> Float64:
 
 
 def _excess(limit: Limit, array: Float64) -> tuple[Float64, Float64]:
-    """Total (T,) in degrees, by whole turns as close to the range as can be, and what of it is too much."""
+    """Totals (T,) in degrees, shifted by whole turns as close to the range as possible, and the excess."""
     total = array[:, list(limit.baps)].sum(axis=1) * DEGREES
     if len(limit.baps) == 1:
         total = total - WHOLE * np.rint((total - (limit.low + limit.high) / 2) / WHOLE)

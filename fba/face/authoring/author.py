@@ -1,4 +1,4 @@
-"""From any head mesh and its 84 feature points to a face model with tables for every FAP."""
+"""Makes a face model with tables for every FAP from a head mesh and its 84 feature points."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _kinds(parts: tuple[Part, ...]) -> str:
 
 
 class _Authoring:
-    """The tables of one face in the making."""
+    """State while the tables of one face are made."""
 
     def __init__(self, parts: tuple[Part, ...], marks: Landmarks, binding: Binding) -> None:
         self.parts = parts
@@ -204,8 +204,8 @@ class _Authoring:
             self._slide(fap, found, shares)
 
     def _pinned(self) -> Bool:
-        """What goes exactly where the jaw wants it."""
-        pinned = self.marks.on(*LIP_CONTOURS)
+        """Vertices that follow the jaw exactly."""
+        pinned = self.marks.on_contours(*LIP_CONTOURS)
         pinned[[self.marks.vertex[name] for name in CHIN if self.marks.has(name)]] = True
         return pinned
 

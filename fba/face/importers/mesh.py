@@ -122,7 +122,7 @@ def _places(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64,
 
 
 def _brought(said: Float64, placed: Float64, chosen: list[str], path: str) -> Float64:
-    """Positions without a vertex, brought to the unit and origin that the others show.
+    """Positions of points without a vertex, converted to the unit and origin of those with one.
 
     Warns of positions that do not agree with their vertices.
     """

@@ -24,7 +24,7 @@ def evaluate(
     viseme: Int16,
     expression: Int16,
 ) -> tuple[Float64, Bool, Bool]:
-    """Values with those filled in that a FIT gives.
+    """FAP values, with missing ones filled in by a FIT.
 
     values: (T, 68). known: bool (T, 68), which of them stand; columns 0 and 1 say whether a viseme and
     an expression are in force. viseme: int16 (T, 4), expression: int16 (T, 6), their fields. Returns

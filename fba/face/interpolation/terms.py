@@ -43,7 +43,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Link:
-    """From one set of FAPs to another.
+    """A link from one set of FAPs to another.
 
     source: names of its FAPs, such as ("lower_t_midlip", "raise_b_midlip"). "viseme" stands for the
     numbers viseme_select1, viseme_select2 and viseme_blend, "expression" for expression_select1,
@@ -61,7 +61,7 @@ class Link:
 
 
 def number_of(value: object) -> float:
-    """A float, NaN for what is none."""
+    """The value as a float; NaN if it is no number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return math.nan
     try:

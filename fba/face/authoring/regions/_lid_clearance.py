@@ -92,7 +92,7 @@ class Profile:
 
 
 def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
-    """The longer ones of the edges at the margins of an eye."""
+    """A typical length of the longer edges at the margins of an eye, metres."""
     surface = marks.surface
     at_margin = np.zeros(len(surface), dtype=bool)
     at_margin[own] = at_margin[other] = True
@@ -101,7 +101,7 @@ def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
 
 
 def freed(profile: Profile, points: Float64, shifts: Float64, values: Float64) -> Float64:
-    """Shifts (K, N, 3) with what would cut the eyeball brought before it, the more the further on its way."""
+    """Shifts (K, N, 3) corrected so that no vertex cuts the eyeball, increasingly along the way."""
     result = shifts.copy()
     for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FREED)):
         result[k] += profile.lift(points, shifts[k]) * share

@@ -47,7 +47,7 @@ class Eye:
 
 
 def eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
-    """Both eyes; where there is no eyeball, the sphere is guessed from the points, for the lids' sake."""
+    """Both eyes; without an eyeball, the sphere that lids need is estimated from the feature points."""
     iris = marks.fapu.IRISD * 1024
     pupils = {side: marks.guess(name) for side, name in (("left", "3.5"), ("right", "3.6"))}
     middle = float((pupils["left"][0] + pupils["right"][0]) / 2)

@@ -186,7 +186,10 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
     values |= {marks.vertex[name]: CORNER for name in ("2.13", "2.14") if marks.has(name)}
     values |= one
     source = np.array(sorted(values))
-    lips = marks.on("lower outer lip", "upper outer lip", "lower inner lip", "upper inner lip") | marks.lips
+    lips = (
+        marks.on_contours("lower outer lip", "upper outer lip", "lower inner lip", "upper inner lip")
+        | marks.lips
+    )
     # below, the neck ends at a body that stays
     end = surface.open_edge & (surface.vertices[:, 1] < marks.place("2.1")[1] - NECK * es)
     still = np.unique(
@@ -223,8 +226,8 @@ def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     """The share of a sliding jaw: the lower lip goes half way, the upper one stays."""
-    lower = marks.on("lower outer lip", "lower inner lip")
-    upper = marks.on("upper outer lip", "upper inner lip")
+    lower = marks.on_contours("lower outer lip", "lower inner lip")
+    upper = marks.on_contours("upper outer lip", "upper inner lip")
     lower &= ~upper
     if not lower.any():
         return share

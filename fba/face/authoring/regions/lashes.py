@@ -1,4 +1,4 @@
-"""Lashes: they go with the lid that they grow on."""
+"""Lashes: they move with the lid that they grow on."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
             found[number] = _linear(marks, limiter, whole * share[:, None], number)
         elif number < mate:
-            whole = eased_field(marks.surface, limiter, whole, goals(number), marks.on(*LINES))
+            whole = eased_field(marks.surface, limiter, whole, goals(number), marks.on_contours(*LINES))
             inward = lips.inward[:, None]
             pair = _coupled(limiter, whole * inward, whole * (1 - inward), number)
             found[number], found[mate] = pair
@@ -169,7 +169,7 @@ def _fields(marks: Landmarks) -> _Lips:
 
 def _inward(marks: Landmarks) -> Float64:
     inner = marks.on_inner_lips | marks.inside_mouth
-    outer = marks.on("upper outer lip", "lower outer lip") & ~marks.on_inner_lips
+    outer = marks.on_contours("upper outer lip", "lower outer lip") & ~marks.on_inner_lips
     for inner_point, outer_point in HANDLES.values():
         if marks.has(outer_point) and marks.vertex[outer_point] != marks.vertex.get(inner_point):
             inner[marks.vertex[outer_point]] = False
@@ -187,7 +187,7 @@ def _inward(marks: Landmarks) -> Float64:
 
 def _linear(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:
     vertices = np.flatnonzero(np.abs(field).max(axis=1) > 0)
-    return linear(marks.surface, limiter, vertices, field[vertices], fap, marks.on(*LINES))
+    return linear(marks.surface, limiter, vertices, field[vertices], fap, marks.on_contours(*LINES))
 
 
 def _coupled(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:

@@ -1,4 +1,4 @@
-"""Shapes mixed for one FAP: solved at the feature points, put right there, kept from folding."""
+"""Mixes shapes for one FAP: solved at the feature points, corrected there, limited where triangles fold."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Mixer:
         self.points = self._points()
         vertices = np.array([base.bound[row_of()[name]] for name in self.points], dtype=np.intp)
         self.vertices = vertices
-        self.at = shapes.at(vertices)
+        self.at = shapes.displacements_at(vertices)
         columns = [self.weight(fap) for fap in self.points.values()]
         self.weights = np.stack(columns, axis=1) if columns else np.zeros((len(base.vertices), 0))
         # how far each point follows when another one is moved by its own table
@@ -215,7 +215,7 @@ def guarded_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> Fa
     share = np.zeros(len(values))
     for k, value in enumerate(values):
         side = below if value < 0 else above
-        shifts[k, side.vertices] = side.at(value)
+        shifts[k, side.vertices] = side.shifts_at(value)
         share[k] = _progress(side, value)
     motions = by_part(surface, Motion(values, moving, shifts[:, moving]))
     for part in model.parts:
@@ -238,7 +238,7 @@ def surface_field(surface: Surface, moves: Float64) -> Float64:
 
 
 def _side(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
-    """A straight motion from 0 to one end, held back where triangles would fold."""
+    """A straight motion from 0 to one end, limited where triangles would fold."""
     limiter = Limiter(surface.vertices, surface.triangles)
     if not field.any() or not end:
         return Motion(np.array(sorted((0.0, end or 1.0))), np.zeros(0, dtype=np.intp), np.zeros((2, 0, 3)))
@@ -254,5 +254,5 @@ def _progress(side: Motion, value: float) -> float:
     if not value or not side.shifts.size or not len(first):
         return float(value)
     near = float(first[np.abs(first).argmin()])
-    step = side.at(near) / near
-    return float((side.at(value) * step).sum() / max(float((step**2).sum()), 1e-30))
+    step = side.shifts_at(near) / near
+    return float((side.shifts_at(value) * step).sum() / max(float((step**2).sum()), 1e-30))

@@ -66,8 +66,8 @@ class Shapes:
                 field += weight * self.field(half)
         return field
 
-    def at(self, vertices: npt.ArrayLike) -> Float64:
-        """(H, N, 3): how far each half moves some vertices."""
+    def displacements_at(self, vertices: npt.ArrayLike) -> Float64:
+        """(H, N, 3): displacements of the given vertices by each half."""
         chosen = np.asarray(vertices, dtype=np.intp)
         found = np.zeros((len(self.halves), len(chosen), 3))
         for number, half in enumerate(self.halves):

@@ -19,7 +19,7 @@ NEAR = 0.1
 
 
 class Anchors:
-    """Where each vertex of a part is fastened to the skin: a triangle and a place in it."""
+    """The attachment of each vertex of a part to the skin: a triangle and barycentric coordinates in it."""
 
     def __init__(self, surface: Surface, part: Part) -> None:
         from scipy.spatial import cKDTree
@@ -38,7 +38,7 @@ class Anchors:
         self._shares: Float64 = shares[root][shape.number]
 
     def carried(self, motion: Motion) -> Motion:
-        """What a motion of the surface does to the part: places move, and turn, with their triangles."""
+        """The motion of the part for a motion of the surface: vertices move and turn with their triangles."""
         whole = np.zeros_like(self._neutral)
         place = np.full(len(self._neutral), -1)
         place[motion.vertices] = np.arange(len(motion.vertices))

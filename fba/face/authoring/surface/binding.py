@@ -44,7 +44,7 @@ class Binding:
 
 
 def face_size(points: Float64) -> float:
-    """A length to measure by: the spread of the known feature points."""
+    """The size of the face: the spread of its known feature points."""
     known = points[np.isfinite(points).all(axis=1)]
     if len(known) < 2:
         raise ModelError(
@@ -103,7 +103,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
 def part_lips(
     surface: Surface, parts: Sequence[Part], points: Float64, binding: Binding, size: float
 ) -> Binding:
-    """The same, where points of one lip that had got hold of the other lip let go of it.
+    """The binding, with points released that were bound to the other lip.
 
     Lips touch, so the nearest vertex may be on the wrong one; walking tells them apart.
     """

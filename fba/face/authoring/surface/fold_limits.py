@@ -1,4 +1,4 @@
-"""How far a motion can go before triangles fold over or tear."""
+"""The extent of a motion up to which triangles neither fold over nor tear."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Limiter:
         self._triangles = triangles[areas > DEGENERATE * typical]
 
     def without(self, vertices: Intp) -> Limiter:
-        """The same, blind to the triangles about some vertices."""
+        """A limiter that ignores the triangles around the given vertices."""
         other = copy(self)
         other.__dict__.pop("_fans", None)
         other._triangles = self._triangles[~np.isin(self._triangles, vertices).any(axis=1)]

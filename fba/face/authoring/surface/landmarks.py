@@ -34,7 +34,7 @@ OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in nam
 
 @dataclass(eq=False)
 class Landmarks:
-    """Where things are on one face.
+    """The feature points and contours of one face.
 
     surface: skin and inner mouth. points: (84, 3), NaN where unknown. vertex: surface vertex by name of
     the feature point, for those that stand on the surface. fapu: the units.
@@ -89,10 +89,10 @@ class Landmarks:
     @cached_property
     def on_inner_lips(self) -> Bool:
         """(N,) vertices of the inner contour."""
-        return self.on("upper inner lip", "lower inner lip")
+        return self.on_contours("upper inner lip", "lower inner lip")
 
-    def on(self, *contours: str) -> Bool:
-        """(N,) vertices of some contours."""
+    def on_contours(self, *contours: str) -> Bool:
+        """(N,) mask of the vertices of the given contours."""
         mask = np.zeros(len(self.surface), dtype=bool)
         for name in contours:
             mask[self.contour(name)] = True
@@ -114,7 +114,7 @@ class Landmarks:
 
     @cached_property
     def guessed(self) -> Float64:
-        """(84, 3): every point; those unknown put where they are in an average adult's head.
+        """(84, 3): every feature point; unknown ones as on an average adult head.
 
         The average is stretched along each axis and moved to fit the known points.
         """
@@ -130,7 +130,7 @@ class Landmarks:
         return result
 
     def guess(self, name: str) -> Float64:
-        """Where a point is, or where it would be in an average head."""
+        """Position of a point; if unknown, as on an average head."""
         place: Float64 = self.guessed[row_of()[name]]
         return place
 

@@ -1,4 +1,4 @@
-"""What one FAP does, in metres at chosen values; the last step before FaceDefMesh."""
+"""The displacements of one FAP, in metres at chosen values; the last step before FaceDefMesh."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STILL = 2e-6
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Vertices on their way as a FAP goes through some values.
+    """Displacements of vertices at several values of a FAP.
 
     values: (K,) rising FAP values, one of them 0. vertices: (N,). shifts: (K, N, 3), metres from the
     neutral face at each value, all zero where the value is 0.
@@ -28,7 +28,7 @@ class Motion:
     vertices: Intp
     shifts: Float64
 
-    def at(self, value: float) -> Float64:
+    def shifts_at(self, value: float) -> Float64:
         """(N, 3): shifts at a value; beyond the outermost values nothing moves any more."""
         x = float(np.clip(value, self.values[0], self.values[-1]))
         k = int(np.clip(np.searchsorted(self.values, x) - 1, 0, len(self.values) - 2))

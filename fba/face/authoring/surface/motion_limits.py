@@ -1,4 +1,4 @@
-"""Motions that go as far as the mesh can follow and then come to rest."""
+"""Motions limited to what the mesh can follow; beyond that, vertices stay where they are."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _caps() -> dict[int, tuple[float, float]]:
 
 
 def caps(fap: int) -> tuple[float, float]:
-    """How far down and up a FAP goes at most, as values: what a face can do, with some to spare."""
+    """Smallest and largest value of a FAP that tables cover: the range of a human face, with a margin."""
     return _caps().get(fap, (np.inf, np.inf))
 
 
@@ -84,7 +84,7 @@ def straight(
     high: float,
     most: tuple[float, float] = (np.inf, np.inf),
 ) -> Motion:
-    """The same without easing, between two values. most: how far down and up it goes in any case."""
+    """A linear motion without easing, between two values. most: the values it always reaches."""
     whole = np.zeros((len(limiter), 3))
     whole[vertices] = field
     triangles = limiter.touched(vertices)
@@ -104,7 +104,7 @@ def _most(limiter: Limiter, field: Float64, triangles: Intp, limit: float) -> fl
 
 
 def guarded(limiter: Limiter, motion: Motion, *, turning: bool = False) -> Motion:
-    """The same motion, stopped on each side where it would fold triangles on its way out."""
+    """The motion, stopped on each side of 0 where it would fold triangles."""
     triangles = limiter.touched(motion.vertices)
     zero = int(np.flatnonzero(motion.values == 0)[0])
     down = _stopped(limiter, motion, range(zero - 1, -1, -1), triangles, turning)

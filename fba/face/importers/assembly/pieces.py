@@ -77,7 +77,7 @@ def shift_pieces(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
 def _with_eyes(
     pieces: Sequence[Piece], kinds: Mapping[int, str | None], middle: float
 ) -> list[tuple[Piece, str | None]]:
-    """Round shells in mirrored pairs taken out of pieces as eyes."""
+    """The pieces, with mirrored pairs of round components split off as eyes."""
     from fba.face.eyeball import sphere
 
     if not pieces:
@@ -121,25 +121,25 @@ def _joined_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple
         if chosen:
             found.append(_joined(chosen, name, kind))
 
-    def of(kind: str) -> list[Piece]:
+    def of_kind(kind: str) -> list[Piece]:
         return [piece for piece, each in pieces if each == kind]
 
-    add("skin", "skin", of("skin"))
+    add("skin", "skin", of_kind("skin"))
     for kind, left, right in (
         ("eye", "left eye", "right eye"),
         ("brow", "left brow", "right brow"),
         ("lash", "left lashes", "right lashes"),
     ):
-        add(kind, left, _side(of(kind), lambda centre: centre[0] > middle))
-        add(kind, right, _side(of(kind), lambda centre: centre[0] <= middle))
-    teeth = of("teeth")
+        add(kind, left, _side(of_kind(kind), lambda centre: centre[0] > middle))
+        add(kind, right, _side(of_kind(kind), lambda centre: centre[0] <= middle))
+    teeth = of_kind("teeth")
     if teeth:
         levels = np.concatenate([piece.part.vertices[:, 1] for piece in teeth])
         between = float(levels.min() + levels.max()) / 2
         add("teeth", "upper teeth", _side(teeth, lambda centre: centre[1] > between))
         add("teeth", "lower teeth", _side(teeth, lambda centre: centre[1] <= between))
     for kind in ("tongue", "mouth"):
-        add(kind, kind, of(kind))
+        add(kind, kind, of_kind(kind))
     taken = {piece.part.name for piece in found}
     for piece, kind in pieces:
         if kind in ("hair", "other"):
@@ -153,7 +153,7 @@ def _joined_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple
 
 
 def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], bool]) -> list[Piece]:
-    """Of each piece the shells whose middle lies on the wanted side."""
+    """The components of each piece whose centre lies on the wanted side."""
     result = []
     for piece in pieces:
         vertices = piece.part.vertices

@@ -68,7 +68,7 @@ def make_part(
 
 
 def polygon_components(polygons: Polygons) -> list[Bool]:
-    """Masks bool (F,) of the polygons of each connected shell, by lowest vertex number."""
+    """Masks, bool (F,), of the polygons of each connected component, ordered by lowest vertex number."""
     sizes = np.diff(polygons.starts)
     first = np.repeat(polygons.corners[polygons.starts[:-1]], sizes)
     label = _connected(first, polygons.corners, len(polygons.vertices))
@@ -77,7 +77,7 @@ def polygon_components(polygons: Polygons) -> list[Bool]:
 
 
 def vertex_components(triangles: Int32, count: int, vertices: Float32) -> Intp:
-    """(count,) shell of each vertex, vertices at the same place taken as one (seams of textures)."""
+    """(count,) connected component of each vertex; vertices at one position (texture seams) count as one."""
     _, same = np.unique(vertices, axis=0, return_inverse=True)
     place = same.reshape(-1)
     a, b, c = place[triangles].T if len(triangles) else (place[:0],) * 3

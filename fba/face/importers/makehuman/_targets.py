@@ -1,4 +1,4 @@
-"""MakeHuman's targets: how far each vertex of the base mesh moves, and what that makes of its head."""
+"""MakeHuman's targets: displacements of the base mesh, applied to the parts of a head."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def target_files(folder: str | os.PathLike[str]) -> dict[str, Path]:
 
 
 def shape_of(head: MakeHumanHead, moved: Float64) -> Mapping[str, Float32]:
-    """What displacements of the base mesh (V, 3) do to the parts of a head: metres, by part.
+    """Displacements of the parts of a head, metres, by part, for displacements (V, 3) of the base mesh.
 
     Eyes that are fitted to the base mesh follow it. Parts that stay are left out.
     """

@@ -233,7 +233,7 @@ def _feature_points(base: Polygons, sources: list[Source]) -> tuple[Float64, Int
 
 
 def _front(vertices: Float32) -> int:
-    """Where an eyeball looks: of its foremost half, the vertex nearest to its axis."""
+    """The foremost vertex of an eyeball: of its front half, the one nearest to its axis."""
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     away = np.hypot(vertices[:, 0] - middle[0], vertices[:, 1] - middle[1])
     away[vertices[:, 2] < middle[2]] = np.inf

@@ -1,4 +1,4 @@
-"""FDP files: where the feature points of a face are. Text files, and the XML of Xface.
+"""FDP files: the positions of the feature points of a face, as text or as the XML of Xface.
 
 A text FDP file has a line `<group.index> x y z <mesh.vertex>` a point (digest text-formats.md); an Xface
 file names vertices of mesh files, and for each FAP the vertices around a point that follow it.
@@ -33,7 +33,7 @@ def read_fdp(path: str | os.PathLike[str]) -> Float64:
 
 
 def load_fdp(path: str | os.PathLike[str]) -> Fdp:
-    """All that an FDP file says, points put right as `read_fdp` does; ModelError where damaged."""
+    """The whole content of an FDP file, points repaired as by `read_fdp`. ModelError if damaged."""
     name = os.fspath(path)
     if read_bytes(name)[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         return load_xface(name)

@@ -1,4 +1,4 @@
-"""What an FDP file holds, and feature points on the wrong side of the face put right."""
+"""The content of an FDP file, and the repair of feature points on the wrong side of the face."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fba.face.feature_points import MIRRORED, row_of
 
 @dataclass(frozen=True, slots=True)
 class Influence:
-    """Vertices of an Xface mesh that follow a FAP: the further from the point, the less.
+    """Vertices of an Xface mesh that follow a FAP, less with distance from the point.
 
     fap: its number. shape: the file's name for the falloff. weight: at the point itself. mesh: the
     submesh; point: the vertex in it; vertices: those that follow.
@@ -44,7 +44,7 @@ class XfaceMesh:
 
 @dataclass(frozen=True, eq=False)
 class Fdp:
-    """What an FDP file holds.
+    """The content of an FDP file.
 
     path: the file. format: "text" or "xface". points: float64 (84, 3), in the file's own unit, NaN where
     it says nothing. vertices: the mesh (as the file names it) and the vertex of a point, by its name.
@@ -62,7 +62,7 @@ class Fdp:
 
 
 def repair_sides_with_warning(points: Float64, path: str, *, stacklevel: int = 2) -> Float64:
-    """Points on the wrong side mirrored, changed places changed back; an FbaWarning names them."""
+    """Points (84, 3) with left and right repaired as `repair_sides` does; an FbaWarning names the changes."""
     right, swaps, mirrored = repair_sides(points)
     changed = [f"{a} and {b} have changed places" for a, b in swaps]
     changed += [f"{name} is on the other side" for name in mirrored]
@@ -77,7 +77,7 @@ def repair_sides_with_warning(points: Float64, path: str, *, stacklevel: int = 2
 
 
 def repair_sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[str]]:
-    """Points (84, 3) on their sides of the face; the pairs that had changed places, and those mirrored.
+    """Points (84, 3) on the right sides of the face; pairs that were swapped, and points that were mirrored.
 
     As they are where most pairs have no left and right in x: then the axes are others than the standard's.
     """

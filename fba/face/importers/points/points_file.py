@@ -1,4 +1,4 @@
-"""Files that say where the feature points of a mesh are: CSV, JSON and FDP."""
+"""Positions of the feature points of a mesh, from CSV, JSON and FDP files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fba.mesh.text_files import parse_integer, parse_number, read_bytes, read_li
 
 @dataclass(frozen=True, eq=False)
 class GivenPoints:
-    """Where feature points are, as their user says.
+    """Feature points given by the user.
 
     points: float64 (84, 3), in the unit of the mesh, NaN where unknown. vertices: the vertex of the mesh
     file a point stands on, from 0, by its name; where both are given the vertex decides.
@@ -35,7 +35,7 @@ class GivenPoints:
 
 
 def given_points(points: object) -> GivenPoints:
-    """Points as the caller of an importer gives them.
+    """Feature points from the argument `points` of an importer.
 
     points: the path of a file, an array (84, 3) with NaN where unknown, or a mapping from names to a
     position (x, y, z) or a vertex number. Raises ModelError for anything else.
