@@ -13,6 +13,8 @@ from fba.codec import EncoderOptions, FrameRate, TimeCode
 from fba.codec._clock import StreamClock
 from fba.codec._headers import mask_types, time_code
 from fba.codec._plane import slots
+from fba.codec._plane.loops import SKIP_MAX
+from fba.codec._ranges import Ranges
 from fba.codec._time_base import TimeBase
 from fba.errors import RangeError
 
@@ -167,3 +169,20 @@ def test_a_range_that_was_widened_stays_wide() -> None:
     assert decoded.face is not None
     assert decoded.face.values[:, 2].tolist() == [0, 900, 0, 900, 0, -900, 0, 900]
     assert encoder.statistics.intra_planes <= 3  # the first, and one for each direction
+
+
+def test_differences_get_one_step_more_than_a_clamped_value_lacks() -> None:
+    ranges = Ranges(slots.FACE_BIT, 1)
+    column = np.array([slots.FAPS.start])
+    ranges.widen_to_catch_up(column, np.array([1861]))  # 1 beyond 31 x 60, in the next step
+    assert ranges.codes[2:, 2].tolist() == [2, 2]
+    ranges.widen_to_catch_up(column, np.array([10**6]))
+    assert ranges.is_widest(int(column[0]))
+
+
+def test_a_plane_skips_as_many_frames_as_its_syntax_carries() -> None:
+    two = face(1, 2)
+    far = Animation(two.rate, np.array([0, SKIP_MAX + 1]), two.face, None)
+    assert fba.decode(fba.encode(far)).index.tolist() == [0, SKIP_MAX + 1]
+    with pytest.raises(RangeError, match="can skip"):
+        fba.encode(Animation(two.rate, np.array([0, SKIP_MAX + 2]), two.face, None))
