@@ -1,4 +1,4 @@
-"""Eyeballs of a face model: the sphere that a part of kind "eye" is, and where it looks."""
+"""Eyeballs of a face model: the sphere that fits a part of kind "eye", and its rotation."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from fba.face.model import FaceModel, Part, point_row
 from fba_player.view.view import Eye
 
 ROUND = 0.03
-"""A part whose vertices are further than this from a sphere, as a share of its radius, is drawn as it is."""
+"""A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
 FEWEST = 12
 SAMPLED = 96
-"""Vertices from which an eyeball's rotation is found."""
+"""Vertices from which an eyeball's rotation is computed."""
 DILATE = (29, 30)
 LIDS = (("3.1", "3.3", "3.7", "3.11"), ("3.2", "3.4", "3.12", "3.8"))
-"""Middles of upper and lower lid, outer and inner corner, of the left and of the right eye."""
+"""Feature points of the left and right eye: middles of upper and lower lid, outer and inner corner."""
 
 
 @dataclass(frozen=True, eq=False)
 class Eyeball:
-    """One eyeball in the neutral face. side: 0 left, 1 right. centre (3,), radius; metres.
+    """One eyeball in the neutral face. side: 0 left, 1 right. centre: (3,), and radius, metres.
 
-    rows: vertices of the part that are sampled, away from the pupil. lids: vertices of the whole model at
-    `LIDS`, -1 where there are none. iris, pupil: diameters; step: by how much one unit of FAP 29 or 30
-    changes the pupil.
+    rows: sampled vertices of the part, away from the pupil. neutral: their positions. lids: the model's
+    vertices at `LIDS`, -1 for missing ones. iris, pupil: diameters (m). step: change of the pupil's diameter
+    for one unit of FAP 29 or 30.
     """
 
     side: int
@@ -41,12 +41,12 @@ class Eyeball:
     pupil: float
     step: float
 
-    def posed(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
-        """The eye for moved vertices of its part (V, 3) and of the face, in the world by matrix (4, 4)."""
+    def pose(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
+        """The eye for moved vertices (V, 3) of its part and of the face; matrix: (4, 4), into the world."""
         moved = part.take(self.rows, axis=0).astype(np.float64)
-        turn, centre = _placed(self.neutral, moved, self.centre)
-        if not np.isfinite(turn).all():  # squeezed flat
-            turn = _rotation(self.neutral - self.neutral.mean(axis=0), moved - moved.mean(axis=0))
+        turn, centre = _fit_motion(self.neutral, moved, self.centre)
+        if not np.isfinite(turn).all():  # the samples lie in a plane
+            turn = _fit_rotation(self.neutral - self.neutral.mean(axis=0), moved - moved.mean(axis=0))
             centre = moved.mean(axis=0) + turn @ (self.centre - self.neutral.mean(axis=0))
         frame = np.eye(4)
         frame[:3, :3] = turn * self.radius
@@ -62,7 +62,7 @@ class Eyeball:
         )
 
     def _lid_places(self, face: Float32, centre: Float64) -> Float64:
-        """(4, 3) lids' middles and corners from the centre, in radii; wide open where there are none."""
+        """(4, 3): lid middles and corners relative to the centre, in radii; an open eye's if missing."""
         if min(self.lids) >= 0:
             known: Float64 = (face.take(self.lids, axis=0) - centre) / self.radius
             return known
@@ -74,13 +74,13 @@ class Eyeball:
 
 
 def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
-    """The sphere that a part is, or None where it is none."""
+    """The sphere that fits a part, or None if it is not round."""
     vertices = part.vertices.astype(np.float64)
     if len(vertices) < FEWEST:
         return None
     on = np.ones(len(vertices), dtype=bool)
-    for _ in range(4):  # what stands out, as a cornea does, is left out
-        centre, radius = _sphere(vertices[on])
+    for _ in range(4):  # leaves out what stands out, such as a cornea
+        centre, radius = _fit_sphere(vertices[on])
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
         on = away <= max(float(np.quantile(away, 0.7)), 1e-9)
     if not np.isfinite(radius) or radius <= 0 or float(np.median(away)) > ROUND * radius:
@@ -97,8 +97,8 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)
 
 
-def _sphere(points: Float64) -> tuple[Float64, float]:
-    """Centre and radius of the sphere nearest to points (N, 3)."""
+def _fit_sphere(points: Float64) -> tuple[Float64, float]:
+    """Centre (3,) and radius of the sphere that fits points (N, 3) best."""
     middle = points.mean(axis=0)
     p = points - middle
     a = np.column_stack([2 * p, np.ones(len(p))])
@@ -107,9 +107,11 @@ def _sphere(points: Float64) -> tuple[Float64, float]:
 
 
 @compiled
-def _placed(before: Float64, after: Float64, centre: Float64) -> tuple[Float64, Float64]:
-    """(3, 3) the rotation that best takes places (N, 3) to others, and where it takes `centre`; NaN where it
-    is not found: the orthogonal part of their covariance, by Newton's iteration (Higham 1986)."""
+def _fit_motion(before: Float64, after: Float64, centre: Float64) -> tuple[Float64, Float64]:
+    """The rotation (3, 3) that takes points (N, 3) best to others, and the image (3,) of `centre`.
+
+    The orthogonal factor of their covariance by Newton's iteration (Higham 1986); NaN if that fails.
+    """
     start, middle = np.zeros(3), np.zeros(3)
     for i in range(len(before)):
         for k in range(3):
@@ -148,8 +150,8 @@ def _placed(before: Float64, after: Float64, centre: Float64) -> tuple[Float64, 
     return x, placed
 
 
-def _rotation(before: Float64, after: Float64) -> Float64:
-    """(3, 3) the rotation that best takes places (N, 3) about their middle to others."""
+def _fit_rotation(before: Float64, after: Float64) -> Float64:
+    """The rotation (3, 3) that takes centred points (N, 3) best to others, by singular values."""
     u, _, vt = np.linalg.svd(after.T @ before)
     flip = np.diag([1.0, 1.0, np.linalg.det(u @ vt)])
     rotation: Float64 = u @ flip @ vt

@@ -1,4 +1,4 @@
-"""What does not change in a face model that is shown: colours, pictures, and how far its neck bends."""
+"""Constant data of a face's parts: shapes with colours, pictures and hairs, and how far its neck bends."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fba.arrays import Float32, Float64, Int32, Intp
 from fba.easing import smoothstep
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
-from fba_player.mesh.simplify import Coarser
+from fba_player.mesh.simplify import DetailLevels
 from fba_player.mesh.textures import RELIEF, FacePicture, texture_breadth
 from fba_player.view.view import FaceShape
 
@@ -25,42 +25,42 @@ SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
 TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
 THICKEST_HAIR = 0.0012
-"""A strip wider than this (m) is no single hair."""
+"""Strips wider than this (m) are not single hairs."""
 ROUGH = 0.36
 """Strength of the skin's relief."""
 NECK = 2.3
-"""Length over which a neck bends, in distances from eyes to nose (ENS)."""
+"""Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""
 MOST_BENT, BENT, LONG = 0.1, 0.8, 0.005
-"""Where more than this share of a part's edges bend by more than the angle of this cosine, and are longer
-than this (m), light is worked out pixel by pixel."""
+"""Light is computed for every pixel if more than this share of a part's edges bend by more than the angle
+with this cosine and are longer than this (m)."""
 NORMAL_WEIGHT, TEXTURE_WEIGHT, COLOUR_WEIGHT = 0.002, 0.5, 0.004
-"""How a coarser part keeps these: what a normal that is off by its own length, a texture off by a metre, and
-a colour off by all its light count in metres."""
+"""Weights for simplification: the error in metres that equals a normal off by its length, a texture off by a
+metre, and a colour off by its whole range."""
 
 
-def sway(model: FaceModel) -> Float32:
-    """(V,) how far each vertex goes with the head: 1 above jaw and ears, falling to 0 along the neck."""
+def compute_sway(model: FaceModel) -> Float32:
+    """float32 (V,): how far each vertex turns with the head, from 1 above jaw and ears to 0 down the neck."""
     chin = known_middle(model, ("2.1", "2.10"))
     lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
     if chin is None or lobe is None:
         return np.ones(len(model.vertices), dtype=np.float32)
     reach = NECK * model.fapu.ENS * 1024
     y, z = model.vertices[:, 1].astype(np.float64), model.vertices[:, 2].astype(np.float64)
-    # The border between head and neck rises from below the chin to below the ears, and stays level behind.
+    # The border between head and neck rises from below the chin to below the ears, and is level behind them.
     along = np.clip((z - lobe[2]) / max(chin[2] - lobe[2], 1e-6), 0.0, 1.0)
     border = lobe[1] + (chin[1] - 0.12 * reach - lobe[1]) * along
     return smoothstep(1 - (border - y) / reach).astype(np.float32)
 
 
 def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
-    """Middle of the first two of those feature points that the face has, or None."""
+    """(3,): the middle of the first two of the named feature points that the face has, or None."""
     places = np.array([model.points[point_row(name)] for name in names])
     known = places[np.isfinite(places).all(axis=1)][:2]
     return np.asarray(known.mean(axis=0)) if len(known) else None
 
 
-def part_shape(part: Part, sways: Float32) -> FaceShape:
-    """What does not change in a part. sways (V,): how far its vertices would go with the head."""
+def make_shape(part: Part, sways: Float32) -> FaceShape:
+    """The constant data of a part. sways: (V,), how far its vertices turn with the head."""
     colours = part.colours
     if colours is None:
         row = (*part.material.colour, 1.0 - part.material.roughness)
@@ -75,16 +75,18 @@ def part_shape(part: Part, sways: Float32) -> FaceShape:
         SCATTER.get(part.kind, 0.0),
         _relief(part),
         part.kind in TWO_SIDED,
-        hairs(part) if part.kind in HAIRY and picture is None else None,
+        find_hairs(part) if part.kind in HAIRY and picture is None else None,
         name=part.name,
         kind=part.kind,
         smooth=_is_smooth(part),
     )
 
 
-def coarser_part(part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None) -> Coarser:
-    """Levels of detail of a part that takes these poses, (V, 3) each. more: (V, N), what is to be kept
-    besides its normals, colours and texture, scaled to metres."""
+def detail_levels(
+    part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None
+) -> DetailLevels:
+    """Levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to preserve besides
+    normals, colours and texture, scaled to metres."""
     columns = list(poses)
     if part.normals is not None:
         columns.append(part.normals * NORMAL_WEIGHT)
@@ -95,21 +97,21 @@ def coarser_part(part: Part | BodyPart, poses: Sequence[Float32], more: Float32 
         columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
     if more is not None:
         columns.append(more)
-    return Coarser(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
+    return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
 
 
 def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:
-    """The same with some of its triangles only."""
+    """The shape with these triangles (F, 3) only."""
     left = np.ascontiguousarray(triangles, dtype=np.int32)
     coarser = None if shape.coarser is None else replace(shape.coarser, triangles=left)
     return replace(shape, triangles=left, coarser=coarser)
 
 
-def hairs(part: Part) -> Float32 | None:
-    """(V, 8) as `FaceShape.across` has it, or None where a part is not of single hairs.
+def find_hairs(part: Part) -> Float32 | None:
+    """float32 (V, 8) as in `FaceShape.across`, or None if a part does not consist of single hairs.
 
-    A hair is a strip of two rows of vertices that ends in a point: the vertex opposite to one is the
-    nearest that an edge joins it to.
+    A hair is a strip of two rows of vertices that ends in a point; the vertex opposite to another is the
+    nearest one joined to it by an edge.
     """
     if not len(part.triangles):
         return None
@@ -130,7 +132,7 @@ def hairs(part: Part) -> Float32 | None:
         return None
     hair = _pieces(edges, count)
     tip = np.full(count, -1)
-    tip[hair[~paired]] = np.flatnonzero(~paired)  # a point is not opposite to what is nearest to it
+    tip[hair[~paired]] = np.flatnonzero(~paired)  # unpaired: a tip's nearest has a nearer one
     kept = paired & (tip[hair] >= 0)
     found = np.zeros((count, 8), dtype=np.float32)
     found[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
@@ -141,9 +143,9 @@ def hairs(part: Part) -> Float32 | None:
 
 
 def _pieces(edges: Intp, count: int) -> Intp:
-    """(V,) the lowest vertex that each is joined to. edges (E, 2), both ways."""
+    """(V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
     lowest = np.arange(count)
-    while True:  # each round halves the way that is left to go
+    while True:  # each round halves the remaining distance
         found = lowest.copy()
         np.minimum.at(found, edges[:, 0], lowest[edges[:, 1]])
         np.minimum.at(found, lowest, found)
@@ -159,7 +161,7 @@ def _units(vectors: Float64) -> Float64:
 
 
 def _relief(part: Part) -> tuple[float, float]:
-    """Strength of the skin's relief and its repeats, so that a repeat is `RELIEF` metres wide."""
+    """Strength of the skin's relief and its repetitions, so that each is `RELIEF` metres wide."""
     if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
         return (0.0, 1.0)
     metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
@@ -167,7 +169,7 @@ def _relief(part: Part) -> tuple[float, float]:
 
 
 def _is_smooth(part: Part) -> bool:
-    """Whether most edges bend so little that light may be worked out at their ends."""
+    """Whether most edges bend so little that light may be interpolated between vertices."""
     if part.normals is None or not len(part.triangles):
         return True
     upright, places = part.normals[part.triangles], part.vertices[part.triangles]
@@ -177,7 +179,7 @@ def _is_smooth(part: Part) -> bool:
 
 
 def _picture(part: Part) -> FacePicture | None:
-    """The part's texture, or None where there is none that can be read."""
+    """The part's texture, or None, with an FbaWarning if it cannot be read."""
     if part.material.texture is None:
         return None
     try:

@@ -1,8 +1,8 @@
-"""How much light reaches the vertices of a body: past its own folds, and past its limbs as they move.
+"""How much light reaches the vertices of a body past its folds and past its moving limbs.
 
-The folds are looked at once, in the posture that the body is modelled in. Limbs, trunk and head are taken as
-capsules between joints: what they hide of the sky and of the key light is worked out at a part of the
-vertices, and spread over the others.
+Occlusion by folds is computed once, in the bind pose. Limbs, trunk and head count as capsules between
+joints: how much they hide of the sky and of the key light is computed at some vertices and interpolated at
+the others.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from fba.arrays import Array, Float32, Float64, Int32, Integer
 from fba.body.model import BodyModel
 from fba.cache import kept, key_of
 from fba.compiled import compiled, is_compiled
-from fba_player.figure.face_light import KEY_DIRECTION, kept_visibility
-from fba_player.mesh.simplify import Coarser
+from fba_player.figure.face_light import KEY_DIRECTION, cached_visibility
+from fba_player.mesh.simplify import DetailLevels
 
 Prepared = tuple[Int32, Int32, Float32, Float32]
 
 REACH = (1.0, 0.95, 0.0, 0.25)
-"""What light reaches a body where nothing is in its way: it shades itself most from behind."""
+"""Light that reaches an unobstructed body: key, sky, through, rim; it shades itself most from behind."""
 CAPSULES = (
     ("sacroiliac", "vt4", 0.115),
     ("vc2", "skullbase", 0.085),
@@ -32,18 +32,18 @@ CAPSULES = (
     ("l_hip", "l_knee", 0.072), ("r_hip", "r_knee", 0.072),
     ("l_knee", "l_ankle", 0.05), ("r_knee", "r_ankle", 0.05),
 )  # fmt: skip
-"""Joints at both ends, and the radius of a body 1.75 m tall (m)."""
+"""Joints at both ends, and the radius (m) for a body 1.75 m tall."""
 KEY = tuple(np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION))
 TALL = 1.75
 COARSE = 0.0064
-"""Light is worked out at what is left of the vertices where the surface may be off by this (m)."""
+"""Light is computed at the vertices that are left when the surface is simplified with this error (m)."""
 NEAREST = 3
 LARGE = 4000
-"""Which vertices are near to which is kept on disk for bodies of so many and more."""
+"""Neighbours are cached on disk for bodies with at least this many vertices."""
 MAKING = 1
-"""Counts up with every change of that: what was kept before is then made anew."""
+"""Cache version of neighbours; increment when `_near` gives other results."""
 FOLDS = 0.75
-"""How much of what folds hide is shown: cloth lets some light through, and the posture changes."""
+"""Strength of occlusion by folds: below 1, as cloth lets light through and the posture changes."""
 
 
 class BodyLight:
@@ -53,14 +53,16 @@ class BodyLight:
     is computed on first use, in about a second, and stored in the disk cache.
     """
 
-    def __init__(self, body: BodyModel, coarser: Mapping[str, Coarser | None]) -> None:
+    def __init__(self, body: BodyModel, coarser: Mapping[str, DetailLevels | None]) -> None:
         self._body = body
         self._coarser = coarser
         names = body.skeleton.names
         known = [row for row in CAPSULES if row[0] in names and row[1] in names]
         self._ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
         tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else TALL
-        head = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or the neck
+        head = (
+            0.92 if "head" in {part.kind for part in body.parts} else 0.85
+        )  # up to the crown, or to the neck
         self._radii = np.array([row[2] for row in known]) * (tall / head / TALL if tall > 0 else 1.0)
 
     def shade(self, positions: Float32, normals: Float32, joints: Float64) -> Float32:
@@ -91,12 +93,12 @@ class BodyLight:
                 rows.append(np.arange(min(len(part.vertices), 1)))  # not drawn
                 continue
             coarser = self._coarser[part.name]
-            left = None if coarser is None else coarser.within(COARSE)
+            left = None if coarser is None else coarser.triangles_within(COARSE)
             rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
         near, shares = _near([part.vertices for part in body.parts], rows)
         starts = [body.starts[part.name] for part in body.parts]
         every = np.ones(len(body.vertices), dtype=bool)
-        open_ = kept_visibility(body.vertices, body.normals, body.triangles, every).open
+        open_ = cached_visibility(body.vertices, body.normals, body.triangles, every).open
         return (
             np.concatenate([some + start for some, start in zip(rows, starts, strict=True)]).astype(np.int32),
             near,
@@ -106,8 +108,8 @@ class BodyLight:
 
 
 def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
-    """For each vertex of all parts, (V, 3) each, the places of the nearest of its part's rows among the rows
-    of all: (V, NEAREST), and their shares."""
+    """For each vertex of all parts, (V, 3) each: indices (V, NEAREST) of the nearest sampled vertices of its
+    part, counted over the rows of all parts, and their weights (V, NEAREST)."""
 
     def make() -> list[Array]:
         from scipy.spatial import cKDTree
@@ -139,9 +141,9 @@ def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
 
 
 def _capsules(ends: Float64, radii: Float64) -> Float32:
-    """(K, 11) for ends (K, 2, 3) and radii (K,): one end, the way to the other, its inverse squared length,
-    how far it goes towards the key light, the inverse squared length of what is left of it, the radius and
-    its square."""
+    """float32 (K, 11) for ends (K, 2, 3) and radii (K,): one end (3), the axis to the other end (3), its
+    inverse squared length, its component towards the key light, the inverse squared length of the rest, the
+    radius and its square."""
     found = np.empty((len(ends), 11), dtype=np.float32)
     way = ends[:, 1] - ends[:, 0]
     squared = np.maximum(np.einsum("ij,ij->i", way, way), 1e-9)
@@ -174,7 +176,7 @@ def _shade_by_capsules(
         bx, by, bz = capsules[k, 3], capsules[k, 4], capsules[k, 5]
         per_way, bk, per_rest = capsules[k, 6], capsules[k, 7], capsules[k, 8]
         radius, square = capsules[k, 9], capsules[k, 10]
-        # The sky: the nearest place of the axis, as a ball there.
+        # The sky: a ball at the nearest point of the axis.
         for i in range(count):
             ax, ay, az = cx - x[i], cy - y[i], cz - z[i]
             s = min(max(-(ax * bx + ay * by + az * bz) * per_way, zero), one)
@@ -184,7 +186,7 @@ def _shade_by_capsules(
             share = min(square * per, one) * np.float32(1.4)
             dark = min(share * towards * np.sqrt(per), np.float32(0.9))
             sky[i] *= one - (dark if towards > zero else zero)
-        # The key light: where the way to it comes nearest to the axis.
+        # The key light: where the ray to it passes nearest to the axis.
         for i in range(count):
             ax, ay, az = cx - x[i], cy - y[i], cz - z[i]
             ab, ak = ax * bx + ay * by + az * bz, ax * kx + ay * ky + az * kz
@@ -195,7 +197,7 @@ def _shade_by_capsules(
             away = np.sqrt(dx * dx + dy * dy + dz * dz)
             hidden = max(min((radius + soft - away) / (np.float32(2.0) * soft), one), zero)
             hidden = hidden * hidden * (np.float32(3.0) - np.float32(2.0) * hidden)
-            # a limb does not hide its own skin
+            # a limb does not hide its own skin from the light
             near = min((ahead / radius - np.float32(0.4)) / np.float32(1.2), one)
             before = nx[i] * kx + ny[i] * ky + nz[i] * kz >= np.float32(-0.2)
             lit[i] *= one - (hidden * near if before and ahead > np.float32(0.4) * radius else zero)
@@ -205,7 +207,7 @@ def _shade_by_capsules(
 
 @compiled
 def _spread(past: Float32, near: Int32, shares: Float32, folds: Float32, light: Float32) -> None:
-    """light (V, 4): what comes past capsules and folds."""
+    """Write light (V, 4): what comes past capsules and folds."""
     lit, open_ = np.float32(REACH[0]), np.float32(REACH[1])
     through, rim = np.float32(REACH[2]), np.float32(REACH[3])
     for i in range(len(light)):

@@ -1,4 +1,4 @@
-"""A face model as the player shows it: FAPs in; meshes, eyes and feature points out."""
+"""A face model as the player shows it: turns FAPs into meshes, eyes and feature points."""
 
 from __future__ import annotations
 
@@ -13,20 +13,26 @@ from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
 from fba.parameters import FAP_COUNT
 from fba_player.figure._eyeball import Eyeball, find_eyeball
-from fba_player.figure._face_parts import coarser_part, known_middle, part_shape, sway, with_triangles
+from fba_player.figure._face_parts import (
+    compute_sway,
+    detail_levels,
+    known_middle,
+    make_shape,
+    with_triangles,
+)
 from fba_player.figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player.view.camera import Subject
 from fba_player.view.geometry import rotation_vector
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 
 CUT = 0.45
-"""On a body, what sways less than this is left out: the body has a neck of its own."""
+"""On a body, what turns with the head by less than this is left out: the body has its own neck."""
 
 GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
            6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip
-"""FAPs that close the eyes, raise the brows and draw the mouth wide: what they move keeps its detail."""
+"""FAPs that close the eyes, raise the brows and widen the mouth: a pose that levels of detail preserve."""
 EYES_APART = 0.062
-"""Metres between an adult's pupils."""
+"""Distance between an adult's pupils, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +49,8 @@ class Pose:
 class FaceFigure:
     """A face model ready to be shown.
 
-    model: any face. The light that reaches its vertices is worked out on first use, in about a second.
-    sway: float32 (V,), how far each vertex goes with the head, which turns about centre (3,).
+    model: any face. Its occlusion is computed on first use, in about a second. sway: float32 (V,), how far
+    each vertex turns with the head, whose rotation is about `centre` (3,).
     """
 
     def __init__(self, model: FaceModel) -> None:
@@ -58,7 +64,7 @@ class FaceFigure:
         self._eyeballs: list[tuple[Part, Eyeball]] = []
         self._shapes: dict[str, FaceShape] = {}
         self._extremes: dict[tuple[int, ...], Float32] = {}
-        sways = sway(model)
+        sways = compute_sway(model)
         for part in model.parts:
             ball = find_eyeball(part, model) if part.kind == "eye" else None
             if ball is None:
@@ -72,15 +78,15 @@ class FaceFigure:
         self._light = FaceLight(model, self.deformer, sways)
 
     def _shape(self, part: Part, sways: Float32) -> FaceShape:
-        shape = part_shape(part, sways)
-        if shape.across is not None:  # single hairs are not made of fewer triangles
+        shape = make_shape(part, sways)
+        if shape.across is not None:  # single hairs are not simplified
             return shape
         rows = self._ranges[part.name]
         poses = [self._extreme(faps)[rows] for faps in ({}, MOUTH_OPEN, GRIMACE)]
-        return replace(shape, coarser=coarser_part(part, poses))
+        return replace(shape, coarser=detail_levels(part, poses))
 
     def _extreme(self, faps: dict[int, int]) -> Float32:
-        """(V, 3) the face, for FAPs by their numbers; its head not turned."""
+        """float32 (V, 3): the face for values by FAP number, without the head's turn."""
         key = tuple(faps)
         if key not in self._extremes:
             values = np.zeros(FAP_COUNT, dtype=np.float32)
@@ -91,7 +97,7 @@ class FaceFigure:
 
     @property
     def scale(self) -> float:
-        """How large it is: 1 where the eyes are as far apart as an adult's."""
+        """Size of the face: 1 if the eyes are as far apart as an adult's."""
         return self.model.fapu.ES * 1024 / EYES_APART
 
     @cached_property
@@ -103,21 +109,21 @@ class FaceFigure:
 
     @cached_property
     def subject(self) -> Subject:
-        """What a camera is to have in view: the head from its top to the upper chest."""
+        """What a camera should have in view: the head from its top to the upper chest."""
         model = self.model
         head = np.concatenate([part.vertices for part in model.of_kind("skin") or model.parts])
         chin = known_middle(model, ("2.10", "2.1"))
         tall = model.fapu.ENS * 1024 * 5.2
         top = float(head[:, 1].max())
         low = float(chin[1]) if chin is not None else top - tall
-        if not 0.5 * tall < top - low < 2 * tall:  # hair, a hat, or a body below
+        if not 0.5 * tall < top - low < 2 * tall:  # high hair, a hat, or a body below
             top = low + tall
         x, _, z = self.between_eyes
         centre = (float(x), (top + low) / 2 - 0.07 * (top - low), float(z) - 0.3 * (top - low))
         return Subject(centre, 0.71 * (top - low), 0.60 * (top - low))
 
     def pose(self, faps: Float32) -> Pose:
-        """The face for FAPs (68,)."""
+        """The face for FAPs (68,); the last pose is kept."""
         if self._pose is None or not np.array_equal(self._pose.faps, faps):
             self._pose = self._posed(faps.copy())
         return self._pose
@@ -130,9 +136,9 @@ class FaceFigure:
     def meshes(
         self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()
     ) -> list[FaceMesh]:
-        """The parts for FAPs (68,), put into the world by matrix (4, 4).
+        """All parts but the eyeballs for FAPs (68,); matrix: (4, 4), into the world.
 
-        on_body: without the lower neck and shoulders. without: kinds of parts that are left out.
+        on_body: whether to leave out the lower neck and shoulders. without: kinds of parts to leave out.
         """
         pose = self.pose(faps)
         light = self._light.shade(pose.positions, pose.turn[:3, :3], matrix[:3, :3])
@@ -152,7 +158,7 @@ class FaceFigure:
         return self._shapes
 
     def rows(self, name: str) -> slice:
-        """Where a part's vertices are among those of the model."""
+        """The slice of a part's vertices in the arrays of the model."""
         return self._ranges[name]
 
     def shade(self, faps: Float32, frame: Float64) -> Float32:
@@ -163,19 +169,19 @@ class FaceFigure:
         return self._light.shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
-        """The eyeballs for FAPs (68,), put into the world by matrix (4, 4).
+        """The eyeballs for FAPs (68,); matrix: (4, 4), into the world.
 
-        turned: whether that has the head's turn in it.
+        turned: whether the matrix contains the head's turn already.
         """
         pose = self.pose(faps)
         placed = matrix if turned else matrix @ pose.turn
         return [
-            ball.posed(pose.positions[self._ranges[part.name]], pose.positions, faps, placed)
+            ball.pose(pose.positions[self._ranges[part.name]], pose.positions, faps, placed)
             for part, ball in self._eyeballs
         ]
 
     def points(self, faps: Float32, matrix: Float64) -> Float64:
-        """(84, 3) feature points for FAPs (68,) in the world; NaN where the face has none."""
+        """float64 (84, 3): feature points in the world for FAPs (68,); NaN for those that the face lacks."""
         places = self.deformer.feature_points(faps)
         moved: Float64 = places @ matrix[:3, :3].T + matrix[:3, 3]
         return moved
@@ -190,7 +196,7 @@ class FaceFigure:
 
 
 def _head_centre(model: FaceModel) -> Float64:
-    """The point that the head turns about, as its tables say."""
+    """(3,): the centre of the head's rotation in its tables; the origin if there is none."""
     for number in (48, 49, 50):
         table = model.table_of.get(number)
         for transform in table.transforms if table is not None else ():

@@ -1,4 +1,4 @@
-"""How much light reaches the vertices of a face, as it turns and opens its mouth."""
+"""How much light reaches the vertices of a face as it turns and opens its mouth."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from fba_player.figure._face_light_loops import Table, blend_swaying, light_vert
 from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
 
 KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
-"""As in shaders/lighting.glsl."""
+"""Directions of key and rim light; the same as in shaders/lighting.glsl."""
 LIGHTS = np.array([KEY_DIRECTION, RIM_DIRECTION])
 MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
               51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
-"""FAPs of a mouth open so far that light falls in."""
+"""FAPs of a mouth so wide open that light falls in."""
 FREE = (0.9, 0.8, 0.0, 0.3)
-"""The light that reaches a tongue put out."""
+"""Light on a tongue that is put out: key, sky, through, rim."""
 ON_TEETH = 0.3
-"""How much more light falls on teeth than finds its way between the lips."""
+"""Share of the missing light that is added on teeth when the mouth is open."""
 STEP = 2
-"""Digits to which the head's rotation is taken: its light changes by less than is seen."""
+"""Decimals to which the head's rotation is rounded; the light changes invisibly little."""
 MOVES = 0.05
-"""What sways less than this is lit without care."""
+"""Occlusion is not computed at vertices that turn with the head by less than this."""
 
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """Visibility with the mouth shut and open, (V,) where these differ, and how far its lips are apart in
-    both, metres."""
+    """Visibility with the mouth shut and wide open; near: bool (V,), where these differ; gaps: distances of
+    the lips in both, metres."""
 
     shut: Visibility
     wide: Visibility
@@ -99,7 +99,7 @@ class FaceLight:
         if self._lips is None:
             return 0.0
         share = (self._gap(positions) - gaps[0]) / max(gaps[1] - gaps[0], 1e-6)
-        return float(min(max(share, 0.0), 1.0) ** 0.4)  # the first millimetres let most of the light in
+        return float(min(max(share, 0.0), 1.0) ** 0.4)  # the first millimetres let in most of the light
 
     def _gap(self, positions: Float32) -> float:
         assert self._lips is not None
@@ -107,12 +107,12 @@ class FaceLight:
         return math.sqrt(float(way @ way))
 
     def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
-        """(N,) how far vertices of a tongue at these depths are out between the lips, 0..1."""
+        """float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the lips."""
         if self._lips is None:
             return np.zeros(len(depths), dtype=np.float32)
         reach = 0.12 * self._model.fapu.ENS * 1024
         lips = min(positions[self._lips[0], 2], positions[self._lips[1], 2])
-        if depths.max(initial=lips) <= lips:  # as most of the time
+        if depths.max(initial=lips) <= lips:  # the usual case
             return np.zeros(len(depths), dtype=np.float32)
         share: Float32 = np.clip((depths - lips) / reach, 0.0, 1.0)
         return share.astype(np.float32)
@@ -125,14 +125,14 @@ class FaceLight:
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
         faps = np.zeros(68, dtype=np.float32)
         still, normals = self._posed(faps)
-        shut = kept_visibility(still, normals, triangles, self._sway > MOVES)
+        shut = cached_visibility(still, normals, triangles, self._sway > MOVES)
         if self._lips is None:
             return Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():
             faps[fap - 1] = value
         moved, normals = self._posed(faps)
         near = self._near_mouth(still)
-        wide = kept_visibility(moved, normals, triangles, near)
+        wide = cached_visibility(moved, normals, triangles, near)
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut.arrays, wide.arrays, strict=True)
@@ -145,13 +145,13 @@ class FaceLight:
         return self._deformer.local(faps, out=positions, normals=normals), normals
 
     def _near_mouth(self, positions: Float32) -> Bool:
-        """(V,) vertices about as near to the mouth as the eyes are to the nose."""
+        """bool (V,): vertices about as near to the mouth as the eyes are to the nose."""
         away = np.linalg.norm(positions - positions[self._lips].mean(axis=0), axis=1)
         return np.asarray(away < 1.1 * self._model.fapu.ENS * 1024)
 
 
-def kept_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
-    """`bake`, but done once and kept on disk: it is half a second of every start."""
+def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
+    """What `bake` returns, stored in the disk cache: computing it takes half a second of every start."""
 
     def make() -> list[Float16]:
         return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
@@ -200,7 +200,7 @@ def _table(baked: Baked, chosen: Intp) -> Table:
 
 
 def _basis(*turns: Float64) -> Float32:
-    """(2 N, 16) what weighs the harmonics for key and rim light, turned by each of turns, N of (3, 3)."""
+    """float32 (2 N, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
     towards = np.empty((2 * len(turns), 3))
     for k, into in enumerate(turns):
         np.dot(LIGHTS, into.T, out=towards[2 * k : 2 * k + 2])

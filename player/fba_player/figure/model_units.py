@@ -1,4 +1,4 @@
-"""A face model as the player can show it: of a person's size, and a word about what it lacks."""
+"""Prepares a face model for display: scales it to a person's size, and warns about what it lacks."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from fba.face.tables import FaceDefTables
 from fba.parameters import faps
 
 SIZES = (0.01, 1.0)
-"""Metres between the eyes of faces that are shown as large as they are: from dolls to giants."""
+"""Distances between the eyes (m) that are taken for metres: from dolls to giants."""
 EYES_APART = 0.062
 KINDS = {"eye": "eyes", "teeth": "teeth"}
 
 
-def usable(model: FaceModel) -> FaceModel:
-    """The model, or a copy of a person's size where its numbers cannot be metres.
+def prepare_model(model: FaceModel) -> FaceModel:
+    """The model, or a copy scaled to a person's size if its unit cannot be metres.
 
-    FbaWarning for such a size, for eyes or teeth that it has not got, and where no FAP moves it.
+    Gives an FbaWarning for such a unit, for missing eyes or teeth, and for missing FaceDefTables.
     """
     named = f"the face {model.name!r}" if model.name else "the face"
     missing = [words for kind, words in KINDS.items() if not model.of_kind(kind)]
@@ -33,11 +33,11 @@ def usable(model: FaceModel) -> FaceModel:
     if SIZES[0] <= apart <= SIZES[1]:
         return model
     _warn(f"{named} is in other units than metres: {apart:.3g} between its eyes; shown as large as a person")
-    return resized(model, EYES_APART / apart)
+    return resize(model, EYES_APART / apart)
 
 
-def resized(model: FaceModel, factor: float) -> FaceModel:
-    """The same face, so many times as large."""
+def resize(model: FaceModel, factor: float) -> FaceModel:
+    """A copy of the face, `factor` times as large."""
     return replace(
         model,
         parts=tuple(
@@ -45,12 +45,12 @@ def resized(model: FaceModel, factor: float) -> FaceModel:
             for part in model.parts
         ),
         points=model.points * factor,
-        tables=tuple(_resized(table, factor) for table in model.tables),
+        tables=tuple(_resize_table(table, factor) for table in model.tables),
     )
 
 
-def _resized(table: FaceDefTables, factor: float) -> FaceDefTables:
-    # Displacements count in units of the face itself; so do angles only where their unit is no length.
+def _resize_table(table: FaceDefTables, factor: float) -> FaceDefTables:
+    # Displacements are in the face's own units; angles scale only if the FAP's unit is a length.
     angle = 1.0 if faps()[table.fap - 1].unit == "AU" else 1.0 / factor
     shift = factor if faps()[table.fap - 1].unit == "AU" else 1.0
     transforms = []
@@ -64,4 +64,4 @@ def _resized(table: FaceDefTables, factor: float) -> FaceDefTables:
 
 
 def _warn(text: str) -> None:
-    warnings.warn(text, FbaWarning, stacklevel=5)  # whoever made the scene
+    warnings.warn(text, FbaWarning, stacklevel=5)  # the caller who made the scene

@@ -1,7 +1,7 @@
-"""How much of the light from any direction reaches each vertex of a mesh, past the rest of it.
+"""How much of the light from any direction reaches each vertex of a mesh past the rest of the mesh.
 
-Worked out once for a pose, by looking at the mesh from many directions, and kept as spherical
-harmonics: soft shadows of large lights then cost a few products a vertex, whichever way the head turns.
+Computed once for a pose, from depth maps of the mesh from many directions, and stored as spherical harmonics:
+soft shadows of large lights then cost a few products for each vertex, whichever way the head turns.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from fba.arrays import Bool, Float32, Float64, Int32, Intp
 from fba.compiled import compiled, is_compiled
 
 DIRECTIONS = 72
-"""From so many sides the mesh is looked at."""
+"""Number of directions from which the mesh is rendered."""
 PIXEL = 0.0014
-"""Size of a pixel of such a look, metres: finer than the folds that are to be shaded."""
+"""Size of a depth map's pixel, metres: finer than the folds that are to be shaded."""
 MOST_PIXELS = 400
 SOFTNESS = (1.0, 0.92, 0.72, 0.46)
-"""What is left of each band of the harmonics: a light of some 40 degrees across."""
+"""Factor for each band of the harmonics, for a light some 40 degrees wide."""
 SKIN_DEPTH = 0.0045
-"""Metres after which light through skin has faded to 1/e."""
+"""Depth (m) at which light through skin has faded to 1/e."""
 HARMONICS = 16
 BAKING = "1"
-"""Counts up with every change of what `bake` gives: what was kept before is then made anew."""
+"""Cache version; increment when `bake` gives other results."""
 
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """light: float32 (V, 16), harmonics of what is seen of each direction, 1 where it is free.
-    through: float32 (V, 16), harmonics of what comes through the skin from behind. open: float32 (V,),
-    how much of the hemisphere above the vertex is free, weighted by the cosine."""
+    """light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32
+    (V, 16), harmonics of the light through the skin from behind. open: float32 (V,), the free share of the
+    hemisphere above each vertex, weighted by the cosine."""
 
     light: Float32
     through: Float32
@@ -41,11 +41,11 @@ class Visibility:
 
     @property
     def arrays(self) -> tuple[Float32, Float32, Float32]:
-        """light, through, open."""
+        """(light, through, open)."""
         return self.light, self.through, self.open
 
     def towards(self, direction: npt.ArrayLike) -> tuple[Float32, Float32]:
-        """What reaches each vertex from a direction (3,), and what comes through: float32 (V,), 0..1."""
+        """Light from a direction (3,) at each vertex, and light through the skin: float32 (V,), 0..1."""
         tables = (self.light, self.through)
         basis = weights(np.asarray(direction, dtype=np.float64)[None])[0].astype(np.float32)
         light, through = (np.clip(np.einsum("ij,j->i", table, basis), 0, 1) for table in tables)
@@ -58,17 +58,17 @@ def bake(
     triangles: Int32,
     within: Bool | None = None,
 ) -> Visibility:
-    """The visibility of every vertex (V, 3) in a mesh; about half a second for 20,000 of them.
+    """The visibility of every vertex (V, 3) of a mesh; takes about half a second for 20,000 vertices.
 
-    within: (V,), the vertices about which it is worked out finely; all by default. Others may count as
-    free. Without numba it would take minutes: everything then counts as free.
+    within: bool (V,), the vertices whose visibility is computed, all by default; others may count as free.
+    Without numba, which would take minutes, all vertices count as free.
     """
     count = len(vertices)
     directions = _directions()
     visible = np.ones((count, len(directions)), dtype=np.float32)
     through = np.zeros_like(visible)
     if is_compiled() and count:
-        # Those of a model cannot be written to, which is another type: the loops would be compiled for both.
+        # Copies: read-only arrays, as a model's, are another type, for which loops would be compiled again.
         normals, triangles = normals.copy(), triangles.copy()
         rows = np.arange(count) if within is None or not within.any() else np.flatnonzero(within)
         chosen = vertices[rows]
@@ -90,12 +90,12 @@ def bake(
 
 
 def weights(directions: Float64) -> Float64:
-    """(N, 16) what a row of `Visibility` is to be multiplied with, for large lights in directions (N, 3)."""
+    """float64 (N, 16): weights for rows of `Visibility`, for large lights in directions (N, 3)."""
     return harmonics(directions) * _bands()
 
 
 def harmonics(directions: Float64) -> Float64:
-    """(N, 16) real spherical harmonics up to the third band, for unit vectors (N, 3)."""
+    """float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
     found = np.empty((len(directions), HARMONICS))
     _harmonics(np.ascontiguousarray(directions, dtype=np.float64), found)
     return found
@@ -130,7 +130,7 @@ def _bands() -> Float64:
 
 @cache
 def _directions() -> Float64:
-    """(N, 3) unit vectors spread evenly over the sphere."""
+    """float64 (N, 3): unit vectors spread evenly over the sphere."""
     k = np.arange(DIRECTIONS) + 0.5
     z = 1 - 2 * k / DIRECTIONS
     around = np.pi * (1 + 5**0.5) * k
@@ -139,7 +139,7 @@ def _directions() -> Float64:
 
 
 def _frame(direction: Float64) -> Float64:
-    """Rows: across, up and towards the looker."""
+    """float64 (3, 3), as rows: right, up and towards the viewer, who looks from this direction."""
     aside = np.cross(direction, (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 else (1.0, 0.0, 0.0))
     aside /= np.linalg.norm(aside)
     return np.stack([aside, np.cross(direction, aside), direction])
@@ -147,8 +147,10 @@ def _frame(direction: Float64) -> Float64:
 
 @compiled
 def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
-    """Below a vertex's horizon its own surface hides it, which the shading itself accounts for: what is
-    seen there is taken from the direction mirrored at the horizon."""
+    """Replace visibility below each vertex's horizon by that of the direction mirrored at the horizon.
+
+    There the surface hides itself, which shading by the normal accounts for already.
+    """
     count = len(directions)
     for i in range(len(visible)):
         for k in range(count):
@@ -169,8 +171,7 @@ def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
 
 @compiled
 def _draw(seen: Float32, triangles: Int32, depth: Float32) -> None:
-    """Draw the depth of what faces the looker of a mesh seen from one side (V, 3): x, y in -1..1, z
-    towards the looker."""
+    """Draw the depths of front-facing triangles. seen: (V, 3), x and y in -1..1, z towards the viewer."""
     size = depth.shape[0]
     depth[:] = -10.0
     half = 0.5 * size
@@ -210,7 +211,7 @@ def _look(
     visible: Float32,
     through: Float32,
 ) -> None:
-    """Which vertices (rows) lie in front in a picture of depths, and how much lies before the others."""
+    """Write for vertices `rows` their visibility in a depth map, and the light that comes through to them."""
     size = depth.shape[0]
     half = 0.5 * size
     pixel = 2.0 * reach / size
@@ -219,7 +220,7 @@ def _look(
         column, row = min(max(int(x), 0), size - 2), min(max(int(y), 0), size - 2)
         fx, fy = min(max(x - column, 0.0), 1.0), min(max(y - row, 0.0), 1.0)
         free, behind = 0.0, 0.0
-        # A surface seen at a slant changes its depth within a pixel.
+        # The depth of a slanted surface changes within a pixel.
         slant = pixel * (1.2 + 1.5 / max(abs(facing[i]), 0.15))
         for k in range(4):
             down, right = k // 2, k % 2

@@ -11,24 +11,24 @@ from fba.arrays import Float32, Float64
 from fba.body.head_attachment import HeadOnBody
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
-from fba_player.figure._face_parts import coarser_part, part_shape, with_triangles
+from fba_player.figure._face_parts import detail_levels, make_shape, with_triangles
 from fba_player.figure.body_light import BodyLight
 from fba_player.figure.face import FaceFigure
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 
 SCATTER = {"skin": 1.0, "neck": 1.0}
 SEEN_WEIGHTS, BEND = 6, 0.02
-"""How a coarser body keeps its joints: what a vertex carried by the wrong one counts in metres."""
+"""Simplification preserves skin weights in this many random projections, scaled to this many metres."""
 WORLD, NOWHERE = np.eye(4), np.zeros(3)
 CARRIED = ("skin", "mouth", "hair", "other")
-"""Kinds of parts of a face that the neck may bend; eyes, teeth and tongue go with the skull."""
+"""Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
 
 class Person:
     """Body and face, moved by joint matrices and FAPs.
 
-    body: a model with a place for pupils. figure: the face to be put there. What of the face lies under the
-    clothes is left out, and so are parts of kind "other" that lie wholly below the chin: the body is dressed.
+    body: a model that says where the pupils are. figure: the face to be put there. Triangles of the face
+    under the body's clothes are left out, and so are parts of kind "other" that lie wholly below the chin.
     """
 
     def __init__(self, body: BodyModel, figure: FaceFigure) -> None:
@@ -49,15 +49,15 @@ class Person:
         self._light = BodyLight(body, {name: shape.coarser for name, shape in self._shapes.items()})
 
     def joints(self, faps: Float32, matrices: Float64) -> Float64:
-        """Joint matrices (J, 4, 4) with the head turned by FAPs (68,) on its skull base."""
+        """Joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
         return self.head.matrices(matrices, self.figure.pose(faps).turn)
 
     def frame(self, joints: Float64) -> Float64:
-        """(4, 4): frame of the face model into the world."""
+        """(4, 4): from the face model's frame into the world."""
         return self.head.frame(joints)
 
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
-        """Everything but the eyeballs, for FAPs (68,) and joint matrices with the head's turn."""
+        """All parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
         positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
         self.body.skin(joints, positions, normals)
         light = self._light.shade(positions, normals, joints)
@@ -74,11 +74,11 @@ class Person:
         return meshes
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
-        """The eyeballs, likewise."""
+        """The eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
         return self.figure.eyes(faps, self.frame(joints), turned=True)
 
     def _face_shapes(self) -> dict[str, FaceShape]:
-        """The face's parts without what the clothes hide."""
+        """The face's parts by name, without the triangles that clothes hide."""
         model, found = self.figure.model, {}
         chin = model.points[point_row("2.1")][1]
         for name, shape in self.figure.shapes.items():
@@ -93,11 +93,11 @@ class Person:
 
 
 def _shape(part: BodyPart, joints: int) -> FaceShape:
-    shape = part_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
-    # Where joints bend it there is to be something to bend: weights, seen from a few fixed sides.
+    shape = make_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
+    # Where joints bend the body, vertices must be left: preserve the weights, projected a few fixed ways.
     random = np.random.default_rng(7).standard_normal((joints, SEEN_WEIGHTS)) / SEEN_WEIGHTS**0.5
     carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * BEND
-    coarser = coarser_part(part, [part.vertices], carried.astype(np.float32))
+    coarser = detail_levels(part, [part.vertices], carried.astype(np.float32))
     kept = replace(shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True, name="")
     return replace(kept, coarser=coarser)
 

@@ -1,4 +1,4 @@
-"""Draws a view's extras over its figure: shells, grid, lines, dots, words."""
+"""Draws a view's annotations over its figure: shells, grid, lines, dots, labels."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from fba_player.view.view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend
 
 REFERENCE_HEIGHT, LEAST_SCALE = 720, 0.35
 CROWDED = 7.0
-"""Lines shorter than this (pixels) are fainter: a fine mesh is a tint, not a black spot."""
+"""Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint and no black spot."""
 HIDDEN = 0.2
-"""How much of a dot is seen through what hides it."""
+"""Opacity of a dot behind a surface."""
 LEAST_RADIUS = 0.8
 NAME_SIZE, SMALLEST_NAME = 13, 10
 LEAST_LEGEND = 0.65
 MARGIN = 14
 MOST_WORDS = 16
-"""Textures of words that are kept."""
+"""Number of label textures that are cached."""
 MOST_SHELLS = 48
-"""Shells whose triangles are remembered; the longest unused goes first."""
+"""Number of shells whose triangles are cached; the least recently used goes first."""
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
 
 
 def projected(places: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
-    """(N, 2) pixels from the upper left, and (N,) depths 0..1, of places (N, 3); NaN behind the camera.
+    """Pixels (N, 2) from the upper left and depths (N,), 0..1, of points (N, 3); NaN behind the camera.
 
     matrix: (4, 4), world to clip space.
     """
@@ -50,7 +50,7 @@ def projected(places: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[
 
 
 def _pixels_a_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
-    """How many pixels a metre has where the middle of the dots is."""
+    """Pixels per metre at the middle of the dots."""
     if not len(dots.places):
         return 0.0
     away = float(np.linalg.norm(dots.places.mean(axis=0) - camera.eye))
@@ -64,7 +64,7 @@ def _towards(eye: Float64, places: Float64, lift: float) -> Float64:
 
 
 class ExtrasRenderer:
-    """Draws extras; what it needs on the graphics card is made on first use and given back by `close`."""
+    """Draws annotations. OpenGL objects are created on first use; `close` frees them."""
 
     def __init__(self, context: Any) -> None:
         self._gl = context
@@ -76,7 +76,7 @@ class ExtrasRenderer:
         self._indices: dict[int, tuple[FaceShape, Any]] = {}
 
     def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
-        """Over what the bound framebuffer shows from that camera, its depths known."""
+        """Draw into the bound framebuffer, over a picture from that camera and with its depths."""
         if not self._programs:
             self._programs = {name: load_program(self._gl, f"extra_{name}") for name in PROGRAMS}
             self._square = self._gl.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4").tobytes())
@@ -90,7 +90,7 @@ class ExtrasRenderer:
         gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
         self._draw_shells(extras.shells)
         gl.fbo.depth_mask = False
-        # What covers a pixel here is smooth already: it takes the alpha away, by which the target knows.
+        # Annotations are antialiased already: they clear alpha, which tells the target not to smooth them.
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA
         if extras.grid is not None:
             self._draw_grid(extras.grid)
@@ -110,7 +110,7 @@ class ExtrasRenderer:
         gl.enable_only(gl.DEPTH_TEST)
 
     def close(self) -> None:
-        """Free everything allocated on the graphics card."""
+        """Free all OpenGL objects."""
         for texture, _ in self._textures.values():
             texture.release()
         for _, triangles in self._indices.values():
@@ -126,7 +126,7 @@ class ExtrasRenderer:
         self._programs.clear()
 
     def _filled(self, name: str, data: Array) -> Any:
-        """A buffer kept under a name, with this in it."""
+        """The buffer of this name, filled with data; it grows as needed."""
         held = self._buffers.get(name)
         if held is None or held.size < data.nbytes:
             if held is not None:
@@ -149,7 +149,7 @@ class ExtrasRenderer:
             content = [(vertices, "3f 3f", "in_position", "in_normal")]
             triangles = self._triangles(mesh.shape)
             arrays.append(gl.vertex_array(self._programs["shell"], content, index_buffer=triangles))
-        # Depths first, so that only the nearest skin is seen.
+        # Depths first, so that only the nearest surface shows.
         gl.blend_func = gl.ZERO, gl.ONE
         for array in arrays:
             array.render()
@@ -162,12 +162,12 @@ class ExtrasRenderer:
             array.release()
 
     def _triangles(self, shape: FaceShape) -> Any:
-        """Those of a shell, kept."""
+        """The index buffer of a shell, cached."""
         held = self._indices.pop(id(shape), None)
         if held is None:
             data = np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()
             held = (shape, self._gl.buffer(data))
-        self._indices[id(shape)] = held  # now the latest used
+        self._indices[id(shape)] = held  # most recently used
         while len(self._indices) > MOST_SHELLS:
             self._indices.pop(next(iter(self._indices)))[1].release()
         return held[1]
@@ -200,7 +200,7 @@ class ExtrasRenderer:
         self._render("line", content, len(lines.ends))
 
     def _draw_dots(self, dots: Dots, scale: float, near: float) -> None:
-        """near: pixels a metre where they are."""
+        """Draw dots. near: pixels per metre where they are."""
         if not len(dots.places):
             return
         gl, program = self._gl, self._programs["dot"]
@@ -245,7 +245,7 @@ class ExtrasRenderer:
             self._draw_labels(words, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
 
     def _depths_of(self, size: tuple[int, int]) -> Float32:
-        """(H, W) depths of what is drawn, 0..1, bottom row first; read once a picture."""
+        """float32 (H, W): depths of the picture, 0..1, bottom row first; read once for each picture."""
         if self._depths is not None:
             return self._depths
         gl, source, parts = self._gl, self._gl.fbo, []
@@ -261,14 +261,14 @@ class ExtrasRenderer:
         return self._depths
 
     def _words(self, key: Hashable, make: Callable[[], tuple[UInt8, Any]]) -> tuple[Any, Any]:
-        """A texture of words and what `make` gave with it; the last few are kept."""
+        """A texture of labels and what `make` returned with it; the last few are cached."""
         held = self._textures.pop(key, None)
         if held is None:
             picture, more = make()
             texture = self._gl.texture((picture.shape[1], picture.shape[0]), 4, picture.tobytes())
             texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
             held = (texture, more)
-        self._textures[key] = held  # now the latest used
+        self._textures[key] = held  # most recently used
         while len(self._textures) > MOST_WORDS:
             self._textures.pop(next(iter(self._textures)))[0].release()
         return held

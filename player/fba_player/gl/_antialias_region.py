@@ -1,4 +1,4 @@
-"""Where a view may leave steps in a picture: what lies elsewhere need not be smoothed."""
+"""The regions of a picture in which a view may leave jagged edges; the rest need not be smoothed."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from fba_player.gl._silhouette import Outliner
 from fba_player.view.view import FaceMesh, View
 
 MARGIN = 0.03
-"""Added on every side, as a share of what is filled."""
+"""Margin on every side, as a share of a rectangle's size."""
 NEAR = 1e-3
 ROW = 64
 STILL = 0.3
-"""What goes with the head by less than this is looked at apart: shoulders are wide, and low."""
+"""Vertices that turn with the head by less than this get a box of their own: shoulders are wide and low."""
 
 
 Rectangle = tuple[int, int, int, int]
@@ -25,32 +25,32 @@ Rectangle = tuple[int, int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Where a picture has to be smoothed.
+    """The regions of a picture to be smoothed.
 
-    rectangles: left, bottom, width and height in pixels. bands: float32 (N, 2), corners of triangles, -1..1
-    across the picture; no two lie over each other.
+    rectangles: left, bottom, width and height in pixels. bands: float32 (N, 2), corners of triangles that do
+    not overlap, -1..1 across the picture.
     """
 
     rectangles: list[Rectangle]
     bands: Float32
 
 
-def steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner) -> Steps:
-    """Along the outlines of faces, and anywhere in the rectangles that hold what else is drawn.
+def find_steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner) -> Steps:
+    """The regions along the outlines of faces, and the rectangles that contain everything else.
 
     matrix: (4, 4), world to clip space. size: of the picture in pixels.
     """
     if not is_compiled():
-        return Steps(filled(view, matrix, size), np.zeros((0, 2), dtype=np.float32))
+        return Steps(bounding_rectangles(view, matrix, size), np.zeros((0, 2), dtype=np.float32))
     outliner.begin(size)
     for face in view.faces:
         outliner.add(face, matrix)
-    rest = filled(replace(view, faces=[]), matrix, size)
+    rest = bounding_rectangles(replace(view, faces=[]), matrix, size)
     return Steps(rest, outliner.tiles())
 
 
-def filled(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:
-    """Rectangles (left, bottom, width, height), in pixels, that together hold all that is drawn.
+def bounding_rectangles(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:
+    """Rectangles (left, bottom, width, height), in pixels, that together contain all that is drawn.
 
     matrix: (4, 4), world to clip space. None of them lies within another.
     """
@@ -109,7 +109,7 @@ def _within(one: Rectangle, other: Rectangle) -> bool:
 def _corners(positions: Float32) -> Float64:
     if not len(positions):
         return np.zeros((0, 3))
-    # Long rows are looked through faster than short ones.
+    # NumPy finds extremes of long rows faster than of short ones.
     whole = len(positions) // ROW * ROW
     rows = positions[:whole].reshape(-1, 3 * ROW) if whole else positions[:1].repeat(ROW, 0).reshape(1, -1)
     low = np.concatenate([rows.min(axis=0).reshape(-1, 3), positions[whole:]])

@@ -1,7 +1,7 @@
-"""The shadow that bodies cast on the ground: of a large key light and of the sky, on a grid of a few cm.
+"""The shadow of a body on the ground, from a large key light and the sky, on a grid of a few centimetres.
 
-Points spread evenly over the surface are thrown down along several directions of each light; where they land
-they cover as much ground as their piece of surface hides from that direction.
+Points spread evenly over the surface are projected onto the ground along several rays of each light, where
+each covers as much ground as its piece of surface hides from that direction.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from fba_player.figure.face_light import KEY_DIRECTION
 from fba_player.view.view import FaceMesh, FaceShape
 
 CELLS, CELL = 96, 0.05
-"""The grid: so many squares each way, of this size (m)."""
+"""The grid: number of cells each way, and their size (m)."""
 SPACING = 0.036
-"""Metres between the points."""
+"""Distance between the points, metres."""
 WITHIN = ("teeth", "tongue", "mouth", "eye")
-"""Kinds of parts that lie within others."""
+"""Kinds of parts that lie inside others and cast no shadow."""
 COARSE = 0.0032
-"""Surfaces that are off by this (m) cast the same shadow."""
+"""Error (m) up to which surfaces are simplified before points are spread over them."""
 KEY_RAYS, KEY_WIDTH = 12, 0.11
-"""Directions of the key light, and its radius as an angle (rad)."""
+"""Number of rays of the key light, and its angular radius (rad)."""
 SKY_RAYS, STEEPEST, FLATTEST = 8, 0.97, 0.62
-"""Directions of the sky, from those heights (sines)."""
+"""Number of rays of the sky, and the sines of their greatest and least elevation."""
 KEY_SHARE, SKY_SHARE = 0.62, 0.85
-"""How dark the ground is where all of either is hidden."""
+"""Darkness of the ground where all of the key light, or all of the sky, is hidden."""
 KEY_BLUR, SKY_BLUR = 1, 4
-"""Cells that the shadows are blurred by, twice."""
+"""Radius, in cells, of the two passes of blur."""
 LEAST = 3
-"""Of 255: what is fainter is not drawn."""
+"""Fainter darkness, of 255, is not drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,8 @@ class CastShadow:
 
 
 class Points(NamedTuple):
-    """corners int32 (N, 3), shares float32 (N, 3): where on which triangles; area float32 (N,), m²."""
+    """Points on triangles. corners: int32 (N, 3), shares: float32 (N, 3), weights of the corners; area:
+    float32 (N,), m²."""
 
     corners: Int32
     shares: Float32
@@ -56,7 +57,7 @@ class Points(NamedTuple):
 
 
 class ShadowCaster:
-    """Works out shadows; remembers the shapes that it has seen."""
+    """Computes shadows; caches the points on each shape."""
 
     def __init__(self) -> None:
         self._points: WeakKeyDictionary[FaceShape, Points | None] = WeakKeyDictionary()
@@ -64,8 +65,8 @@ class ShadowCaster:
         self._darkness = np.zeros((CELLS, CELLS), dtype=np.uint8)
 
     def cast(self, meshes: list[FaceMesh], middle: tuple[float, float]) -> CastShadow | None:
-        """What meshes cast on the ground y = 0 about the place (x, z); None where that is nothing, or where
-        it cannot be worked out (without numba)."""
+        """The shadow of meshes on the ground y = 0 around `middle` (x, z); None if there is none, or without
+        numba."""
         if not is_compiled():
             return None
         ahead = 0.9 / KEY_DIRECTION[1]  # shadows fall away from the key light
@@ -98,10 +99,10 @@ class ShadowCaster:
 
 
 def _spread(shape: FaceShape) -> Points | None:
-    """Points over a shape's surface, as it is modelled."""
+    """Points spread over a shape's surface in its rest pose; None for a shape that casts no shadow."""
     if shape.coarser is None or shape.kind in WITHIN:
         return None
-    found = shape.coarser.within(COARSE)
+    found = shape.coarser.triangles_within(COARSE)
     triangles = shape.triangles if found is None else found
     if not len(triangles):
         return None
@@ -111,7 +112,7 @@ def _spread(shape: FaceShape) -> Points | None:
     count = int(ends[-1] / SPACING**2) + 1
     steps = np.arange(count)
     owner = np.minimum(np.searchsorted(ends, (steps + 0.5) * ends[-1] / count), len(triangles) - 1)
-    # Evenly over the triangles: a sequence of low discrepancy in the unit square, folded.
+    # A low-discrepancy sequence in the unit square, folded onto the triangles.
     u, v = (0.5 + steps * 0.7548776662) % 1, (0.5 + steps * 0.5698402910) % 1
     over = u + v > 1
     u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
@@ -124,7 +125,7 @@ def _spread(shape: FaceShape) -> Points | None:
 
 @cache
 def _rays() -> Float64:
-    """(N, 3) unit vectors towards the key light, then the sky."""
+    """float64 (N, 3): unit vectors towards the key light, then towards the sky."""
     key = np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION)
     aside = np.cross(key, (0.0, 1.0, 0.0))
     aside /= np.linalg.norm(aside)
@@ -155,7 +156,7 @@ def _place(
 ) -> int:
     """Write points from row `count` on: column, height (m), row; normal, as long as the area in cells.
 
-    How many there are then.
+    Returns the number of rows written so far.
     """
     corners, shares, area = points
     p = np.empty((3, 3))
@@ -182,10 +183,10 @@ def _place(
 
 @compiled
 def _throw(thrown: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write how dark each cell is; the columns and rows between which there is anything."""
+    """Write the darkness of each cell; return the bounds of the shadow: left, bottom, right, top."""
     cells = len(darkness)
     key, sky = np.zeros((cells, cells), dtype=np.float32), np.zeros((cells, cells), dtype=np.float32)
-    layer = np.empty((cells, cells), dtype=np.float32)  # one ray after another: it stays near the processor
+    layer = np.empty((cells, cells), dtype=np.float32)  # one ray at a time: it stays in the cache
     for ray in range(len(rays)):
         layer[:] = np.float32(0.0)
         _cover(thrown, rays[ray, 0], rays[ray, 1], rays[ray, 2], layer)
@@ -200,7 +201,7 @@ def _throw(thrown: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, i
 
 @compiled
 def _cover(thrown: Float32, rx: float, ry: float, rz: float, layer: Float32) -> None:
-    """Add to a layer the share of each cell that the points cover, seen along a ray."""
+    """Add to a layer the share of each cell that the points cover along a ray."""
     cells = len(layer)
     limit, half, quarters = np.float32(cells - 2), np.float32(0.5), np.float32(0.75)
     longer = 1.0 / ry
@@ -212,7 +213,7 @@ def _cover(thrown: Float32, rx: float, ry: float, rz: float, layer: Float32) -> 
         row = thrown[i, 2] - ahead * thrown[i, 1]
         if not (amount > np.float32(0.0) and 1.0 <= column < limit and 1.0 <= row < limit):
             continue
-        # Over three cells each way, as a quadratic spline spreads it: the points are not quite even.
+        # Spread over three cells each way by a quadratic spline, as the points are not quite even.
         middle, centre = int(column + half), int(row + half)
         fx, fy = column - np.float32(middle), row - np.float32(centre)
         one, two, three = (
@@ -236,7 +237,7 @@ def _cover(thrown: Float32, rx: float, ry: float, rz: float, layer: Float32) -> 
 
 @compiled
 def _blur(grid: Float32, reach: int, room: Float32) -> None:
-    """Mean over 2 reach + 1 cells, along rows and columns, twice."""
+    """Blur by the mean over 2 reach + 1 cells along rows and columns, twice."""
     cells = len(grid)
     per = np.float32(1.0 / (2 * reach + 1))
     for _ in range(2):
@@ -265,7 +266,7 @@ def _blur(grid: Float32, reach: int, room: Float32) -> None:
 
 @compiled
 def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write how dark each cell is, for the rays of both lights that are hidden there; see `_throw`."""
+    """Write the darkness of each cell from the number of hidden rays of both lights; returns as `_throw`."""
     cells = len(darkness)
     left, bottom, right, top = cells, cells, 0, 0
     for row in range(cells):

@@ -1,4 +1,4 @@
-"""Words in a picture: a legend and the names of points, drawn by Pillow, and where names find room."""
+"""Labels in a picture, drawn by Pillow: a legend and the names of points, where there is room."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
 SHADE = (18, 21, 26, 190)
 SMALLEST, SMALLEST_WITH_LEGEND = 96, 240
-"""In pictures lower than this (pixels) there are no names, and no legend."""
+"""Heights (pixels) below which a picture has no names, and no legend."""
 MOST_NAMES = 45
-"""Where more points are in view, none is named."""
+"""If more points are in view, none is named."""
 GAP = 2.0
 
 
 def legend_picture(legend: Legend, scale: float) -> UInt8:
-    """(H, W, 4) colours with numbers below them and a title above. scale: 1 in a picture 720 high."""
+    """uint8 (H, W, 4): a colour bar with numbers below and a title above. scale: 1 in a picture 720 high."""
     from PIL import Image, ImageDraw
 
     title, small = label_font(round(17 * scale)), label_font(round(14 * scale))
@@ -51,7 +51,7 @@ def legend_picture(legend: Legend, scale: float) -> UInt8:
 
 
 def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
-    """(H, W, 4) all names one below the other, and (N, 4) left, top, width and height of each."""
+    """uint8 (H, W, 4): all names below each other; and int64 (N, 4): left, top, width and height of each."""
     from PIL import Image, ImageDraw
 
     font = label_font(pixels)
@@ -68,11 +68,11 @@ def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
 
 
 def placed_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int]) -> tuple[Intp, Float64]:
-    """Which names find room, and their upper left corners (M, 2), pixels.
+    """Indices (M,) of the names for which there is room, and their upper left corners (M, 2), pixels.
 
-    dots: (N, 2) pixels from the upper left, NaN where one cannot be seen. sizes: (N, 2) of the names.
-    None where more than `MOST_NAMES` dots are in the picture; each beside its dot, or above a place
-    without one (radius 0); none over another.
+    dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
+    beside its dot, or above its point if radius is 0, and none overlaps another. There are none if more than
+    `MOST_NAMES` dots are in the picture.
     """
     inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
     if inside.sum() > MOST_NAMES:

@@ -1,4 +1,4 @@
-"""Draws the parts of faces and bodies: their buffers and textures on the graphics card."""
+"""Draws the parts of faces and bodies: their buffers, textures and programs."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float32, Float64, UInt8
-from fba_player.gl._textures import Pictures, halved
-from fba_player.gl.lod import distance, same
+from fba_player.gl._textures import Pictures, count_halvings
+from fba_player.gl.lod import distance, share_memory
 from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
 from fba_player.mesh.textures import RELIEF, skin_relief
 from fba_player.view.view import FaceMesh, FaceShape
 
 MOST_SHAPES = 64
-"""Parts remembered on the graphics card; the longest unused goes first."""
+"""Number of parts whose buffers are cached; the least recently used goes first."""
 FAINTEST = 0.25
-"""Where a repeat of the skin's relief is this share of its size in pixels or less, it is not seen."""
+"""The skin's relief is not drawn if it is reduced to less than this share of its size."""
 
 
 class FaceRenderer:
@@ -31,8 +31,8 @@ class FaceRenderer:
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
-        """From where the next meshes are seen: eye (3,), (4, 4) world to clip space, size of a pixel at a
-        distance of 1."""
+        """Set the camera: its position (3,), the matrix (4, 4) from world to clip space, and the size of a
+        pixel at a distance of 1."""
         before = self._camera
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
         if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
@@ -40,7 +40,7 @@ class FaceRenderer:
                 self._place(program)
 
     def draw(self, meshes: list[FaceMesh]) -> None:
-        """Draw parts; those that can be seen through last."""
+        """Draw parts, the transparent ones last."""
         gl = self._gl
         rest = []
         for mesh in meshes:
@@ -58,7 +58,7 @@ class FaceRenderer:
             gl.enable_only(gl.DEPTH_TEST)
 
     def close(self) -> None:
-        """Free everything allocated on the graphics card."""
+        """Free all OpenGL objects."""
         for _, parts in self._kept.values():
             _release(parts)
         self._kept.clear()
@@ -74,7 +74,7 @@ class FaceRenderer:
         return self._programs[words]
 
     def _array(self, parts: dict[str, Any], words: tuple[str, ...]) -> Any:
-        """The part's vertices as the program takes them."""
+        """The vertex array of a part for a program."""
         if words not in parts["arrays"]:
             attributes: list[tuple[Any, ...]] = [
                 (parts["positions"], "3f", "in_position"),
@@ -103,7 +103,7 @@ class FaceRenderer:
         _upload_vertices(mesh, parts)
         away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
         wide = self._camera[2] * away
-        picture = parts["pictures"].suited(wide)
+        picture = parts["pictures"].choose(wide)
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
         words = tuple(
             word
@@ -131,7 +131,7 @@ class FaceRenderer:
     def _parts(self, mesh: FaceMesh) -> dict[str, Any]:
         key = id(mesh.shape)
         if key in self._kept:
-            self._kept[key] = self._kept.pop(key)  # now the latest used
+            self._kept[key] = self._kept.pop(key)  # most recently used
             return self._kept[key][1]
         while len(self._kept) >= MOST_SHAPES:
             _release(self._kept.pop(next(iter(self._kept)))[1])
@@ -160,11 +160,11 @@ class FaceRenderer:
         return parts
 
     def _relief_texture(self, wide: float) -> Any:
-        """The relief for pixels as wide as this (m), or None where it is not seen."""
+        """The skin's relief for pixels of this width (m), or None if it would be too fine to see."""
         if self._pixels is None:
             self._pixels = skin_relief()
         size = self._pixels.shape[0]
-        halvings = halved(RELIEF / size, wide, size)
+        halvings = count_halvings(RELIEF / size, wide, size)
         if size / 2**halvings < FAINTEST * size:
             return None
         if halvings not in self._reliefs:
@@ -181,7 +181,7 @@ def _upload_vertices(mesh: FaceMesh, parts: dict[str, Any]) -> None:
     """Write positions and normals into a part's buffers, and its light unless that is there already."""
     _write(parts["positions"], mesh.positions)
     _write(parts["normals"], mesh.normals)
-    if parts["lit"] is None or not same(parts["lit"], mesh.light):
+    if parts["lit"] is None or not share_memory(parts["lit"], mesh.light):
         parts["lit"] = mesh.light
         _write(parts["light"], mesh.light)
 
@@ -192,7 +192,7 @@ def _write(buffer: Any, array: Float32) -> None:
 
 
 def _set_shape(program: Any, shape: FaceShape) -> None:
-    """What a program takes of a shape, unless it has just had it."""
+    """Set the uniforms for a shape, unless the program has them already."""
     if program.extra.get("shape") is shape:
         return
     program.extra["shape"] = shape
@@ -203,7 +203,7 @@ def _set_shape(program: Any, shape: FaceShape) -> None:
 
 
 def _set_placing(program: Any, mesh: FaceMesh) -> None:
-    """Where a mesh is and how it is turned, unless the program has just had the same for another part."""
+    """Set the uniforms for a mesh's place and turn, unless the program has them already."""
     placing = (mesh.matrix, mesh.turn, mesh.centre)
     had = program.extra.get("placing")
     if had is not None and all(one is other for one, other in zip(placing, had, strict=True)):

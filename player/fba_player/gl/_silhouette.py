@@ -1,6 +1,6 @@
-"""Where the outlines of meshes run in a picture: there, and only there, steps are to be smoothed.
+"""Finds where outlines of meshes run in a picture: only there must edges be smoothed.
 
-Software OpenGL spends as long on looking for steps in a whole picture as on drawing a face.
+Software OpenGL takes as long to search a whole picture for edges as to draw a face.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from fba.compiled import compiled
 from fba_player.view.view import FaceMesh
 
 TILE = 8
-"""Pixels: the picture is smoothed in tiles of this size that an outline runs through."""
+"""Size (pixels) of the tiles that are smoothed if an outline runs through them."""
 BESIDE = 1.5
-"""Pixels on each side of an outline where there may be steps."""
+"""Pixels on each side of an outline that may need smoothing."""
 
 
 class Edges:
@@ -34,16 +34,16 @@ class Edges:
         self.sides[:, 0] = owner[start]
         uses = np.diff(np.append(start, len(ordered)))
         self.sides[uses == 2, 1] = owner[start[uses == 2] + 1]
-        # Copies: what cannot be written to is another type, and the loops would be compiled for both.
+        # Copies: read-only arrays are another type, for which the loops would be compiled again.
         self.triangles = np.array(triangles, dtype=np.int32, order="C")
-        # Room to work in.
+        # Work space.
         self.seen = np.empty((0, 3), dtype=np.float32)
         self.facing = np.empty(len(triangles), dtype=np.int8)
         self.sway: tuple[Float32, Float32] | None = None
 
 
 class Outliner:
-    """Finds outlines; remembers the edges of the shapes that it has seen.
+    """Finds outlines; caches the edges of shapes.
 
     `begin` a picture, `add` meshes, and take its `tiles`.
     """
@@ -56,7 +56,7 @@ class Outliner:
         self._marked = np.zeros((1, 1), dtype=np.uint8)
 
     def begin(self, size: tuple[int, int]) -> None:
-        """A picture of this width and height in pixels, in which there is nothing yet."""
+        """Start with an empty picture of this width and height in pixels."""
         shape = (-(-size[1] // TILE), -(-size[0] // TILE))
         if self._marked.shape != shape:
             self._marked = np.zeros(shape, dtype=np.uint8)
@@ -64,7 +64,7 @@ class Outliner:
         self._size = size
 
     def add(self, mesh: FaceMesh, matrix: Float64) -> None:
-        """The outlines of a mesh. matrix: (4, 4), world to clip space."""
+        """Mark the outlines of a mesh. matrix: (4, 4), world to clip space."""
         if not len(mesh.positions):
             return
         edges = self._edges_of(mesh)
@@ -98,7 +98,7 @@ class Outliner:
     def _edges_of(self, mesh: FaceMesh) -> Edges:
         key = id(mesh.shape)
         if key in self._edges:
-            self._edges[key] = self._edges.pop(key)  # now the latest used
+            self._edges[key] = self._edges.pop(key)  # most recently used
         else:
             while len(self._edges) >= self.MOST_SHAPES:
                 del self._edges[next(iter(self._edges))]
@@ -121,7 +121,7 @@ def _add(
     facing: Int8,
     marked: UInt8,
 ) -> None:
-    """Both in one: what is called from Python costs most."""
+    """Project and mark in one call: calls from Python cost most."""
     _project(positions, sway, turn, centre, clip, size, seen)
     _outline(seen, triangles, ends, sides, size, facing, marked)
 
@@ -136,7 +136,7 @@ def _project(
     size: tuple[int, int],
     seen: Float32,
 ) -> None:
-    """Pixels x, y of vertices (V, 3), and w, below 0 behind the camera; turned as face.vert does."""
+    """Write pixels x, y of vertices (V, 3), turned as in face.vert, and a number below 0 if behind it."""
     angle = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
     axis = turn / max(angle, 1e-12)
     half_wide, half_high = 0.5 * size[0], 0.5 * size[1]
@@ -145,7 +145,7 @@ def _project(
         x, y, z = float(positions[i, 0]), float(positions[i, 1]), float(positions[i, 2])
         if angle > 1e-6:
             sine, cosine = whole_sine, whole_cosine
-            if sway[i] != 1.0:  # few: sines take longer than all else
+            if sway[i] != 1.0:  # few vertices: sines take longer than everything else
                 sine, cosine = np.sin(angle * sway[i]), np.cos(angle * sway[i])
             x, y, z = x - centre[0], y - centre[1], z - centre[2]
             along = (x * axis[0] + y * axis[1] + z * axis[2]) * (1.0 - cosine)
@@ -176,7 +176,7 @@ def _outline(
     facing: Int8,
     marked: UInt8,
 ) -> None:
-    """Mark the tiles along every edge between what faces the camera and what does not, and along borders."""
+    """Mark the tiles along borders and along edges between a front-facing and a back-facing triangle."""
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = seen[a, 0], seen[a, 1]
@@ -203,7 +203,7 @@ def _outline(
             continue
         left, right = int(max(min(ax, bx) - BESIDE, 0.0)), int(min(max(ax, bx) + BESIDE, wide - 1.0))
         low, top = int(max(min(ay, by) - BESIDE, 0.0)), int(min(max(ay, by) + BESIDE, high - 1.0))
-        if right // TILE - left // TILE <= 1 and top // TILE - low // TILE <= 1:  # short, as most are
+        if right // TILE - left // TILE <= 1 and top // TILE - low // TILE <= 1:  # short, as most edges are
             for row in range(low // TILE, top // TILE + 1):
                 for column in range(left // TILE, right // TILE + 1):
                     marked[row, column] = 1
@@ -220,7 +220,7 @@ def _outline(
 
 @compiled
 def _runs(marked: UInt8, size: tuple[int, int], corners: Float32) -> int:
-    """Write two triangles for each row of marked tiles side by side, where there is room; how many rows."""
+    """Write two triangles for each run of marked tiles if there is room; return the number of runs."""
     count = 0
     for row in range(marked.shape[0]):
         column = 0

@@ -1,7 +1,7 @@
-"""Pictures on parts of faces, as the graphics card gets them: in the size in which they are seen.
+"""Textures of parts of faces in OpenGL, at the size in which they are seen.
 
-Software OpenGL spends more time on choosing between the sizes of a texture, pixel by pixel, than on all
-else: here one size is chosen for a whole part.
+Software OpenGL spends more time on choosing a mipmap level for every pixel than on everything else: here one
+size is chosen for a whole part.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from fba_player.mesh.textures import texture_breadth
 from fba_player.view.view import FaceShape
 
 SHARPEST = 0.8
-"""Pixels of the screen that a texel is wide, at least."""
+"""Least width of a texel, in pixels of the screen."""
 SMALLEST = 16
 
 
 class Pictures:
-    """The textures of one shape on a moderngl context, made on first use.
+    """The textures of one shape on a moderngl context, created on first use.
 
-    positions: float32 (V, 3), of the shape in any pose: they say how wide its picture lies.
+    positions: float32 (V, 3), of the shape in any pose, which give the size of a texel.
     """
 
     def __init__(self, context: Any, shape: FaceShape, positions: Float32) -> None:
@@ -32,13 +32,13 @@ class Pictures:
         if shape.picture is not None and shape.texcoords is not None:
             self._breadth = texture_breadth(positions, shape.texcoords, shape.triangles)
 
-    def suited(self, pixel: float) -> Any:
-        """The texture for a screen whose pixels are so wide where the part is (m), or None without one."""
+    def choose(self, pixel: float) -> Any:
+        """The texture for pixels of this width (m) at the distance of the part; None if it has no picture."""
         if self._picture is None:
             return None
-        halvings = halved(self._breadth / max(self._picture.size), pixel, max(self._picture.size))
+        halvings = count_halvings(self._breadth / max(self._picture.size), pixel, max(self._picture.size))
         if halvings not in self._sizes:
-            pixels = self._picture.seen(2**halvings)
+            pixels = self._picture.reduced(2**halvings)
             height, width = pixels.shape[:2]
             texture = self._gl.texture((width, height), 4, pixels.tobytes())
             texture.filter = (self._gl.LINEAR, self._gl.LINEAR)
@@ -52,8 +52,8 @@ class Pictures:
         self._sizes.clear()
 
 
-def halved(texel: float, pixel: float, size: int) -> int:
-    """How often to halve a picture of `size` texels of this width (m), for texels of about a pixel."""
+def count_halvings(texel: float, pixel: float, size: int) -> int:
+    """How often to halve a picture of `size` texels, `texel` metres wide, to make them about a pixel wide."""
     if not texel > 0 or not pixel > 0:
         return 0
     ratio = SHARPEST * pixel / texel

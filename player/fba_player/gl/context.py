@@ -1,4 +1,4 @@
-"""Getting an OpenGL context, or a clear word about why there is none."""
+"""Creates OpenGL contexts, with errors that say what to install."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ GL_VERSION = 330
 
 
 def import_moderngl() -> Any:
-    """The moderngl module. Raises DisplayError where it is missing."""
+    """The moderngl module. Raises DisplayError if it cannot be imported."""
     try:
         import moderngl
     except ImportError as error:
@@ -23,9 +23,9 @@ def import_moderngl() -> Any:
 
 
 def offscreen_context() -> Any:
-    """A moderngl context that needs no display: through EGL, else as the platform gives one.
+    """A moderngl context that needs no display, through EGL or the platform's default.
 
-    Raises DisplayError where there is no OpenGL 3.3, naming what to install.
+    Raises DisplayError without OpenGL 3.3; the message says what to install.
     """
     moderngl = import_moderngl()
     reasons = []

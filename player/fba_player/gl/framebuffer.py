@@ -1,7 +1,7 @@
-"""Where pictures are drawn: a framebuffer whose edges come out smooth.
+"""A framebuffer with antialiasing.
 
-Two ways against jagged edges: several samples a pixel (best, and dear in software OpenGL), or one sample
-and a pass that smooths the finished picture's edges.
+Either with several samples per pixel (best, but slow in software OpenGL), or with one sample and a pass that
+smooths edges in the finished picture.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from fba_player.gl.context import import_moderngl
 class Target:
     """A framebuffer of a fixed size on a moderngl context.
 
-    samples: samples a pixel; 0 for one sample and smoothed edges. `begin`, draw, then `finish` gives the
-    framebuffer that holds the picture. Raises DisplayError where the driver has no room for it.
+    samples: samples per pixel; 0 for one sample and smoothed edges. `begin`, draw, then `finish` gives the
+    framebuffer that holds the picture. Raises DisplayError if the driver cannot allocate it.
     """
 
     def __init__(self, context: Any, size: tuple[int, int], samples: int) -> None:
@@ -76,9 +76,9 @@ class Target:
         self._drawn.use()
 
     def finish(self, into: Any = None, within: Steps | None = None) -> Any:
-        """The framebuffer that now holds the picture: one of its own, or, with samples = 0, `into`.
+        """The framebuffer that holds the finished picture: one of its own, or, with samples = 0, `into`.
 
-        within: where there are edges to be smoothed; everywhere by default.
+        within: the regions to be smoothed; everywhere by default.
 
         `into` may be a window's framebuffer: its size is taken to be that of this target, as moderngl does
         not notice that a window was resized.
@@ -113,7 +113,7 @@ class Target:
         self._along.render(vertices=len(data))
 
     def close(self) -> None:
-        """Give everything back."""
+        """Free all OpenGL objects."""
         for part in reversed(self._parts):
             part.release()
         self._parts.clear()

@@ -1,4 +1,4 @@
-"""As many triangles as can be seen: parts that are small on the screen are drawn coarser."""
+"""Level of detail: parts that are small on the screen are drawn with fewer triangles."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from fba_player.mesh.simplify import TOLERANCES
 from fba_player.view.view import FaceMesh, FaceShape
 
 PIXELS = 1.3
-"""How far the coarser mesh may be off, in pixels."""
+"""Largest error of a coarser mesh, in pixels."""
 SAMPLED = 24
-"""Vertices from which the distance to the camera is taken."""
+"""Number of vertices from which the distance to the camera is taken."""
 
 
 @dataclass(eq=False)
 class _Level:
-    """A coarser shape, the vertices (V,) that it has left, and their light as it was last seen."""
+    """A coarser shape, its vertices as rows (N,) of the full one, and the last light: of the full shape and
+    of these rows."""
 
     shape: FaceShape
     rows: Intp
@@ -30,18 +31,18 @@ class _Level:
 
 
 class Details:
-    """Chooses levels; remembers the shapes that it has seen."""
+    """Chooses levels of detail; caches the coarser shapes."""
 
     def __init__(self) -> None:
         self._levels: WeakKeyDictionary[FaceShape, dict[int, _Level | None]] = WeakKeyDictionary()
 
-    def suited(self, meshes: list[FaceMesh], eye: npt.ArrayLike, pixel: float) -> list[FaceMesh]:
-        """The meshes as they are best drawn for a camera at `eye` (3,), whose pixels have the size `pixel`
-        at a distance of 1."""
+    def choose(self, meshes: list[FaceMesh], eye: npt.ArrayLike, pixel: float) -> list[FaceMesh]:
+        """The meshes at the levels of detail for a camera at `eye` (3,), with pixels of size `pixel` at a
+        distance of 1."""
         place = np.asarray(eye, dtype=np.float64)
-        return [self._suited(mesh, place, pixel) for mesh in meshes]
+        return [self._choose(mesh, place, pixel) for mesh in meshes]
 
-    def _suited(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
+    def _choose(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
         coarser = mesh.shape.coarser
         if coarser is None or not len(mesh.positions):
             return mesh
@@ -49,7 +50,7 @@ class Details:
         level = self._level(mesh.shape, bisect_right(TOLERANCES, PIXELS * pixel * away))
         if level is None:
             return mesh
-        if level.light is None or not same(level.light[0], mesh.light):
+        if level.light is None or not share_memory(level.light[0], mesh.light):
             level.light = (mesh.light, mesh.light.take(level.rows, axis=0))
         return replace(
             mesh,
@@ -64,12 +65,12 @@ class Details:
         levels = self._levels.setdefault(shape, {})
         if number not in levels:
             assert shape.coarser is not None
-            triangles = shape.coarser.within(TOLERANCES[number - 1]) if number else None
-            levels[number] = None if triangles is None else _left(shape, triangles)
+            triangles = shape.coarser.triangles_within(TOLERANCES[number - 1]) if number else None
+            levels[number] = None if triangles is None else _make_level(shape, triangles)
         return levels[number]
 
 
-def _left(shape: FaceShape, triangles: Int32) -> _Level:
+def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
     rows, corners = np.unique(triangles, return_inverse=True)
     kept = replace(
         shape,
@@ -83,7 +84,7 @@ def _left(shape: FaceShape, triangles: Int32) -> _Level:
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
-    """From an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
+    """Distance from an eye (3,) to the nearest of some sampled vertices, in the mesh's own unit."""
     sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED, 1)]
     return float(_nearest(sample, mesh.matrix, eye))
 
@@ -105,8 +106,8 @@ def _nearest(positions: Float32, matrix: Float64, eye: Float64) -> float:
     return np.sqrt(least / scale) if least < np.inf and scale > 0.0 else 0.0
 
 
-def same(one: Float32, other: Float32) -> bool:
-    """Whether two arrays, both of them kept alive, are the same numbers in the same place."""
+def share_memory(one: Float32, other: Float32) -> bool:
+    """Whether two arrays are equal views of the same memory; both must be alive."""
     if one is other:
         return True
     return (

@@ -1,4 +1,4 @@
-"""Shader programs from the files beside this module, and setting what they take."""
+"""Loads shader programs from `shaders/` and sets their uniforms."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from fba.arrays import Array
 
 
 def load_program(context: Any, name: str, *defined: str) -> Any:
-    """The program of shaders/NAME.vert and NAME.frag on a moderngl context. defined: names that the
-    preprocessor is to know."""
+    """The program of shaders/NAME.vert and NAME.frag on a moderngl context. defined: names to
+    define for the preprocessor."""
     folder = files(__package__) / "shaders"
     lighting = (folder / "lighting.glsl").read_text(encoding="utf-8")
     sources = {
@@ -25,9 +25,9 @@ def load_program(context: Any, name: str, *defined: str) -> Any:
 
 
 def set_uniform(program: Any, name: str, value: Any) -> None:
-    """Set what a program takes under a name; bytes are written as they are, unknown names passed over.
+    """Set a uniform of a program; bytes are written as they are, unknown names are ignored.
 
-    What was set last is remembered: setting it again costs nothing.
+    Setting the same value again costs nothing.
     """
     if program.extra is None:
         program.extra = {}

@@ -1,4 +1,4 @@
-"""Draws a `View` with OpenGL 3.3 core: one program for meshes, one for capsules, one for eyes."""
+"""Draws a `View` with OpenGL 3.3 core."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
 from fba_player.gl._annotation_renderer import ExtrasRenderer
-from fba_player.gl._antialias_region import Steps, steps
+from fba_player.gl._antialias_region import Steps, find_steps
 from fba_player.gl._ground_shadow import ShadowCaster
 from fba_player.gl._mesh_renderer import FaceRenderer
 from fba_player.gl._silhouette import Outliner
@@ -22,13 +22,13 @@ from fba_player.view.view import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
 
 MOST_BLOBS = 8
 THROUGH = 0.16
-"""How much of a mark is seen through what hides it."""
+"""Opacity of a mark behind a surface."""
 THINNEST = 0.9
-"""Radius in pixels that no mark falls below."""
+"""Least radius of a mark, pixels."""
 RAISED = 0.003
-"""Marks are drawn over what hides them by less than this (m)."""
+"""Marks are drawn over surfaces that hide them by less than this (m)."""
 MOST_SHAPES = 32
-"""Meshes remembered on the graphics card; the longest unused goes first."""
+"""Number of meshes whose buffers are cached; the least recently used goes first."""
 
 
 class Renderer:
@@ -98,16 +98,17 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        drawn = replace(view, faces=self._details.suited(view.faces, place, pixel))
+        drawn = replace(view, faces=self._details.choose(view.faces, place, pixel))
         self._faces.begin(place, matrix, pixel)
         self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
             drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
-        return steps(drawn, matrix, size, self._outliner)
+        return find_steps(drawn, matrix, size, self._outliner)
 
     def _see(self, *seen: object) -> None:
-        """From where everything is seen: eye, (4, 4) world to clip space, size of a pixel at 1."""
+        """Set the camera in all programs: its position, the matrix (4, 4) from world to clip space, and the
+        size of a pixel at a distance of 1."""
         if seen == self._seen:
             return
         self._seen = seen
@@ -116,7 +117,7 @@ class Renderer:
                 set_uniform(program, name, value)
 
     def close(self) -> None:
-        """Free everything allocated on the graphics card."""
+        """Free all OpenGL objects."""
         for _, parts in self._shapes.values():
             for part in parts:
                 part.release()
@@ -149,8 +150,10 @@ class Renderer:
     def _draw_studio(
         self, view: View, matrix: Float64, size: tuple[int, int], centre: tuple[float, float]
     ) -> None:
-        """Backdrop and ground: drawn once for each camera and kept, as most pictures share theirs. centre: x
-        and z of where the ground is brightest."""
+        """Draw backdrop and ground, cached for the last camera.
+
+        centre: x and z of the ground's brightest point.
+        """
         gl = self._gl
         if view.background is not None:
             gl.clear(*view.background, 1.0, depth=1.0)
@@ -175,7 +178,7 @@ class Renderer:
         self._draw_shadows(view)
 
     def _draw_shadows(self, view: View) -> None:
-        """Soft shadows on the ground."""
+        """Draw soft shadows on the ground."""
         gl = self._gl
         blobs = np.ascontiguousarray(view.blobs[:MOST_BLOBS], dtype="f4")
         if not view.ground or not len(blobs):
@@ -224,7 +227,7 @@ class Renderer:
     def _shape_parts(self, mesh: Mesh) -> tuple[Any, Any, Any]:
         key = id(mesh.shape)
         if key in self._shapes:
-            self._shapes[key] = self._shapes.pop(key)  # now the latest used
+            self._shapes[key] = self._shapes.pop(key)  # most recently used
         else:
             while len(self._shapes) >= MOST_SHAPES:
                 for part in self._shapes.pop(next(iter(self._shapes)))[1]:
@@ -261,7 +264,7 @@ class Renderer:
         self._capsules.render(instances=len(data))
 
     def _draw_marks(self, marks: Float32) -> None:
-        """Marks as capsules; those behind something faintly through it."""
+        """Draw marks as capsules, faintly through surfaces that hide them."""
         if not len(marks):
             return
         gl = self._gl

@@ -1,4 +1,4 @@
-"""The system libraries that drawing needs on Linux: which are missing, and how to install them."""
+"""The system libraries that OpenGL needs on Linux: which are missing, and how to install them."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ PACKAGES = {
     "libGL.so.1": ("libgl1", "mesa-libGL mesa-dri-drivers"),
     "libX11.so.6": ("libx11-6", "libX11"),
 }
-"""Library: the packages that hold it in Debian and Ubuntu, and in Fedora."""
+"""Libraries, and the packages that contain them: in Debian and Ubuntu, and in Fedora."""
 OPENGL = ("libEGL.so.1", "libGL.so.1")
-"""What pictures without a window need."""
+"""The libraries that pictures without a window need."""
 
 
 def missing_libraries(names: Iterable[str] = OPENGL) -> list[str]:

@@ -1,8 +1,8 @@
-"""The loops of `fba_player.mesh.simplify`: vertices of a mesh are drawn onto neighbours where little is lost.
+"""Compiled loops of `fba_player.mesh.simplify`: edges are collapsed where that changes the surface least.
 
 Garland and Heckbert's quadrics, "Simplifying Surfaces with Color and Texture using Quadric Error Metrics"
-(1998), about points of any dimension; of the two ends of an edge one stays, so that what is left is a part of
-the vertices that were there.
+(1998), for points of any dimension. Of an edge's two ends one stays where it is, so that the vertices that
+are left are a subset of those that were there.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from fba.arrays import Bool, Float64, Int32, Int64
 from fba.compiled import compiled, inlined
 
 BORDER = 2.0
-"""How much more a border counts than the surface."""
+"""Weight of a border relative to the surface."""
 MOST_AROUND = 64
-"""A vertex with more triangles than this stays."""
+"""A vertex with more triangles than this is never removed."""
 TURNED = 0.3
 """No triangle may turn by more than the angle of this cosine."""
 THIN = 0.05
-"""Nor become thinner: its height by its longest side, unless it was thin before."""
+"""Least height of a triangle, as a share of its longest side, unless it was thinner before."""
 
 
 @compiled
 def around(triangles: Int32, count: int, start: Int64, owners: Int32) -> None:
-    """Which triangles each vertex is in: owners from start[v] to start[v + 1]."""
+    """Write the triangles of each vertex: those of v are owners[start[v] : start[v + 1]]."""
     start[:] = 0
     for t in range(len(triangles)):
         for k in range(3):
@@ -41,7 +41,7 @@ def around(triangles: Int32, count: int, start: Int64, owners: Int32) -> None:
 
 @compiled
 def borders(triangles: Int32, start: Int64, owners: Int32, border: Bool) -> None:
-    """Vertices with an edge that only one triangle has."""
+    """Mark vertices with an edge that belongs to one triangle only."""
     for t in range(len(triangles)):
         for k in range(3):
             a, b = triangles[t, k], triangles[t, (k + 1) % 3]
@@ -56,7 +56,7 @@ def borders(triangles: Int32, start: Int64, owners: Int32, border: Bool) -> None
 
 @compiled
 def _unit(vector: Float64) -> float:
-    """Make it as long as 1; how long it was."""
+    """Scale a vector to length 1 in place and return the length that it had."""
     squared = 0.0
     for i in range(len(vector)):
         squared += vector[i] * vector[i]
@@ -71,7 +71,7 @@ def _unit(vector: Float64) -> float:
 def _add(
     points: Float64, p: int, e: Float64, f: Float64, weight: float, a: Float64, b: Float64, c: Float64, v: int
 ) -> None:
-    """Add to the quadric of v the distance to what e and f span at the point p."""
+    """Add to the quadric of v the squared distance to the plane that e and f span at the point p."""
     n = len(e)
     pe, pf, pp = 0.0, 0.0, 0.0
     for i in range(n):
@@ -97,8 +97,8 @@ def quadrics(
     c: Float64,
     w: Float64,
 ) -> None:
-    """For each vertex the sum of squared distances to the planes of its triangles, and to the lines of its
-    borders: x.a.x + 2 b.x + c, and its weight."""
+    """Write each vertex's quadric x.a.x + 2 b.x + c, and its weight: the sum of squared distances to the
+    planes of its triangles and the lines of its borders."""
     n = points.shape[1]
     e, f = np.zeros(n), np.zeros(n)
     for t in range(len(triangles)):
@@ -193,7 +193,8 @@ def candidates(
     goal: Int32,
     cost: Float64,
 ) -> int:
-    """For each vertex the neighbour that it is best drawn onto, or -1, and the squared error; how many."""
+    """Write the neighbour that each vertex is best collapsed onto, or -1, and the squared error; return how
+    many vertices have one."""
     n = points.shape[1]
     near = np.empty(2 * MOST_AROUND, dtype=np.int32)
     shared = np.empty(2 * MOST_AROUND, dtype=np.int32)
@@ -233,7 +234,7 @@ def candidates(
             error /= max(w[u], 1e-30)
             if not error < best:
                 continue
-            joint = 0  # neighbours of both: more than the edge's own triangles have would tie a knot
+            joint = 0  # neighbours of both ends: more than the edge has triangles would make a non-manifold
             for k in range(count):
                 other = near[k]
                 if other == v:
@@ -270,8 +271,10 @@ def collapse(
     c: Float64,
     w: Float64,
 ) -> int:
-    """Draw vertices onto their goals in this order, none next to another; how many. Triangles without area
-    are left with corners that are the same. onto (V,): what each was drawn onto."""
+    """Collapse vertices onto their goals in this order, none next to another; return how many.
+
+    Triangles that lose their area keep two equal corners. onto: (V,), written: what each vertex collapsed to.
+    """
     touched[:] = False
     done = 0
     for u in order:

@@ -1,4 +1,4 @@
-"""Meshes with fewer triangles, for what is small on the screen."""
+"""Levels of detail: meshes with fewer triangles, for what is small on the screen."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from fba.cache import kept
 from fba.compiled import is_compiled
 
 TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
-"""Metres by which a coarser mesh may be off, as a root of mean squares."""
+"""Root-mean-square errors of the levels of detail, metres."""
 FEWEST = 200
-"""Meshes of fewer triangles stay as they are."""
+"""Meshes with fewer triangles than this are not simplified."""
 MOST_PASSES = 40
 WORTH = 0.004
-"""A pass that takes away less than this share of the vertices is the last one."""
+"""A pass that removes less than this share of the vertices is the last one of its level."""
 MAKING = "2"
-"""Counts up with every change of what `coarser` gives: what was kept before is then made anew."""
+"""Cache version; increment when `simplify` gives other results."""
 
 
 @dataclass(frozen=True, eq=False)
-class Coarser:
-    """One mesh at several levels of detail, worked out on first use and kept on disk.
+class DetailLevels:
+    """One mesh at several levels of detail, computed on first use and stored in the disk cache.
 
-    points: (V, N), for each vertex its places in all the poses that count, (3 x poses), and after them
-    whatever else is to be kept, each scaled so that a difference of 1 matters as much as a metre.
+    points: (V, N), each vertex's positions in all poses that count (3 x poses columns), then any attributes
+    to be preserved, scaled so that a difference of 1 weighs as much as a metre. triangles: int32 (F, 3).
     """
 
     points: Float32
     poses: int
     triangles: Int32
 
-    def within(self, tolerance: float) -> Int32 | None:
-        """Triangles (F, 3) of the coarsest level that is off by no more than this (m), or None where there
-        is none: the mesh as it is."""
+    def triangles_within(self, tolerance: float) -> Int32 | None:
+        """int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None for the
+        mesh as it is."""
         level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
         if level < 0 or len(self.triangles) < FEWEST or not is_compiled():
             return None
-        onto, first = self._drawn
+        onto, first = self._collapses
         place = np.arange(len(onto), dtype=np.int32)
         goes = first <= level
         for _ in range(MOST_PASSES * len(TOLERANCES)):  # no more steps than passes were made
@@ -54,14 +54,14 @@ class Coarser:
         return np.ascontiguousarray(left[~flat])
 
     @cached_property
-    def _drawn(self) -> tuple[Int32, Int32]:
-        """As `coarser` gives it."""
+    def _collapses(self) -> tuple[Int32, Int32]:
+        """What `simplify` returns."""
         digest = hashlib.sha256(MAKING.encode())
         for array in (self.points, self.triangles):
             digest.update(np.ascontiguousarray(array).data)
 
         def make() -> list[Int32]:
-            return list(coarser(self.points.astype(np.float64), self.poses, self.triangles))
+            return list(simplify(self.points.astype(np.float64), self.poses, self.triangles))
 
         count = len(self.points)
         onto, first = kept(f"coarse-{digest.hexdigest()[:32]}", ((count,), (count,)), make, np.int32)
@@ -70,13 +70,13 @@ class Coarser:
         return onto, first
 
 
-def coarser(
+def simplify(
     points: Float64, poses: int, triangles: Int32, tolerances: Sequence[float] = TOLERANCES
 ) -> tuple[Int32, Int32]:
-    """Which vertex each (V,) is drawn onto, and from which level on: the number of a tolerance (m, rising),
-    or how many there are where it stays. points: as of `Coarser`.
+    """For each vertex, int32 (V,) twice: the vertex that it collapses onto, and the level at which it does.
 
-    Borders keep their course, places where several vertices meet stay.
+    The level is an index into tolerances (m, rising), or their number for a vertex that stays. points, poses,
+    triangles: as in `DetailLevels`. Borders keep their course; vertices that share a position stay.
     """
     from fba_player.mesh import _simplify_loops as loops
 
@@ -115,7 +115,7 @@ def coarser(
 
 
 def _shared_places(places: Float64) -> Bool:
-    """(V,) vertices that stand where another one stands: a seam, which would gape."""
+    """bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
     rounded = np.ascontiguousarray(np.round(places * 1e6).astype(np.int64))
     _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
     shared: Bool = counts[inverse.ravel()] > 1

@@ -14,9 +14,9 @@ from fba.arrays import Float32, Int32, UInt8
 from fba.cache import kept, key_of
 
 LARGEST = 4096
-"""Pictures of more pixels across are made smaller."""
+"""Wider or higher pictures are scaled down to this many pixels."""
 LARGE = 100_000
-"""Of files of so many bytes and more something is kept."""
+"""Files of at least this many bytes are cached on disk when reduced."""
 MAKING = 1
 """Cache version of pictures; increment when `FacePicture` gives other pixels or measures."""
 
@@ -32,9 +32,9 @@ RELIEF_MAKING = 1
 
 
 class FacePicture:
-    """A picture in a file of PNG or JPEG.
+    """A texture from the bytes of a PNG or JPEG file.
 
-    Raises OSError, ValueError or SyntaxError where it cannot be read.
+    Raises OSError, ValueError or SyntaxError if it cannot be read.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -49,11 +49,11 @@ class FacePicture:
         self.size = (int(found[0]), int(found[1]))
         """Width and height."""
         self.opaque = bool(found[2])
-        """Whether nothing shines through it anywhere."""
+        """Whether alpha is 255 everywhere."""
 
     @property
     def pixels(self) -> UInt8:
-        """(H, W, 4), decoded anew."""
+        """uint8 (H, W, 4), sRGB and alpha, decoded on every access."""
         from PIL import Image
 
         try:
@@ -65,8 +65,8 @@ class FacePicture:
         except Image.DecompressionBombError as error:
             raise ValueError(str(error)) from error
 
-    def seen(self, factor: int) -> UInt8:
-        """Every `factor` texels made one, (h, w, 4), and the square roots of their linear light."""
+    def reduced(self, factor: int) -> UInt8:
+        """uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and alpha."""
         if factor < 2 or len(self._data) < LARGE:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
@@ -91,7 +91,7 @@ def _reduced(pixels: UInt8, factor: int) -> UInt8:
 
 @cache
 def _roots() -> tuple[int, ...]:
-    """sRGB codes -> square roots of linear light, 0..255."""
+    """Table from sRGB codes to square roots of linear light, 0..255."""
     code = np.arange(256) / 255
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
     return tuple(int(v) for v in np.round(255 * np.sqrt(linear)))

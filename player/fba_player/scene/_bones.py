@@ -13,10 +13,10 @@ from fba_player.view.view import CAPSULE_FLOATS, spheres, srgb
 BONE = (*srgb("#c3c8cf"), 0.12)
 JOINT = (*srgb("#e08a3c"), 0.25)
 SLENDERNESS = 0.105
-"""Radius of a bone by its length, between the limits below."""
+"""Radius of a bone as a share of its length, within the limits below."""
 RADII = (0.0045, 0.019)
 SPINE_RADIUS = 0.0095
-"""Vertebrae are shorter than thick: their length says nothing."""
+"""Radius of vertebrae (m), which are shorter than thick."""
 JOINT_PER_BONE = 1.22
 HEAD_RADIUS = 0.006
 SPINE = ("vl", "vt", "vc", "sacroiliac", "skullbase")
@@ -57,7 +57,7 @@ class Bones:
 
 
 class Pivots:
-    """The places that a head and its eyes turn about, and bones between them: a face's own joints.
+    """The centres of rotation of a head and its eyes as joints, and bones between them.
 
     head: (3,) metres, in the neutral face. others: (N, 3). scale: size of the face, 1 for an adult's.
     """
@@ -84,7 +84,7 @@ class Pivots:
 
 
 def face_pivots(model: FaceModel, scale: float = 1.0) -> Pivots:
-    """What a face's tables turn it and its parts about."""
+    """The centres of all rotations in a face's tables."""
     head, others = np.zeros(3), []
     for table in model.tables:
         for transform in table.transforms:

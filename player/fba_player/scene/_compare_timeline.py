@@ -1,4 +1,4 @@
-"""Several performances on one time base."""
+"""A timeline of several performances."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from fba.arrays import Float32, Float64, Int64
 from fba_player.playback.timeline import FRAME_ROUNDING, Timeline
 
 FINEST = 1_000_000
-"""Frames a second beyond which rates that differ are not brought to a common one."""
+"""Greatest common frame rate of performances with different rates."""
 
 
 class CompareTimeline:
-    """The frames of all, at their own times.
+    """The frames of all performances at their own times. A `fba_player.view.protocols.Course`.
 
-    Where two have no time in common, as recordings with time codes of different hours, each begins with the
-    first one. What is counted as a frame is every moment at which one of them has a frame. rate, faps and
-    baps are those of the first. A `fba_player.view.protocols.Course`.
+    A performance that does not overlap the first, as with time codes of different hours, is shifted to begin
+    with it. A frame is every moment at which one of them has a frame. rate, faps and baps are the first's.
     """
 
     def __init__(self, timelines: Sequence[Timeline]) -> None:
@@ -28,22 +27,22 @@ class CompareTimeline:
             raise ValueError("nothing to compare: there is no timeline")
         self.timelines = tuple(timelines)
         self.later = _later(self.timelines)
-        """Seconds by which each is shown later than its own times say, exact."""
+        """Exact seconds by which each performance is shifted to later times."""
         self._merged: tuple[int, Fraction, Int64] | None = None
 
     @property
     def rate(self) -> Fraction:
-        """Frames a second of the first."""
+        """Frames per second of the first performance."""
         return self.timelines[0].rate
 
     @property
     def start(self) -> Fraction:
-        """Where the earliest begins."""
+        """Start of the earliest performance."""
         return min(one.start + later for one, later in self._shown())
 
     @property
     def end(self) -> Fraction:
-        """Where the latest ends."""
+        """End of the latest performance."""
         return max(one.end + later for one, later in self._shown())
 
     @property
@@ -53,22 +52,22 @@ class CompareTimeline:
 
     @property
     def frames(self) -> int:
-        """Moments at which at least one has a frame."""
+        """Number of moments at which at least one performance has a frame."""
         return len(self._frames()[1])
 
     @property
     def growing(self) -> bool:
-        """Whether one of them is still arriving."""
+        """Whether a performance is still arriving."""
         return any(one.growing for one in self.timelines)
 
     @property
     def arrived(self) -> int:
-        """Changes whenever more of one has arrived."""
+        """A number that changes whenever more of a performance has arrived."""
         return sum(one.arrived for one in self.timelines)
 
     @property
     def interpolate(self) -> bool:
-        """Whether what is shown between two frames lies between them; of all."""
+        """Whether values between two frames are interpolated; set for all performances."""
         return self.timelines[0].interpolate
 
     @interpolate.setter
@@ -77,16 +76,16 @@ class CompareTimeline:
             one.interpolate = interpolate
 
     def own_time(self, number: int, time: float) -> float:
-        """Seconds, in the times of that performance, at which it is when the time is that of all."""
+        """The time of performance `number` at a common time, seconds."""
         return time - float(self.later[number])
 
     def time_of(self, frame: int) -> Fraction:
-        """Exact time of a frame, counted from 0 over all of them."""
+        """Exact common time of a frame by its index."""
         rate, index = self._frames()
         return Fraction(int(index[frame])) / rate
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """(frame, next frame, share of the next) at a time; ValueError for one that is not finite."""
+        """(frame, next frame, weight of the next) at a time; ValueError if it is not finite."""
         if not math.isfinite(time):
             raise ValueError(f"the time must be a finite number of seconds, not {time}")
         rate, index = self._frames()
@@ -100,15 +99,15 @@ class CompareTimeline:
         return before, after, min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
 
     def faps(self, time: float) -> Float32:
-        """(68,) of the first."""
+        """float32 (68,): FAPs of the first performance."""
         return self.timelines[0].faps(self.own_time(0, time))
 
     def baps(self, time: float) -> Float64:
-        """(296,) of the first."""
+        """float64 (296,): BAPs of the first performance."""
         return self.timelines[0].baps(self.own_time(0, time))
 
     def times(self) -> Float64:
-        """(T,) seconds of all frames."""
+        """float64 (T,): times of all frames, seconds."""
         rate, index = self._frames()
         return index * rate.denominator / rate.numerator
 
@@ -116,7 +115,7 @@ class CompareTimeline:
         return zip(self.timelines, self.later, strict=True)
 
     def _frames(self) -> tuple[Fraction, Int64]:
-        """A rate at which every frame has a whole number, and those numbers, ascending."""
+        """A common rate, and the ascending indices of all frames at that rate."""
         arrived = self.arrived
         if self._merged is None or self._merged[0] != arrived:
             parts = [one.rate for one in self.timelines] + [1 / later for later in self.later if later]

@@ -1,4 +1,4 @@
-"""Switches -> what is drawn: takes things out of a view, paints it, and adds lines, dots, bones, a legend."""
+"""Applies switches to a view: hides parts, colours them, and adds lines, dots, bones and a legend."""
 
 from __future__ import annotations
 
@@ -11,45 +11,45 @@ from fba.arrays import Bool, Float32, Float64
 from fba.face.feature_points import names
 from fba_player.figure.face import FaceFigure
 from fba_player.scene._bones import Bones, face_pivots
-from fba_player.scene._fap_heatmap import Influence
+from fba_player.scene._fap_heatmap import FapHeatmap
 from fba_player.scene._ground import body_grid, face_grid, no_shadows
 from fba_player.scene._wireframe import Wireframe
 from fba_player.view.switches import Switches
 from fba_player.view.view import Colour, Dots, Extras, FaceMesh, FaceShape, Grid, View
 
 LEFT_OUT = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
-"""Kinds of parts that a switch takes out."""
+"""Kinds of parts that a switch hides."""
 UNSHADED = (0.9, 0.85, 0.0, 0.25)
-"""The light that reaches everything where nothing casts a shadow."""
+"""The light at every vertex when shadows are off."""
 BACKGROUNDS = {"studio": None, "grey": (0.5, 0.5, 0.5), "transparent": (0.5, 0.5, 0.5)}
-"""Colours behind everything; pictures that can be transparent make of the last what it says."""
+"""Background colours; the last one is made transparent by pictures that have alpha."""
 HAIRS = ("lash", "brow")
-"""Kinds of parts that are too fine for colours and normals."""
+"""Kinds of parts too fine for colours and normals."""
 INSIDE = (*HAIRS, "teeth", "tongue", "mouth", "eye")
-"""Kinds of parts that a body of glass does without."""
+"""Kinds of parts that a transparent body leaves out."""
 DOT: Colour = (0.98, 0.62, 0.20, 1.0)
 DOT_RADIUS, DOT_SIZE = 3.2, 0.0022
-"""Pixels of a picture 720 high, and at most so many metres."""
+"""Radius in pixels of a picture 720 high, and at most in metres."""
 DOT_LIFT, NAME_LIFT = 0.004, 0.006
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """What a view was made from: FAPs (68,), face (4, 4) into the world, joints (J, 4, 4) or None."""
+    """The pose of a view: FAPs (68,), the face's matrix (4, 4) into the world, joints (J, 4, 4) or None."""
 
     faps: Float32
     face: Float64
     joints: Float64 | None
 
 
-class Dressing:
-    """Applies switches to the views of one face, and of a body with these bones."""
+class DisplayOptions:
+    """Applies switches to views of one face, on a body with these bones or None."""
 
     def __init__(self, figure: FaceFigure, bones: Bones | None) -> None:
         self._figure = figure
         self._bones = bones
         self._wires = Wireframe()
-        self._influence: Influence | None = None
+        self._influence: FapHeatmap | None = None
         self._full: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
         self._pivots = face_pivots(figure.model, figure.scale)
         model = figure.model
@@ -57,16 +57,16 @@ class Dressing:
         self._names = tuple(name for name, known in zip(names(), self._known, strict=True) if known)
         self._scale = figure.scale
 
-    def dressed(self, view: View, switches: Switches, posture: Posture) -> View:
-        """The view as the switches have it."""
+    def apply(self, view: View, switches: Switches, posture: Posture) -> View:
+        """The view with the switches applied."""
         if not switches.changed:
             return view
-        view = self._taken_out(view, switches)
+        view = self._hide_parts(view, switches)
         extras = Extras()
         number = switches["influence"]
         if number is not None:
             paint = self._painter(int(number))
-            faces = paint.painted([mesh for mesh in view.faces if mesh.shape.kind not in HAIRS])
+            faces = paint.paint([mesh for mesh in view.faces if mesh.shape.kind not in HAIRS])
             view = replace(view, faces=faces, meshes=[*view.meshes, *paint.eyes(view.eyes)], eyes=[])
             extras = replace(extras, legend=paint.legend)
         lines = []
@@ -94,7 +94,7 @@ class Dressing:
         extras = replace(extras, lines=tuple(lines), dots=dots)
         return replace(view, extras=extras, background=background)
 
-    def _taken_out(self, view: View, switches: Switches) -> View:
+    def _hide_parts(self, view: View, switches: Switches) -> View:
         hidden = {kind for name, kinds in LEFT_OUT.items() if not switches[name] for kind in kinds}
         if hidden:
             view = replace(view, faces=[mesh for mesh in view.faces if mesh.shape.kind not in hidden])
@@ -112,20 +112,20 @@ class Dressing:
         return face_grid(self._figure.subject, lowest, self._scale)
 
     def _in_full(self, mesh: FaceMesh) -> FaceMesh:
-        """With all its triangles, however small it is: lines lie on them."""
+        """The mesh without levels of detail, as lines lie on all its triangles."""
         if mesh.shape.coarser is None:
             return mesh
         if mesh.shape not in self._full:
             self._full[mesh.shape] = replace(mesh.shape, coarser=None)
         return replace(mesh, shape=self._full[mesh.shape])
 
-    def _painter(self, number: int) -> Influence:
+    def _painter(self, number: int) -> FapHeatmap:
         if self._influence is None or self._influence.fap.number != number:
-            self._influence = Influence(self._figure, number)
+            self._influence = FapHeatmap(self._figure, number)
         return self._influence
 
     def _skeleton(self, posture: Posture) -> Float32:
-        """Capsules of all joints, those of the head's own among them."""
+        """Capsules of all joints of the body and of the head."""
         turned = posture.face @ self._figure.pose(posture.faps).turn
         own = self._pivots.capsules(turned)
         if self._bones is None or posture.joints is None:
@@ -133,7 +133,7 @@ class Dressing:
         return np.concatenate([self._bones.capsules(posture.joints), own])
 
     def _dots(self, posture: Posture, *, over: bool) -> Dots:
-        """Feature points; over: whether the dots themselves are to be drawn, not their names alone."""
+        """Feature points with names. over: whether to draw the dots themselves."""
         figure, model = self._figure, self._figure.model
         places = figure.points(posture.faps, posture.face)[self._known]
         pose = figure.pose(posture.faps)

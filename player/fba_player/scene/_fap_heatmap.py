@@ -1,4 +1,4 @@
-"""How far a FAP moves every vertex of a face, as colour."""
+"""Colours a face by how far a FAP moves each vertex."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from fba_player.view.geometry import rotation_vector, turn_partly
 from fba_player.view.view import Eye, FaceMesh, FaceShape, Legend, Mesh, MeshShape
 
 STEPS, ANGLE = 100, 10_000
-"""The value of the FAP that is looked at: of distances, about a tenth of the unit; of angles, 0.1 rad."""
+"""The FAP's value: about a tenth of the unit for distances, 0.1 rad for angles."""
 GLOSS = 0.15
 SHADES = 33
-"""Colours of a legend."""
+"""Number of colours in the legend."""
 LEAST = 1e-6
-"""What moves by less than this (m) does not move."""
+"""Movements smaller than this (m) count as none."""
 
 
-class Influence:
-    """What one FAP does to a face. number: 3..68. measured at `value`, which is positive."""
+class FapHeatmap:
+    """The movement of a face's vertices by one FAP. number: 3..68, measured at `value`, which is positive."""
 
     def __init__(self, figure: FaceFigure, number: int) -> None:
         self._figure = figure
@@ -42,18 +42,18 @@ class Influence:
 
     @property
     def legend(self) -> Legend:
-        """What the colours mean, in millimetres."""
+        """A legend of the colours in millimetres."""
         unit = "0.1 rad" if self.fap.unit == "AU" else f"+{self.value} steps of {self.fap.unit}/1024"
         moved = f"mm moved by {unit}" if self.most > LEAST else "moves no vertex of this face"
         stops = tuple(tuple(float(v) for v in row) for row in shown(np.linspace(0, 1, SHADES)))
         return Legend(self.fap.label, moved, self.most * 1000, stops)  # type: ignore[arg-type]
 
-    def painted(self, meshes: list[FaceMesh]) -> list[FaceMesh]:
-        """The meshes in these colours; what is no part of the face, as a body, in that of 0."""
+    def paint(self, meshes: list[FaceMesh]) -> list[FaceMesh]:
+        """The meshes in these colours; parts that are not the face's get the colour of 0."""
         return [replace(mesh, shape=self._shape(mesh)) for mesh in meshes]
 
     def eyes(self, eyes: list[Eye]) -> list[Mesh]:
-        """Eyeballs in these colours."""
+        """Eyeballs as meshes in these colours."""
         vertices, _ = sphere_mesh()
         found = []
         for number, eye in enumerate(eyes):
@@ -63,7 +63,7 @@ class Influence:
         return found
 
     def _measured(self) -> Float32:
-        """(V,) metres between the neutral face and that with the FAP, the neck's bend in it."""
+        """float32 (V,): metres between the neutral face and the face with the FAP, with the neck bent."""
         figure = self._figure
         neutral, moved = figure.pose(np.zeros_like(self._values)).positions, figure.pose(self._values)
         turn = rotation_vector(moved.turn[:3, :3])
@@ -90,7 +90,7 @@ class Influence:
         return own if len(own) == count else np.zeros(count, dtype=np.float32)
 
     def _ball(self, number: int, vertices: Float32) -> MeshShape:
-        """An eyeball whose every place has the colour of its own movement."""
+        """An eyeball coloured by the movement of its points."""
         still = self._figure.eyes(np.zeros_like(self._values), np.eye(4))[number].matrix
         moved = self._figure.eyes(self._values, np.eye(4))[number].matrix
         away = np.linalg.norm(vertices @ (moved - still)[:3, :3].T + (moved - still)[:3, 3], axis=1)
@@ -105,7 +105,7 @@ class Influence:
 
 
 def shown(shares: Floating) -> Float64:
-    """(N, 3) colours as they are shown (sRGB, 0..1) for shares 0..1 of the largest movement."""
+    """float64 (N, 3): colours (sRGB, 0..1) for shares 0..1 of the largest movement."""
     table = _table()
     columns = [np.interp(shares, table[:, 0], table[:, column]) for column in (1, 2, 3)]
     return np.stack(columns, axis=-1)
@@ -119,5 +119,5 @@ def _table() -> Float64:
 
 
 def _linear(colours: Float64) -> Float64:
-    """sRGB to linear light."""
+    """Linear light of sRGB colours."""
     return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)

@@ -1,6 +1,6 @@
-"""The face as its feature points: a sphere at every point, thin lines through those that belong together.
+"""A face shown as its feature points: a sphere at each, and thin lines through those that belong together.
 
-Behind them stands the face itself in one dull colour, so that what lies on its far side stays hidden.
+Behind them the face itself is drawn in one dull colour, which hides points on its far side.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ GHOST = (*srgb("#8b929c"), 0.12)
 EYEBALL = (*srgb("#c9cdd2"), 0.35)
 LEFT_OUT = ("lash", "brow", "hair")
 INSET = 0.0003
-"""The rims of iris and pupil lie this far (m) above the eyeball."""
+"""Distance of the rims of iris and pupil from the eyeball, metres."""
 RAISED = 0.003
 AROUND = 8
 COLOURS = {
@@ -38,11 +38,11 @@ COLOURS = {
 RADII = {"lip": 0.0007, "brow": 0.0011, "lid": 0.0006, "fold": 0.0004, "plain": 0.0005, "iris": 0.0005,
          "pupil": 0.0003}  # fmt: skip
 RING = 24
-"""Steps around an iris."""
+"""Number of points on the rim of an iris."""
 
 
 class PointView:
-    """What a face's feature points look like; everything takes FAPs (68,) and the matrix into the world."""
+    """Draws a face's feature points for FAPs (68,) and a matrix (4, 4) into the world."""
 
     def __init__(self, figure: FaceFigure) -> None:
         self._figure = figure
@@ -57,11 +57,11 @@ class PointView:
         self._sizes = sizes[self._known] * (model.fapu.ES * 1024 / 0.062)
 
     def marks(self, faps: Float32, matrix: Float64) -> Float32:
-        """(N, 16) capsules: a sphere at every feature point that the face has."""
+        """float32 (N, 16): capsules, a sphere at each feature point that the face has."""
         return spheres(self._figure.points(faps, matrix)[self._known], self._sizes, POINT)
 
     def eyeballs(self, faps: Float32, matrix: Float64) -> Float32:
-        """(E, 16) capsules: plain eyeballs."""
+        """float32 (E, 16): capsules, plain eyeballs."""
         eyes = self._figure.eyes(faps, matrix)
         if not eyes:
             return spheres(np.zeros((0, 3)), np.zeros(0), EYEBALL)
@@ -97,7 +97,7 @@ class PointView:
         return found
 
     def _rings(self, faps: Float32, matrix: Float64) -> tuple[list[Float64], Float64]:
-        """Rims of iris and pupil of every eye in the world, (RING + 1, 3) each, and a place behind them."""
+        """Rims of iris and pupil of each eye in the world, (RING + 1, 3) each, and a point behind them."""
         turn = np.linspace(0, 2 * np.pi, RING + 1)
         found, behind = [], np.zeros(3)
         for eye in self._figure.eyes(faps, matrix):
@@ -111,7 +111,7 @@ class PointView:
 
 
 class _Tubes:
-    """Tubes along lines of a kind and a number of places each; only the places change."""
+    """Tubes along lines, each of a kind and with a fixed number of points."""
 
     def __init__(self, lines: list[tuple[str, int]], raised: float = 0.0) -> None:
         self._lengths = [count for _, count in lines]
@@ -127,11 +127,11 @@ class _Tubes:
         )
 
     def mesh(self, places: Float64, inside: Float64, matrix: Float64) -> Mesh:
-        """Tubes along places (N, 3), all lines one after the other; inside: a place deep in the head."""
+        """Tubes along the points (N, 3) of all lines in turn. inside: a point deep in the head."""
         along = np.concatenate([
             np.gradient(line, axis=0) for line in np.split(places, np.cumsum(self._lengths)[:-1])
         ])  # fmt: skip
-        # Lines lie on a head: what points out of it is never along one.
+        # Lines lie on the head, so the direction out of it is never along one.
         aside = _unit(np.cross(along, places - inside))
         out = _unit(np.cross(aside, along))
         turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)

@@ -1,4 +1,4 @@
-"""What a camera is to have in view of a moving body, and whether it has to follow."""
+"""Fits a camera to a moving body, and decides whether it must follow."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from fba.arrays import Float64
 from fba_player.view.camera import Subject
 
 BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
-"""Somebody who stands at the origin."""
+"""A body that stands at the origin."""
 HIPS = 0.78
 STANDING = 0.12
-"""Legs that move less than this (m) stand still."""
+"""Legs that move by less than this (m) count as still."""
 MOST_TRAVEL = 4.0
-"""A performance that moves further than this (m) is followed by the camera instead of fitted whole."""
+"""The camera follows a performance that moves further than this (m)."""
 NEAR = 0.12
-"""Who goes about by less than this (m) stays at one distance."""
+"""Movement (m) below which the camera's distance is not enlarged."""
 LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
 
 @dataclass(frozen=True)
 class Extent:
-    """Where a performance takes place.
+    """The space that a performance takes.
 
-    follows: it goes too far to be seen whole. legs_move: by more than `STANDING`.
+    follows: whether it goes too far for one fixed camera. legs_move: whether by more than `STANDING`.
     """
 
     subject: Subject
@@ -34,7 +34,7 @@ class Extent:
 
     @property
     def upper_half(self) -> Subject:
-        """From the hips up."""
+        """The subject from the hips up."""
         whole = self.subject
         top = whole.centre[1] + whole.half_height
         bottom = min(HIPS, top - 0.8)
@@ -44,7 +44,7 @@ class Extent:
 
 
 def body_extent(places: Float64, names: tuple[str, ...]) -> Extent:
-    """What joints at places (T, J, 3), metres, the root first, go through in T moments."""
+    """The extent of joints at places (T, J, 3), metres, the root first, over T moments."""
     legs = places[:, [names.index(name) for name in LEGS if name in names]]
     legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > STANDING)
     low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
@@ -58,12 +58,12 @@ def body_extent(places: Float64, names: tuple[str, ...]) -> Extent:
     wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     tall = max(float(high[1] - low[1]) / 2 * 1.06, 0.9)
     path = places[:, 0, [0, 2]]
-    towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from whatever side the camera looks
+    towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from any side
     subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - NEAR, 0.0))
     return Extent(subject, follows=False, legs_move=legs_move)
 
 
 def _aside(low: Float64, high: Float64) -> Float64:
-    """Shift that keeps the floor below a body that stands elsewhere than at the origin."""
+    """The shift of the floor for a body that does not stand at the origin."""
     middle = (low + high) / 2
     return np.array([middle[0], 0.0, middle[2]])

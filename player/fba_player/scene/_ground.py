@@ -1,4 +1,4 @@
-"""The ground under a figure: soft shadows on it, and a grid."""
+"""The ground under a figure: soft shadows and a grid."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ SHADOWS = (
     ("l_subtalar", 0.16, 0.40, 0.04),
     ("r_subtalar", 0.16, 0.40, 0.04),
 )
-"""Joints that have a shadow: its radius, its darkness, and the joint's height at rest."""
+"""Joints with a shadow: its radius (m), its darkness, and the joint's height at rest (m)."""
 REACH = 7.0
-"""A grid is seen this many steps around its centre."""
+"""Radius of a grid, in steps."""
 
 
 def shadows(joints: Float64, names: tuple[str, ...]) -> Float32:
-    """(K, 4) soft blobs under the hips and both feet, fainter the higher these are; see `View.blobs`."""
+    """float32 (K, 4): soft shadows under hips and feet, fainter with height, as in `View.blobs`."""
     found = []
     for name, radius, darkness, rest in SHADOWS:
         x, y, z = joints[list(names).index(name), :3, 3]
@@ -31,17 +31,17 @@ def shadows(joints: Float64, names: tuple[str, ...]) -> Float32:
 
 
 def no_shadows() -> Float32:
-    """(0, 4)."""
+    """float32 (0, 4): no shadows."""
     return np.zeros((0, 4), dtype=np.float32)
 
 
 def body_grid(joints: Float64) -> Grid:
-    """Metres on the floor, around where somebody stands."""
+    """A grid of metres on the floor around the body's root."""
     return Grid(0.0, 1.0, (float(joints[0, 0, 3]), float(joints[0, 2, 3])), REACH)
 
 
 def face_grid(subject: Subject, lowest: float, scale: float) -> Grid:
-    """Tenths of a metre under a head whose lowest vertex has that y. scale: 1 for an adult's."""
+    """A grid of tenths of a metre at height `lowest`, under a head of size `scale`, 1 for an adult's."""
     x, _, z = subject.centre
     step = 10.0 ** round(np.log10(max(scale, 1e-9)) - 1)
     return Grid(lowest, step, (x, z), step * 2 * REACH)

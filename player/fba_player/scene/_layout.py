@@ -1,4 +1,4 @@
-"""Views moved, tinted and put together: several performances in one picture."""
+"""Moves, tints and joins views, to show several performances in one picture."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Colour = tuple[float, float, float]
 JOINT = 1e-3
 """Capsules shorter than this (m) are joints, not bones."""
 BONE_WIDTH, BONE_LIFT = 2.6, 0.3
-"""Bones as lines: pixels of a picture 720 high, and metres of flesh through which they are seen."""
+"""Bones as lines: width in pixels of a picture 720 high, and depth (m) through which they show."""
 LINE_LIFT = 0.02
-"""Metres by which another face may hide the lines of a face."""
+"""Depth (m) by which another face may hide the lines of a face."""
 
 
-def moved(view: View, offset: Float64) -> View:
-    """The view, everything in it moved by (3,) metres."""
+def move_view(view: View, offset: Float64) -> View:
+    """The view with everything moved by offset (3,), metres."""
     if not offset.any():
         return view
     shift = translation(offset)
@@ -39,8 +39,8 @@ def moved(view: View, offset: Float64) -> View:
     )
 
 
-def joined(views: Sequence[View]) -> View:
-    """All of them in one picture; the background, the grid and the legend are those of the first."""
+def join_views(views: Sequence[View]) -> View:
+    """One view of everything in all views, with the background, grid and legend of the first."""
     first = views[0]
     extras = [view.extras for view in views if view.extras is not None]
     return replace(
@@ -64,9 +64,9 @@ def joined(views: Sequence[View]) -> View:
 
 
 class Drawing:
-    """A view of feature points and bones as a drawing in one colour, that goes over another figure.
+    """Turns a view of feature points and bones into a drawing in one colour, to lie over another figure.
 
-    colour: linear light; ink: the same as it is shown. Shapes are kept, as renderers want them.
+    colour: linear light. ink: the same colour in sRGB. Tinted shapes are cached for the renderer.
     """
 
     def __init__(self, colour: Colour, ink: Colour) -> None:
@@ -75,7 +75,7 @@ class Drawing:
         self._shapes: dict[int, tuple[MeshShape, MeshShape]] = {}
 
     def __call__(self, view: View, eyeballs: int) -> View:
-        """eyeballs: so many of the view's capsules, the first ones, are left out."""
+        """The drawing of a view. eyeballs: number of capsules to leave out, the first ones."""
         bones = view.capsules[eyeballs:]
         ends = np.stack([bones[:, 0:3], bones[:, 4:7]], axis=1)
         long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > JOINT
@@ -103,7 +103,7 @@ class Drawing:
 
 
 def caption(text: str, place: Float64) -> Extras:
-    """A word at a place, in the picture's plane."""
+    """A label at a point."""
     at = np.asarray(place, dtype=np.float32)[None]
     return Extras(dots=(Dots(at, (1.0, 1.0, 1.0, 1.0), 0.0, 1.0, (text,), np.zeros((1, 3), np.float32)),))
 

@@ -1,4 +1,4 @@
-"""Lines on the skin of a face through its feature points: they go with the skin, however it moves."""
+"""Lines on the skin of a face through its feature points, which move with the skin."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from fba.face.model import FaceModel, point_row
 Indices = Intp
 
 FINER = 8
-"""Steps between two points."""
+"""Number of steps between two feature points."""
 RINGS = 3
-"""A line keeps to the triangles this near to the shortest way along edges: one lip's stays off the other."""
+"""Distance (m) of a line's triangles from the shortest path along edges, so that lips stay apart."""
 
 
 @dataclass(frozen=True, eq=False)
 class SkinLine:
-    """A line of places on triangles. kind: what it outlines. corners (N, 3): vertices of the whole model;
-    shares (N, 3): their weights."""
+    """A line of points on triangles. kind: what it outlines. corners: (N, 3), vertices of the model. shares:
+    (N, 3), their weights."""
 
     kind: str
     corners: Indices
     shares: Float64
 
     def places(self, vertices: Float32) -> Float64:
-        """(N, 3) where it runs on moved vertices (V, 3)."""
+        """float64 (N, 3): the line's points on moved vertices (V, 3)."""
         placed: Float64 = np.einsum("nk,nkc->nc", self.shares, vertices[self.corners].astype(np.float64))
         return placed
 
 
 def skin_lines(model: FaceModel) -> list[SkinLine]:
-    """All lines of `skin_lines.csv` whose points stand on the skin; the others are left out."""
+    """The lines of `skin_lines.csv` whose feature points lie on the skin."""
     with (files(__package__) / "skin_lines.csv").open(encoding="utf-8") as file:
         rows = [(row["kind"], row["points"].split()) for row in csv.DictReader(file)]
     surface = _Surface(model)
@@ -51,7 +51,7 @@ def skin_lines(model: FaceModel) -> list[SkinLine]:
 
 
 class _Surface:
-    """The skin as a graph of its edges, vertices at one place taken as one."""
+    """The skin as a graph of its edges, in which vertices at the same position are one."""
 
     def __init__(self, model: FaceModel) -> None:
         from scipy.sparse import csr_matrix
@@ -78,7 +78,7 @@ class _Surface:
         return vertex in self._on
 
     def line(self, through: list[int]) -> tuple[Indices, Float64] | None:
-        """Corners (N, 3) and weights (N, 3) of a smooth line through vertices; None where there is no way."""
+        """Corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if unconnected."""
         from scipy.interpolate import CubicSpline
 
         knots = self._vertices[through]
@@ -106,7 +106,7 @@ class _Surface:
         return np.array(corners, dtype=np.intp), np.array(shares)
 
     def _near(self, start: int, end: int) -> Indices | None:
-        """(F, 3) triangles along the shortest way between two vertices."""
+        """Triangles (F, 3) along the shortest path between two vertices; None if there is none."""
         from scipy.sparse.csgraph import dijkstra
 
         one, other = int(self._welded[start]), int(self._welded[end])
@@ -127,7 +127,7 @@ class _Surface:
 
 
 def _nearest(place: Float64, triangles: Float64) -> tuple[int, Float64]:
-    """Which of triangles (F, 3, 3) is nearest to a place, and the weights of its corners there."""
+    """Index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners there."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     ab, ac, ap = b - a, c - a, place - a
     d1, d2 = (ab * ap).sum(1), (ac * ap).sum(1)

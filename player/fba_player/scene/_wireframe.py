@@ -1,4 +1,4 @@
-"""Edges and normals of what a view shows, as lines."""
+"""Edges and normals of a view's meshes, as lines."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from fba_player.view.view import Colour, Eye, FaceMesh, FaceShape, Lines, Mesh, 
 WIRE: Colour = (0.03, 0.05, 0.08, 0.8)
 WIRE_LIFT = 0.0012
 NORMAL_LENGTH = 0.007
-"""Metres on a face whose eyes are as far apart as an adult's."""
+"""Metres, on an adult's face."""
 NORMAL_CELL = 0.0045
-"""One normal is drawn in every cube of so many metres."""
+"""One normal is drawn in each cube of this size (m)."""
 NORMAL_OPACITY = (0.95, 0.55)
 """At its foot and at its tip."""
 RINGS = (14, 20)
-"""Of an eyeball, which has no mesh when it is drawn."""
+"""Of an eyeball, which has no mesh of its own."""
 
 
 class Wireframe:
-    """Lines along edges and normals; what does not change is worked out once a shape."""
+    """Lines along edges and normals; the edges of each shape are cached."""
 
     def __init__(self) -> None:
         self._edges: WeakKeyDictionary[FaceShape | MeshShape, Int32] = WeakKeyDictionary()
@@ -33,7 +33,7 @@ class Wireframe:
         self._ball = vertices[unique_edges(triangles)]
 
     def edges(self, faces: list[FaceMesh], meshes: list[Mesh], eyes: list[Eye], scale: float) -> Lines:
-        """Every edge once; scale: size of the face, 1 for an adult's."""
+        """All edges, each once. scale: size of the face, 1 for an adult's."""
         found = [np.zeros((0, 2, 3), dtype=np.float32)]
         found += [world_positions(mesh)[self._of(mesh.shape)] for mesh in faces]
         found += [_moved(mesh.positions, mesh.matrix)[self._of(mesh.shape)] for mesh in meshes]
@@ -41,7 +41,7 @@ class Wireframe:
         return Lines(np.concatenate(found), WIRE, 1.0, WIRE_LIFT * scale)
 
     def normals(self, faces: list[FaceMesh], scale: float) -> Lines:
-        """A line on every vertex, or on some of many; red, green and blue say along x, y and z."""
+        """A line at each vertex, or at some of many; red, green and blue stand for x, y and z."""
         ends, colours = [np.zeros((0, 2, 3), np.float32)], [np.zeros((0, 2, 4), np.float32)]
         for mesh in faces:
             if mesh.shape not in self._thinned:
@@ -62,14 +62,14 @@ class Wireframe:
 
 
 def unique_edges(triangles: Int32) -> Int32:
-    """(E, 2) edges of triangles (F, 3), each once, the smaller index first."""
+    """int32 (E, 2): the edges of triangles (F, 3), each once, the smaller index first."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     found: Int32 = np.unique(edges, axis=0).astype(np.int32)
     return found
 
 
 def _thinned(mesh: FaceMesh, cell: float) -> Intp:
-    """The first vertex that triangles use in every cell of that many metres."""
+    """Indices (N,) of the first vertex used by triangles in each cell of this size (m)."""
     used = np.unique(mesh.shape.triangles)
     cells = np.floor(mesh.positions[used] / max(cell, 1e-9)).astype(np.int64)
     first: Intp = np.unique(cells, axis=0, return_index=True)[1]

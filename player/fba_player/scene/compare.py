@@ -1,4 +1,4 @@
-"""Several performances in one picture: side by side, or one over the other."""
+"""Several performances in one picture, side by side or over each other."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba_player.scene._compare_timeline import CompareTimeline
-from fba_player.scene._layout import Drawing, caption, joined, moved
+from fba_player.scene._layout import Drawing, caption, join_views, move_view
 from fba_player.scene.differences import Differences, differences
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import PRESETS, Camera, Subject
@@ -26,27 +26,25 @@ if TYPE_CHECKING:
 
 
 ARRANGEMENTS = ("side", "over")
-"""Beside each other, or each over the first as a drawing of feature points and bones in a colour."""
+"""Side by side; or over the first, as coloured drawings of feature points and bones."""
 COLOURS = ("#2f9bff", "#ff5a36", "#39c26b", "#c266ff", "#f2b500")
-"""Of the drawings over the first, one after the other (sRGB)."""
+"""Colours (sRGB) of the drawings over the first, in turn."""
 APART = 1.12
-"""Distance of two figures side by side, in their widths."""
+"""Distance between figures side by side, in their widths."""
 FIELD_OF_VIEW = 14.0
-"""Degrees: from further away than one figure alone, so that all are seen from the same side."""
+"""Field of view (degrees): narrow, from further away, so that all figures are seen from the same side."""
 SHOULDERS = 0.25
-"""Half the width (m) of a body of which only the upper part is in view."""
+"""Half the width (m) of a body that is seen from the hips up."""
 ABOVE = 0.96
 """Height of a caption above the middle of a head, in half heads."""
 
 
 class CompareScene(InTime[CompareTimeline]):
-    """Several scenes shown together, at the same times; a `Showable` as `Scene` is.
+    """Several scenes shown together on one timeline; a `Showable` like `Scene`.
 
     scenes: at least one. arrangement: "side" or "over"; may be set at any time. names: captions of the
-    figures side by side, by default the animations' own; "" for none. Where a scene has no body and another
-    has one, its head stands as high as that one's.
-
-    Beside each other means beside each other as the named view sees them: `camera` decides.
+    figures side by side, by default the animations' names; "" for none. A head without a body is shown at
+    the height of the heads on bodies. Figures stand side by side as seen by the last `camera`.
     """
 
     def __init__(
@@ -65,7 +63,7 @@ class CompareScene(InTime[CompareTimeline]):
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
 
-    # ---- what the window and recordings want of a scene
+    # ---- the protocol of a scene
 
     @property
     def arrangement(self) -> str:
@@ -80,37 +78,37 @@ class CompareScene(InTime[CompareTimeline]):
 
     @property
     def animation(self) -> Animation:
-        """The first one's."""
+        """The first scene's animation."""
         return self.scenes[0].animation
 
     @property
     def model(self) -> FaceModel:
-        """The first one's face."""
+        """The first scene's face model."""
         return self.scenes[0].model
 
     @property
     def figure(self) -> FaceFigure:
-        """The first one's face as it is shown."""
+        """The first scene's face as it is shown."""
         return self.scenes[0].figure
 
     @property
     def title(self) -> str:
-        """Their names."""
+        """The scenes' names."""
         return " | ".join(name for name in self.names if name)
 
     @property
     def switches(self) -> Switches:
-        """What is drawn of all of them; set by `show`."""
+        """The switches of all scenes; set by `show`."""
         return self.scenes[0].switches
 
     def show(self, name: str, on: object = True) -> None:
-        """Set a switch of all of them; ValueError for what does not exist."""
+        """Set a switch of all scenes; ValueError for an unknown name or value."""
         for scene in self.scenes:
             scene.show(name, on)
 
     @property
     def view(self) -> str:
-        """What they are shown as: "figure" or "points"."""
+        """How the scenes are shown: "figure" or "points"."""
         return self.scenes[0].view
 
     @view.setter
@@ -120,27 +118,27 @@ class CompareScene(InTime[CompareTimeline]):
 
     @property
     def has_body(self) -> bool:
-        """Whether one of them has a body."""
+        """Whether a scene has a body."""
         return any(scene.has_body for scene in self.scenes)
 
     @property
     def subject(self) -> Subject:
-        """What a camera is to have in view of all of them."""
+        """What a camera should have in view: all figures."""
         return self._all([scene.subject for scene in self.scenes])
 
     @property
     def face_subject(self) -> Subject:
-        """All heads."""
+        """What a camera should have in view: all heads."""
         return self._all([scene.face_subject for scene in self.scenes])
 
     @property
     def gesture_subject(self) -> Subject | None:
-        """All of them from the hips up, where that shows all that moves; else None."""
+        """All figures from the hips up if that shows all that moves, else None."""
         found = [scene.gesture_subject if scene.has_body else scene.subject for scene in self.scenes]
         return self._all([one for one in found if one is not None]) if all(found) and self.has_body else None
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """A camera that has all of them in view; they are then side by side as it sees them.
+        """A camera that has all figures in view; from now on they stand side by side as it sees them.
 
         preset: see `Scene.camera`.
         """
@@ -164,33 +162,33 @@ class CompareScene(InTime[CompareTimeline]):
         return own.fit(self._all(subjects), aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """How far a following camera has gone: as the first one asks for."""
+        """Offset of a following camera at a time, metres: the first scene's."""
         return self.scenes[0].travel(self.timeline.own_time(0, time))
 
     def at(self, time: float) -> View:
-        """Everything to be drawn at a time; ValueError for one that is not finite."""
+        """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
         times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
         if self._arrangement == "over":
             return self._over(times)
         views = []
         gone = np.array(self.scenes[0].travel(times[0]))
         for number, (scene, own) in enumerate(zip(self.scenes, times, strict=True)):
-            view = moved(scene.at(own), self._place(number) + gone - np.array(scene.travel(own)))
+            view = move_view(scene.at(own), self._place(number) + gone - np.array(scene.travel(own)))
             if self.names[number] and len(self.scenes) > 1:
                 view = _captioned(view, self.names[number], self._caption_place(number) + gone)
             views.append(view)
-        return joined(views)
+        return join_views(views)
 
     def still(self, faps: Float32) -> View:
-        """The first one alone for FAPs (68,)."""
+        """The first scene alone for FAPs (68,)."""
         return self.scenes[0].still(faps)
 
     # ---- comparing
 
     def differences(self, second: int = 1) -> Differences:
-        """What another one shows minus what the first shows; worked out once, anew where more has arrived.
+        """Performance `second` minus the first; cached until more of a performance arrives.
 
-        ValueError where there is no other.
+        Raises ValueError if there is no such performance.
         """
         key = (second, self.timeline.arrived)
         if key not in self._differences:
@@ -210,16 +208,16 @@ class CompareScene(InTime[CompareTimeline]):
                 drawn = self._drawings[number - 1](scene.at(own), _eyes(scene))
             finally:
                 scene.view = kept
-            views.append(moved(drawn, self._height(number) + gone - np.array(scene.travel(own))))
-        return joined(views)
+            views.append(move_view(drawn, self._height(number) + gone - np.array(scene.travel(own))))
+        return join_views(views)
 
     def _right(self) -> Float64:
-        """(3,) to the right of the picture, on the ground."""
+        """(3,): the picture's right, on the ground."""
         yaw = math.radians(self._yaw)
         return np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
 
     def _place(self, number: int) -> Float64:
-        """(3,) by which a figure stands elsewhere than alone."""
+        """(3,): the shift of a figure in the arrangement."""
         if self._arrangement == "over":
             return self._height(number)
         widths = [self._half_width(scene) for scene in self.scenes]
@@ -227,14 +225,14 @@ class CompareScene(InTime[CompareTimeline]):
         return np.asarray(self._right() * along * APART + self._height(number))
 
     def _half_width(self, scene: Scene) -> float:
-        """The room that one takes: all the same, but heads less than whole bodies."""
+        """Half the width that each figure takes; heads take less than whole bodies."""
         if self._apart is not None:
             return self._apart
         kin = [one.subject.half_width for one in self.scenes if one.has_body == scene.has_body]
         return max(*kin, SHOULDERS) if self.has_body else max(kin)
 
     def _height(self, number: int) -> Float64:
-        """(3,) that brings a head alone up to the heads on bodies."""
+        """(3,): the shift that brings a head alone to the height of heads on bodies."""
         scene = self.scenes[number]
         whole = next((one for one in self.scenes if one.has_body), None)
         if scene.has_body or whole is None:
@@ -247,7 +245,7 @@ class CompareScene(InTime[CompareTimeline]):
         return np.asarray(np.array([x, y + head.half_height * ABOVE, z]) + self._place(number))
 
     def _all(self, subjects: list[Subject]) -> Subject:
-        """One subject around them, where they stand."""
+        """One subject around all subjects in their places."""
         right = self._right()
         places = [np.array(one.centre) + self._place(n) for n, one in enumerate(subjects)]
         along = [float(place @ right) for place in places]

@@ -1,4 +1,4 @@
-"""By how much two performances differ, parameter by parameter, on a common time base."""
+"""Differences between two performances, parameter by parameter, on one timeline."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from fba.parameters import baps, faps
 from fba_player.scene._compare_timeline import CompareTimeline
 
 MOST_FRAMES = 20_000
-"""Of longer performances, so many moments evenly chosen are looked at."""
+"""Longer performances are sampled at this many moments."""
 
 
 @dataclass(frozen=True)
 class Largest:
-    """A parameter that differs. kind: "fap" or "bap". most: the largest difference, in its unit, at `time`
-    seconds; rms: over all moments."""
+    """The largest difference in one parameter. kind: "fap" or "bap". most: in its unit, at `time` seconds.
+    rms: root mean square over all moments."""
 
     kind: str
     number: int
@@ -33,9 +33,9 @@ class Largest:
 class Differences:
     """The second performance minus the first, at every moment at which either has a frame.
 
-    times: float64 (T,) seconds, those that both have. faps: float32 (T, 68) in the FAP's unit, a fraction
-    of the face's measures as in the stream; baps: float64 (T, 296), 1e-5 rad or mm. Values are those shown:
-    kept where nothing was sent, between frames interpolated. Zeros where one has no face, or no body.
+    times: float64 (T,), seconds, those that both have. faps: float32 (T, 68), in the FAPs' units. baps:
+    float64 (T, 296), 1e-5 rad or mm. Values are as shown: held until the next is sent, interpolated between
+    frames. Zeros if one performance has no face, or no body.
     """
 
     times: Float64
@@ -44,16 +44,16 @@ class Differences:
 
     @cached_property
     def fap_units(self) -> list[str]:
-        """Of each of the 68 FAPs: "MNS", "1e-5 rad" ...; "" for the first two."""
+        """Units of the 68 FAPs: "MNS", "1e-5 rad" ...; "" for the first two."""
         return ["1e-5 rad" if fap.unit == "AU" else fap.unit for fap in faps()]
 
     @cached_property
     def bap_units(self) -> list[str]:
-        """Of each of the 296 BAPs: "1e-5 rad" or "mm"."""
+        """Units of the 296 BAPs: "1e-5 rad" or "mm"."""
         return [bap.unit for bap in baps()]
 
     def largest(self, count: int = 10) -> list[Largest]:
-        """The parameters that differ most, in units of their own quantiser step, the worst first."""
+        """The `count` parameters with the largest differences in quantiser steps, largest first."""
         found = []
         columns = [("fap", fap.number, fap.name, fap.step) for fap in faps()]
         columns += [("bap", bap.number, bap.name, bap.step_iso) for bap in baps()]
@@ -73,7 +73,7 @@ class Differences:
 
 
 def differences(timeline: CompareTimeline, second: int = 1) -> Differences:
-    """Differences of the first performance to another, by its number. ValueError where there is none."""
+    """Differences between the first performance and another, by its index. ValueError for an invalid one."""
     if not 0 < second < len(timeline.timelines):
         raise ValueError(f"there is no performance {second} to compare: {len(timeline.timelines)} are shown")
     one, other = timeline.timelines[0], timeline.timelines[second]

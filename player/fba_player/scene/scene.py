@@ -1,4 +1,4 @@
-"""What is shown at time t: an animation, its face, its body, and where a camera should look."""
+"""A scene: an animation on a face and body, which gives the view at any time and a camera for it."""
 
 from __future__ import annotations
 
@@ -21,30 +21,29 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
     from fba_player.figure.face import FaceFigure
     from fba_player.figure.person import Person
-    from fba_player.scene._display_options import Dressing
+    from fba_player.scene._display_options import DisplayOptions
     from fba_player.scene._feature_points_view import PointView
 
 __all__ = ["LOOKS", "SWITCHES", "Scene", "default_camera"]
 
 
 SAMPLES = 48
-"""Moments at which the extent of a moving body is looked up to fit the camera."""
+"""Number of moments at which a body's extent is sampled to fit the camera."""
 LOOKS = ("figure", "points")
-"""What a scene may be shown as: a person, or feature points and bones."""
+"""How a scene may be shown: as a person, or as feature points and bones."""
 
 
 class Scene(InTime[Timeline]):
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
     animation: at least one frame, else ValueError. model: the face, by default the built-in head; one that is
-    not in metres is shown as large as a person, with an FbaWarning, and what it lacks is told likewise. body:
-    what BAPs move, by default the built-in person; ModelError where it has no place for a face. axes: name
-    of the body's axis convention (`fba.body.convention_names()`). view: "figure", a person, or "points",
-    the face as its feature points with lines through them and the body as its bones; it may be set at any
-    time, ValueError where it is something else. timeline: what is shown when, by default
-    `Timeline(animation, model)`; one that grows shows a stream while it arrives.
+    not in metres is scaled to a person's size, with an FbaWarning for that and for missing eyes, teeth or
+    tables. body: the body that BAPs move, by default the built-in person; ModelError if it cannot take a
+    face. axes: name of the body's axis convention (`fba.body.convention_names()`). view: "figure" for a
+    person, "points" for feature points with lines and bones; may be set at any time, ValueError for another
+    value. timeline: by default `Timeline(animation, model)`; one that grows shows a stream as it arrives.
 
-    `show` sets its `switches`, at any time. What is drawn is worked out on first use. A `Showable`.
+    `show` sets the `switches` at any time. Figures are built on first use. A `Showable`.
     """
 
     def __init__(
@@ -60,16 +59,16 @@ class Scene(InTime[Timeline]):
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
         self.animation = animation
-        self.model = _default_model() if model is None else _usable(model)
+        self.model = _default_model() if model is None else _prepare_model(model)
         self.timeline = timeline or Timeline(animation, self.model)
         self.switches = Switches()
         self.view = view
         self._figure: FaceFigure | None = None
         self._point_view: PointView | None = None
         self._person: Person | None = None
-        self._dressing: Dressing | None = None
+        self._options: DisplayOptions | None = None
         self._extent: Extent | None = None
-        self._fitted = 0  # frames there were when the extent was looked up
+        self._fitted = 0  # number of frames when the extent was sampled
         if animation.body is not None:
             from fba.body import BapSolver
             from fba.body.model import BodyModel
@@ -82,7 +81,7 @@ class Scene(InTime[Timeline]):
 
     @property
     def view(self) -> str:
-        """What the scene is shown as: "figure" or "points"."""
+        """How the scene is shown: "figure" or "points"."""
         return self._view
 
     @view.setter
@@ -114,7 +113,7 @@ class Scene(InTime[Timeline]):
 
     @property
     def person(self) -> Person:
-        """The body that is shown, with the face on it; built on first use. Only where there is a body."""
+        """The body that is shown, with the face on it; built on first use; only if there is a body."""
         if self._person is None:
             from fba_player.figure.person import Person
 
@@ -128,19 +127,19 @@ class Scene(InTime[Timeline]):
 
     @property
     def subject(self) -> Subject:
-        """What a camera is to have in view over the whole performance."""
+        """What a camera should have in view over the whole performance."""
         return self._framed().subject if self.has_body else self.figure.subject
 
     @property
     def gesture_subject(self) -> Subject | None:
-        """The body from the hips up, where the legs stand still and the face is animated; else None."""
+        """The body from the hips up if the legs stand still and the face is animated, else None."""
         if not self.has_body or self.animation.face is None or self._framed().legs_move:
             return None
         return self._framed().upper_half
 
     @property
     def face_subject(self) -> Subject:
-        """The head alone, where the performance begins."""
+        """The head alone, at the start of the performance."""
         face = self.figure.subject
         if not self.has_body:
             return face
@@ -150,7 +149,7 @@ class Scene(InTime[Timeline]):
         return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """A camera that has everything in view: the named preset, or the one that suits the content.
+        """A camera that has everything in view, for the named preset or for what the content suggests.
 
         "body" fits the whole body; the other presets look at the face, from the front, at three quarters
         or in profile, also where there is a body. ValueError for another name.
@@ -161,20 +160,20 @@ class Scene(InTime[Timeline]):
         return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
 
     def of(self, faps: Float32, baps: Float64) -> View:
-        """What is drawn for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), whatever is played.
+        """The view for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), not the animation's.
 
-        baps count only where the animation has a body.
+        baps are ignored if the animation has no body.
         """
         return self._shown(faps, self._solver.pose(baps) if self.has_body else None)
 
     def still(self, faps: Float32) -> View:
-        """The face for FAPs (68,) as they are shown, in the body's posture at the start."""
+        """The view for FAPs (68,), in the body's pose at the start."""
         return self._shown(faps, self._posed(float(self.start))[1])
 
     def at(self, time: float) -> View:
-        """Everything to be drawn at a time in seconds; before the start or after the end, its frames.
+        """The view at a time in seconds; before the start or after the end, the first or last frame.
 
-        Raises ValueError for a time that is not finite.
+        Raises ValueError if the time is not finite.
         """
         return self._shown(*self._posed(time))
 
@@ -182,14 +181,14 @@ class Scene(InTime[Timeline]):
         view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
         if not self.switches.changed:
             return view
-        from fba_player.scene._display_options import Dressing, Posture
+        from fba_player.scene._display_options import DisplayOptions, Posture
 
-        if self._dressing is None:
-            self._dressing = Dressing(self.figure, self._bones if self.has_body else None)
-        return self._dressing.dressed(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
+        if self._options is None:
+            self._options = DisplayOptions(self.figure, self._bones if self.has_body else None)
+        return self._options.apply(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
 
     def _person_or_head(self, faps: Float32, joints: Float64 | None) -> View:
-        """The view as a figure."""
+        """The view of a person or a head."""
         if joints is None:
             world = np.eye(4)
             return View(eyes=self.figure.eyes(faps, world), faces=self.figure.meshes(faps, world))
@@ -202,7 +201,7 @@ class Scene(InTime[Timeline]):
         )
 
     def _points(self, faps: Float32, joints: Float64 | None) -> View:
-        """The view as feature points and bones."""
+        """The view of feature points and bones."""
         if self._point_view is None:
             from fba_player.scene._feature_points_view import PointView
 
@@ -221,7 +220,7 @@ class Scene(InTime[Timeline]):
         )
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """How far a following camera has gone at a time: (x, y, z), metres; zeros where it stands still."""
+        """Offset (x, y, z) of a following camera at a time, metres; zeros if it does not follow."""
         if not self.has_body or not self._framed().follows:
             return (0.0, 0.0, 0.0)
         joints = self._posed(time)[1]
@@ -236,12 +235,12 @@ class Scene(InTime[Timeline]):
         return faps, self._solver.pose(self.timeline.baps(time))
 
     def _face_matrix(self, joints: Float64 | None) -> Float64:
-        """Frame of the face model, without the head's own turn, into the world."""
+        """(4, 4): from the face model's frame into the world, without the head's own turn."""
         return np.eye(4) if joints is None else self.person.frame(joints)
 
     def _framed(self) -> Extent:
         frames = self.timeline.frames
-        if self._extent is None or frames >= 2 * self._fitted:  # much more of a stream has arrived
+        if self._extent is None or frames >= 2 * self._fitted:  # a stream has grown by much
             self._fitted = frames
             chosen = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in chosen])
@@ -249,10 +248,10 @@ class Scene(InTime[Timeline]):
         return self._extent
 
 
-def _usable(model: FaceModel) -> FaceModel:
-    from fba_player.figure.model_units import usable
+def _prepare_model(model: FaceModel) -> FaceModel:
+    from fba_player.figure.model_units import prepare_model
 
-    return usable(model)
+    return prepare_model(model)
 
 
 def _default_model() -> FaceModel:
@@ -262,10 +261,10 @@ def _default_model() -> FaceModel:
 
 
 def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:
-    """The view that suits the content.
+    """A camera that suits the content.
 
-    A body whole; from the hips up where it has a face that moves and its legs stand still; a face alone
-    from slightly aside.
+    It shows a whole body; a body from the hips up if its face moves and its legs stand still; a face alone
+    slightly from the side.
     """
     if scene.has_body:
         return Camera.preset("body", scene.gesture_subject or scene.subject, aspect)

@@ -22,7 +22,7 @@ DISTANCES = (0.05, 100.0)
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What a camera is fitted to: centre (x, y, z) and half the height and width to be seen, metres.
+    """The box that a camera is fitted to: centre (x, y, z), half its height and width, metres.
 
     half_depth: how far from the centre this may come towards the camera.
     """
@@ -60,29 +60,29 @@ class Camera:
         return cls(yaw=yaw, pitch=pitch).fit(subject, aspect)
 
     def fit(self, subject: Subject, aspect: float) -> Camera:
-        """The same direction, moved so that the subject fills the picture."""
+        """The camera, moved along its direction so that the subject fills the picture."""
         half = max(subject.half_height, subject.half_width / max(aspect, 1e-3))
         distance = half / math.tan(math.radians(self.field_of_view) / 2) + subject.half_depth
         return replace(self, target=subject.centre, distance=_clamped(distance, DISTANCES))
 
     def orbit(self, yaw: float, pitch: float) -> Camera:
-        """Turned about the target by degrees."""
+        """The camera, turned about its target by degrees."""
         turned = (self.yaw + yaw + 180.0) % 360.0 - 180.0
         return replace(self, yaw=turned, pitch=_clamped(self.pitch + pitch, (-PITCH_LIMIT, PITCH_LIMIT)))
 
     def zoom(self, factor: float) -> Camera:
-        """Distance times factor: below 1 comes nearer."""
+        """The camera, its distance multiplied by `factor`: below 1 comes nearer."""
         return replace(self, distance=_clamped(self.distance * factor, DISTANCES))
 
     def pan(self, right: float, up: float) -> Camera:
-        """Target and camera moved across the view, in fractions of the picture's height."""
+        """The camera with its target, moved across the view by fractions of the picture's height."""
         size = 2 * self.distance * math.tan(math.radians(self.field_of_view) / 2)
         axes = self._axes()
         moved = np.array(self.target) + (axes[0] * right + axes[1] * up) * size
         return replace(self, target=(float(moved[0]), float(moved[1]), float(moved[2])))
 
     def between(self, other: Camera, share: float) -> Camera:
-        """A camera on the way to another, share 0 here and 1 there: the shorter way round."""
+        """A camera between this one (share 0) and another (share 1), the shorter way round."""
         turn = (other.yaw - self.yaw + 180.0) % 360.0 - 180.0
         x, y, z = (a + (b - a) * share for a, b in zip(self.target, other.target, strict=True))
         return Camera(
@@ -95,12 +95,12 @@ class Camera:
 
     @property
     def eye(self) -> Float64:
-        """(3,) where the camera stands."""
+        """(3,) position of the camera."""
         place: Float64 = np.array(self.target) + self._axes()[2] * self.distance
         return place
 
     def view_matrix(self) -> Float64:
-        """(4, 4) world to camera."""
+        """(4, 4) matrix from world to camera space."""
         axes = self._axes()
         matrix = np.eye(4)
         matrix[:3, :3] = axes
@@ -108,7 +108,7 @@ class Camera:
         return matrix
 
     def projection_matrix(self, aspect: float) -> Float64:
-        """(4, 4) camera to clip space, OpenGL's convention."""
+        """(4, 4) matrix from camera to clip space, in OpenGL's convention."""
         near, far = self.distance * 0.05, self.distance * 4 + 60.0
         scale = 1 / math.tan(math.radians(self.field_of_view) / 2)
         matrix = np.zeros((4, 4))

@@ -1,4 +1,4 @@
-"""Words in pictures: Pillow's own font, the same on every machine."""
+"""Text in pictures: Pillow's built-in font, the same on every machine."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ SMALLEST = 6
 
 
 def label_font(size: float) -> Any:
-    """The font at a size in pixels."""
+    """The font at a size in pixels, at least `SMALLEST`."""
     return _font(max(round(size), SMALLEST))
 
 
 def shortened(draw: Any, text: str, font: Any, width: float) -> str:
-    """The text, cut where it is wider than so many pixels."""
+    """The text, cut so that it is at most `width` pixels wide."""
     while len(text) > 1 and draw.textlength(text, font=font) > width:
         text = text[:-1]
     return text

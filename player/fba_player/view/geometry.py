@@ -10,14 +10,14 @@ from fba_player.view.view import FaceMesh
 
 
 def world_positions(mesh: FaceMesh) -> Float32:
-    """(V, 3) positions in the world."""
+    """float32 (V, 3): the mesh's positions in the world."""
     at = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
     world: Float32 = (at @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
     return world
 
 
 def world_normals(mesh: FaceMesh) -> Float32:
-    """(V, 3) unit normals in the world."""
+    """float32 (V, 3): the mesh's unit normals in the world."""
     turned = turn_partly(mesh.normals, mesh.shape.sway, mesh.turn, np.zeros(3)) @ mesh.matrix[:3, :3].T
     length = np.linalg.norm(turned, axis=1, keepdims=True)
     unit: Float32 = (turned / np.maximum(length, 1e-20)).astype(np.float32)
@@ -25,7 +25,7 @@ def world_normals(mesh: FaceMesh) -> Float32:
 
 
 def turn_partly(positions: Float32, sway: Float32, turn: Float64, centre: Float64) -> Float64:
-    """(V, 3) positions turned about `centre` (3,), each vertex by its share `sway` (V,) of a rotation.
+    """float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of a rotation.
 
     turn: (3,), the rotation's axis times its angle.
     """
@@ -43,8 +43,8 @@ def turn_partly(positions: Float32, sway: Float32, turn: Float64, centre: Float6
 
 
 def rotation_vector(matrix: Float64) -> Float64:
-    """(3,) axis of a rotation (3, 3) times its angle, 0..pi."""
-    # The quaternion, by its largest component: exact near half a turn too.
+    """(3,): the axis of a rotation matrix (3, 3) times its angle, 0..pi."""
+    # Through the quaternion and its largest component, which is exact near half a turn, too.
     trace = float(np.trace(matrix))
     squares = np.array([trace, *np.diag(matrix)])
     largest = int(squares.argmax())
@@ -72,7 +72,7 @@ def rotation_vector(matrix: Float64) -> Float64:
 
 
 def translation(offset: npt.ArrayLike) -> Float64:
-    """(4, 4) matrix of a shift."""
+    """(4, 4) matrix of a translation by (3,)."""
     matrix = np.eye(4)
     matrix[:3, 3] = offset
     return matrix

@@ -1,6 +1,6 @@
-"""What a window, an `Offscreen` or a recording can show: the least that they need of a scene.
+"""Protocols of what a window, an `Offscreen` or a recording can show.
 
-`Scene` is one; a live stream that grows and several performances side by side are others.
+`Scene` implements them; so do a live stream and several performances side by side.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from fba_player.view.view import View
 
 
 class Times(Protocol):
-    """The frames of a performance and their times, seconds; all may grow while it is shown."""
+    """The frames of a performance and their times in seconds; both may grow while it is shown."""
 
     @property
     def frames(self) -> int:
-        """How many there are."""
+        """Number of frames."""
 
     @property
     def rate(self) -> Fraction:
-        """Frames a second."""
+        """Frames per second."""
 
     @property
     def start(self) -> Fraction:
-        """Time of the first."""
+        """Time of the first frame."""
 
     @property
     def end(self) -> Fraction:
-        """One frame period after the last."""
+        """Time of the last frame, plus one frame period."""
 
     @property
     def duration(self) -> Fraction:
-        """From start to end."""
+        """Seconds from start to end."""
 
     interpolate: bool
     """Whether what is shown between two frames lies between them."""
@@ -49,33 +49,33 @@ class Times(Protocol):
         """Changes whenever some did, and when no more will."""
 
     def time_of(self, frame: int) -> Fraction:
-        """Exact time of a frame, counted from 0."""
+        """Exact time of a frame by its index."""
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """(frame, next frame, share of the next) at a time."""
+        """(frame, next frame, weight of the next) at a time."""
 
 
 class Course(Times, Protocol):
-    """What parameters a performance shows at any time."""
+    """FAPs and BAPs of a performance at any time."""
 
     def faps(self, time: float) -> Float32:
-        """(68,) as `fba.face.resolve` gives them; zeros where there is no face."""
+        """float32 (68,) as `fba.face.resolve` gives them; zeros without a face."""
 
     def baps(self, time: float) -> Float64:
-        """(296,); zeros where there is no body."""
+        """float64 (296,); zeros without a body."""
 
 
 Own = TypeVar("Own", bound=Times)
 
 
 class InTime(Generic[Own]):
-    """A scene's times, as its own kind of timeline says."""
+    """Gives a scene the times of its timeline."""
 
     timeline: Own
 
     @property
     def rate(self) -> Fraction:
-        """Frames a second; of several performances, the first's."""
+        """Frames per second; of several performances, those of the first."""
         return self.timeline.rate
 
     @property
@@ -98,24 +98,24 @@ class Showable(Protocol):
 
     @property
     def switches(self) -> Switches:
-        """What is drawn, set by `show`."""
+        """What is drawn; set by `show`."""
 
     @property
     def has_body(self) -> bool:
-        """Whether there is a body in it: it has a ground, and a camera can show it whole."""
+        """Whether it contains a body: then there is a ground, and the camera preset "body"."""
 
     @property
     def title(self) -> str:
-        """Its name, "" for none."""
+        """Name of what is shown, "" for none."""
 
     def show(self, name: str, on: object = True) -> None:
-        """Set one of `fba_player.scene.scene.SWITCHES`; ValueError for what does not exist."""
+        """Set one of `fba_player.view.switches.SWITCHES`; ValueError for an unknown name or value."""
 
     def at(self, time: float) -> View:
-        """Everything to be drawn at a time, seconds; ValueError for one that is not finite."""
+        """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """The named view, or the one that suits the content; ValueError for another name."""
+        """A camera for the named preset, or for what the content suggests; ValueError for an unknown name."""
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """How far a following camera has gone, metres; zeros where it stands still."""
+        """Offset of a following camera at a time, metres; zeros if it does not follow."""

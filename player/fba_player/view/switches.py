@@ -1,4 +1,4 @@
-"""What can be switched on and off in a picture: a table, and the state of one scene's switches."""
+"""Display switches of a scene: the table of all of them, and their state in one scene."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from importlib.resources import files
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
 
 Value = bool | str | int | None
-"""Of a flag, whether it is on; of a choice, the chosen word; of a FAP, its number or None."""
+"""A flag's bool, a choice's word, or a FAP's number (None for none)."""
 
 ON, OFF = ("on", "yes", "true", "1"), ("off", "no", "false", "0", "none")
 
@@ -21,9 +21,9 @@ ON, OFF = ("on", "yes", "true", "1"), ("off", "no", "false", "0", "none")
 class Switch:
     """One switch.
 
-    name: what `Scene.show` calls it. key: label of the key for it, "" for none. label: a few words for a
-    panel. kind: "flag", "choice" or "fap". default: its value in a new scene. choices: of a choice, the
-    first of them is what it is when it is off. description: one line.
+    name: as in `Scene.show`. key: label of its key, "" for none. label: a few words for a panel. kind:
+    "flag", "choice" or "fap". default: its value in a new scene. choices: the words of a choice, the first of
+    which means off. description: one line.
     """
 
     name: str
@@ -34,10 +34,10 @@ class Switch:
     choices: tuple[str, ...]
     description: str
 
-    def checked(self, value: object) -> Value:
-        """The value that a switch gets for True, False, None, a word or a FAP's name or number.
+    def parse(self, value: object) -> Value:
+        """The switch's value for True, False, None, a word, or a FAP's name or number.
 
-        Raises ValueError for what it cannot be, naming what it can be.
+        Raises ValueError for an invalid value, and names the valid ones.
         """
         if self.kind == "flag":
             return self._flag(value)
@@ -46,7 +46,8 @@ class Switch:
         return self._fap(value)
 
     def next(self, value: Value) -> Value:
-        """What a key turns a flag or a choice to; a FAP goes off, or on to open_jaw."""
+        """The value after `value` when the key is pressed: a flag turns over, a choice moves on, a FAP turns
+        off, or on to open_jaw."""
         if self.kind == "flag":
             return not value
         if self.kind == "choice":
@@ -56,7 +57,7 @@ class Switch:
     def _flag(self, value: object) -> bool:
         word = str(value).lower()
         if value is not None and word not in ON + OFF:
-            raise ValueError(f"{self.name} is on or off, not {value!r}")
+            raise ValueError(f"{self.name} must be on or off, not {value!r}")
         return value is not None and word in ON
 
     def _choice(self, value: object) -> str:
@@ -65,7 +66,7 @@ class Switch:
         if value in (True, "on"):
             return self.choices[1]
         if value not in self.choices:
-            raise ValueError(f"{self.name} is one of {', '.join(self.choices)}, not {value!r}")
+            raise ValueError(f"{self.name} must be one of {', '.join(self.choices)}, not {value!r}")
         return str(value)
 
     def _fap(self, value: object) -> int | None:
@@ -81,7 +82,7 @@ class Switch:
             near = get_close_matches(text, low, n=3)
             hint = f" (near: {', '.join(near)})" if near else ""
             raise ValueError(
-                f"{self.name}: there is no low-level FAP {text!r}{hint}; they have names, or numbers "
+                f"{self.name}: no low-level FAP {text!r}{hint}; give a name or a number in "
                 f"{FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}"
             )
         return number
@@ -102,13 +103,13 @@ def _table() -> dict[str, Switch]:
 
 
 SWITCHES: Mapping[str, Switch] = _table()
-"""All switches by name, in the order of a panel."""
+"""All switches by name, in the order in which a panel lists them."""
 
 
 class Switches(Mapping[str, Value]):
     """The switches of one scene: a mapping of names to values, set by `show`.
 
-    version: counts the changes, so that what was drawn before one can be told from what comes after.
+    version: increases with every change, so that a picture drawn before can be recognised as outdated.
     """
 
     def __init__(self) -> None:
@@ -125,26 +126,26 @@ class Switches(Mapping[str, Value]):
         return len(self._values)
 
     def show(self, name: str, on: object = True) -> None:
-        """Set a switch: True, False, a choice's word, or a FAP by name or number (None for none).
+        """Set a switch to True, False, a choice's word, or a FAP by name or number (None for none).
 
-        Raises ValueError for a switch that does not exist or a value that it cannot have.
+        Raises ValueError for an unknown switch or an invalid value.
         """
-        value = _named(name).checked(on)
+        value = _find_switch(name).parse(on)
         if value != self._values[name]:
             self._values[name] = value
             self.version += 1
 
     def press(self, name: str) -> None:
-        """What the switch's key does: a flag turns over, a choice goes on to its next."""
-        self.show(name, _named(name).next(self._values[_named(name).name]))
+        """Do what the switch's key does: turn a flag over, move a choice on to its next word."""
+        self.show(name, _find_switch(name).next(self._values[_find_switch(name).name]))
 
     @property
     def changed(self) -> dict[str, Value]:
-        """Those that are not as in a new scene."""
+        """The switches that differ from a new scene's, with their values."""
         return {name: value for name, value in self._values.items() if value != SWITCHES[name].default}
 
     def text(self, name: str) -> str:
-        """A switch's value in a word: "on", "off", a choice, or a FAP's name."""
+        """A switch's value as text: "on", "off", a choice's word, or a FAP's name."""
         value = self._values[name]
         if SWITCHES[name].kind == "fap":
             return "off" if value is None else faps()[int(value) - 1].name
@@ -152,18 +153,18 @@ class Switches(Mapping[str, Value]):
 
 
 def parse_switch(text: str) -> tuple[str, Value]:
-    """NAME or NAME=VALUE as it is written in a command: what to hand to `Scene.show`.
+    """The arguments of `Scene.show` for NAME or NAME=VALUE as written on a command line.
 
-    Raises ValueError as `Switches.show`.
+    Raises ValueError as `Switches.show` does.
     """
     name, equals, value = text.partition("=")
     name = name.strip()
-    return name, _named(name).checked(value.strip() if equals else True)
+    return name, _find_switch(name).parse(value.strip() if equals else True)
 
 
-def _named(name: str) -> Switch:
+def _find_switch(name: str) -> Switch:
     if name not in SWITCHES:
         near = get_close_matches(str(name), list(SWITCHES), n=1)
         hint = f" (near: {near[0]})" if near else ""
-        raise ValueError(f"there is no switch {name!r}{hint}; there are {', '.join(SWITCHES)}")
+        raise ValueError(f"no switch {name!r}{hint}; choose from {', '.join(SWITCHES)}")
     return SWITCHES[name]

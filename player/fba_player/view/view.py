@@ -1,7 +1,7 @@
-"""What a scene hands to a renderer: meshes, capsules and eyes in the world, at one moment.
+"""A view: the meshes, capsules, eyes and annotations that a scene hands to a renderer for one moment.
 
-The seam between "what is shown" (`Scene`) and "how" (`Renderer`): a face mesh or a skinned body is one
-more `Mesh` here. World frame: +x the subject's left, +y up, +z forward, metres; the ground is y = 0.
+World frame: +x the subject's left, +y up, +z forward, metres; the ground is y = 0. Annotations (lines, dots,
+shells, grid, legend) have colours as displayed instead of colours under light.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64, Int32
 
 if TYPE_CHECKING:
-    from fba_player.mesh.simplify import Coarser
+    from fba_player.mesh.simplify import DetailLevels
     from fba_player.mesh.textures import FacePicture
 
 
@@ -24,17 +24,17 @@ Colour = tuple[float, float, float, float]
 """Of annotations: red, green, blue as displayed (sRGB, 0..1), and opacity."""
 
 CAPSULE_FLOATS = 16
-"""A capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
+"""Of a capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshShape:
-    """What does not change from frame to frame; keep the object, renderers remember it.
+    """The constant data of a mesh. Reuse the object from frame to frame: renderers cache by its identity.
 
-    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light 0..1,
-    the fourth how glossy. two_sided: False where the inside is to look dark, as that of a mouth. raised:
-    above 0 for thin lines on another mesh: they are drawn over what hides them by less (m), and never
-    thinner than about a pixel.
+    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light 0..1 and
+    gloss. two_sided: False if the inside should look dark, as in a mouth. raised: above 0 for thin lines on
+    another mesh: they are drawn over surfaces that hide them by less than this (m), and at least about a
+    pixel wide.
     """
 
     triangles: Int32
@@ -45,7 +45,7 @@ class MeshShape:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A mesh in one pose: positions and normals float32 (V, 3), matrix (4, 4) into the world."""
+    """A mesh in one pose: positions and normals, float32 (V, 3); matrix, (4, 4), into the world."""
 
     shape: MeshShape
     positions: Float32
@@ -55,19 +55,18 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class FaceShape:
-    """What does not change in a part of a face; keep the object, renderers remember it.
+    """The constant data of a part of a face or body. Reuse the object: renderers cache by its identity.
 
-    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light, the
-    fourth how glossy. sway: float32 (V,), 1 where it goes with the head, 0 where it stands, as shoulders
-    do. texcoords: float32 (V, 2), origin at the picture's top left. picture: what
-    the colours are multiplied with. scatter: how far light wanders below the surface: 1 skin, 0 cloth.
-    fine: strength of the skin's relief, and how often it repeats over the picture. two_sided: False where
-    the inside is to look dark. across: float32 (V, 8), of single hairs: from the vertex opposite to each,
-    half the hair's width there (m), direction to the tip, and 1 or -1 on its two sides; hairs are never
-    drawn thinner than a pixel, but fainter. closed: nobody sees into it, so its inside is not drawn.
-    name, kind: of the part that it was made from, "" where there is none. coarser: the same with fewer
-    triangles, for when it is small on the screen; None where it is always drawn as it is. smooth: False where
-    its triangles are so large that their light changes visibly within them.
+    triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light and gloss.
+    sway: float32 (V,), 1 where the part turns with the head, 0 where it stays, as shoulders do. texcoords:
+    float32 (V, 2), origin at the picture's top left. picture: texture that multiplies the colours. scatter:
+    how much light scatters below the surface, 1 for skin, 0 for cloth. fine: strength of the skin's relief,
+    and its repetitions over the picture. two_sided: False if the inside should look dark. across: float32
+    (V, 8) for single hairs: direction from the opposite vertex, half the hair's width (m), direction to the
+    tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
+    whether the inside is never visible and not drawn. name, kind: of the model's part, "" if there is none.
+    coarser: levels of detail for small sizes, None if there are none. smooth: False if triangles are so large
+    that light changes visibly within them.
     """
 
     triangles: Int32
@@ -82,12 +81,12 @@ class FaceShape:
     closed: bool = False
     name: str = ""
     kind: str = ""
-    coarser: Coarser | None = None
+    coarser: DetailLevels | None = None
     smooth: bool = True
 
     @property
     def see_through(self) -> bool:
-        """Whether it is to be drawn over what is behind: its picture is not everywhere, or it is of hairs."""
+        """Whether parts of it are transparent: its picture has alpha, or it consists of hairs."""
         return (self.picture is not None and not self.picture.opaque) or self.across is not None
 
 
@@ -115,12 +114,12 @@ class FaceMesh:
 
 @dataclass(frozen=True, eq=False)
 class Eye:
-    """An eyeball. matrix (4, 4): its frame (looking along +z, radius 1) into the world.
+    """An eyeball. matrix: (4, 4), from its own frame (looking along +z, radius 1) into the world.
 
-    iris, pupil: their radii as fractions of the eyeball's. lids: (4, 3), middles of the upper and the
-    lower lid's margin, outer and inner corner, from the eyeball's centre in the axes of the head, as
-    fractions of its radius: they shade it. axes: (3, 3), the head's in the world, in columns. tint: of
-    the iris, linear light.
+    iris, pupil: radii as fractions of the eyeball's. lids: (4, 3), the middles of the upper and lower lid
+    margins and the outer and inner corners, which shade the eye: relative to its centre, in the head's axes,
+    as fractions of its radius. axes: (3, 3), the head's axes in the world, as columns. tint: colour of the
+    iris, linear light.
     """
 
     matrix: Float64
@@ -133,10 +132,10 @@ class Eye:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Straight lines, equally wide near and far.
+    """Straight lines of the same width near and far.
 
-    ends: float32 (N, 2, 3). colours: one for all, or float32 (N, 2, 4), one an end. width: pixels of a
-    picture 720 high. lift: they are drawn over what hides them by less than this (m).
+    ends: float32 (N, 2, 3). colours: one for all, or float32 (N, 2, 4), one for each end. width: pixels in a
+    picture 720 high. lift: lines are drawn over surfaces that hide them by less than this (m).
     """
 
     ends: Float32
@@ -147,12 +146,12 @@ class Lines:
 
 @dataclass(frozen=True, eq=False)
 class Dots:
-    """Round dots, equally large near and far, with names.
+    """Round dots with names, of the same size near and far.
 
-    places: float32 (N, 3). colour: of all. radius: pixels of a picture 720 high; 0 for names alone. lift:
-    as of lines; hidden further, a dot shines through faintly. names: one a dot, shown where few are in
-    view. facing: float32 (N, 3), the way in which a dot can be seen; zeros: from everywhere. most: no dot
-    has a larger radius than this (m), so that from afar they stay apart.
+    places: float32 (N, 3), positions. colour: of all dots. radius: pixels in a picture 720 high; 0 for names
+    alone. lift: as for lines; a dot hidden further shows through faintly. names: one for each dot, drawn if
+    few are in view. facing: float32 (N, 3), the direction from which a dot is visible; zeros for all. most:
+    largest radius of a dot (m), so that dots stay apart from afar.
     """
 
     places: Float32
@@ -166,8 +165,8 @@ class Dots:
 
 @dataclass(frozen=True)
 class Grid:
-    """Lines on a level plane. height: y. step: metres between the bold ones, ten fine ones in each. centre:
-    x and z around which they are seen. reach: how far they fade out, metres."""
+    """A grid on a horizontal plane at y = height. step: metres between bold lines, with ten fine steps
+    between them. centre: x and z of its middle. reach: metres from there at which it has faded out."""
 
     height: float
     step: float
@@ -177,8 +176,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class Legend:
-    """What colours mean. title, unit: words. most: the value of the last colour; the first is 0.
-    stops: colours at equal steps."""
+    """Explains colours. title, unit: text. most: value of the last colour; the first is 0. stops: colours at
+    equal steps."""
 
     title: str
     unit: str
@@ -188,7 +187,7 @@ class Legend:
 
 @dataclass(frozen=True, eq=False)
 class Extras:
-    """All of it; shells are meshes drawn as if of glass."""
+    """The annotations of a view; shells are meshes drawn as if made of glass."""
 
     lines: tuple[Lines, ...] = ()
     dots: tuple[Dots, ...] = ()
@@ -201,11 +200,10 @@ class Extras:
 class View:
     """Everything to be drawn at one moment.
 
-    capsules: float32 (N, 16), see `CAPSULE_FLOATS`. marks: the same, but what hides them lets them shine
-    through a little. blobs: float32 (K, 4), soft shadows on the ground:
-    x, z, radius, darkness. ground: whether there is a ground. background: colour behind everything (sRGB,
-    0..1, as shown) instead of the studio. extras: what is drawn over the figure, see
-    `Extras`.
+    capsules: float32 (N, 16), see `CAPSULE_FLOATS`. marks: likewise, but they show faintly through surfaces
+    that hide them. blobs: float32 (K, 4), soft shadows on the ground: x, z, radius, darkness. ground: whether
+    there is a ground. background: colour behind everything (sRGB, 0..1) instead of the studio. extras:
+    annotations drawn over the figure.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -220,11 +218,11 @@ class View:
 
 
 def spheres(places: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:
-    """(N, 16) capsules that are spheres: places (N, 3) and radii (N,), metres; colour and gloss."""
+    """float32 (N, 16): spheres as capsules. places: (N, 3), and radii (N,), metres. colour: with gloss."""
     centres = np.asarray(places, dtype=np.float32)
     found = np.zeros((len(centres), CAPSULE_FLOATS), dtype=np.float32)
     found[:, 0:3] = centres
-    found[:, 4:7] = centres + np.array([0.0, 2e-5, 0.0], dtype=np.float32)  # an axis needs some length
+    found[:, 4:7] = centres + np.array([0.0, 2e-5, 0.0], dtype=np.float32)  # the axis must not have length 0
     found[:, 3] = found[:, 7] = radii
     found[:, 8:12] = (0.0, 0.0, 1.0, 1.0)
     found[:, 12:16] = colour
@@ -232,7 +230,7 @@ def spheres(places: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ..
 
 
 def srgb(text: str) -> tuple[float, float, float]:
-    """A colour written "#rrggbb" in sRGB, as linear light."""
+    """Linear light (3 values, 0..1) of a colour "#rrggbb" in sRGB."""
     values = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
     red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values)
     return red, green, blue

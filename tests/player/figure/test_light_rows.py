@@ -11,7 +11,7 @@ from fba.compiled import is_compiled
 from fba.face.model import FaceModel
 from fba_player.figure.face import FaceFigure
 from fba_player.figure.person import Person
-from fba_player.gl.lod import Details, same
+from fba_player.gl.lod import Details, share_memory
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 
@@ -32,7 +32,7 @@ def test_a_coarser_mesh_has_the_light_of_its_vertices(person: Person) -> None:
     vector = faps(f3=600, f5=-700, f10=-500, f11=-500, f44=900, f48=30000, f49=40000)
     joints = BapSolver(person.body.skeleton).pose(np.zeros(296))
     meshes = [*person.figure.meshes(vector, np.eye(4)), *person.meshes(vector, joints)]
-    coarser = Details().suited(meshes, (0.0, 1.0, 5.0), 0.001)
+    coarser = Details().choose(meshes, (0.0, 1.0, 5.0), 0.001)
     assert sum(len(mesh.positions) for mesh in coarser) < sum(len(mesh.positions) for mesh in meshes) / 2
     for mesh, small in zip(meshes, coarser, strict=True):
         assert mesh.light.shape == (len(mesh.positions), 4)
@@ -68,9 +68,9 @@ def test_an_earlier_view_stays_as_it_was(person: Person) -> None:
 
 def test_a_head_that_stands_still_keeps_its_light(person: Person) -> None:
     one, two = (person.figure.meshes(faps(f31=value), np.eye(4))[0] for value in (100, 200))
-    assert same(one.light, two.light)  # a brow alone does not change it
+    assert share_memory(one.light, two.light)  # a brow alone does not change it
     turned = person.figure.meshes(faps(f31=200, f49=40000), np.eye(4))[0]
-    assert not same(turned.light, two.light)
+    assert not share_memory(turned.light, two.light)
     assert np.abs(turned.light - two.light).max() > 0.05
 
 

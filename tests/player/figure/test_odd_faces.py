@@ -15,7 +15,7 @@ from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part, point_row
 from fba.player import Offscreen, Scene
-from fba_player.figure.model_units import resized, usable
+from fba_player.figure.model_units import prepare_model, resize
 from fba_player.scene.scene import SWITCHES
 from player_tracks import body_track, face_track
 from small_face import small_face
@@ -86,7 +86,7 @@ def test_a_whole_face_is_taken_as_it_is() -> None:
     model = FaceModel.default()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert usable(model) is model
+        assert prepare_model(model) is model
 
 
 def test_a_face_of_skin_alone_from_a_file(tmp_path: Path) -> None:
@@ -103,8 +103,8 @@ def test_sizes_change_nothing_that_faps_do(factor: float) -> None:
     vector = np.zeros(68, dtype=np.float32)
     for number, value in {3: 300, 23: 20000, 29: 100, 31: 200, 47: 20000, 48: 10000, 49: 20000}.items():
         vector[number - 1] = value
-    other = resized(resized(model, factor), 1 / factor)
-    grown = resized(model, factor)
+    other = resize(resize(model, factor), 1 / factor)
+    grown = resize(model, factor)
     assert pytest.approx(model.fapu.ES * factor) == grown.fapu.ES
     expected = Deformer(model)(vector)
     np.testing.assert_allclose(Deformer(grown)(vector) / factor, expected, atol=2e-6)

@@ -8,7 +8,7 @@ import pytest
 from fba.compiled import is_compiled
 from fba_player.gl._ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
 from fba_player.mesh.primitives import sphere_mesh
-from fba_player.mesh.simplify import Coarser
+from fba_player.mesh.simplify import DetailLevels
 from fba_player.view.view import FaceMesh, FaceShape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba there are blobs instead")
@@ -26,7 +26,7 @@ def ball(radius: float, centre: tuple[float, float, float]) -> FaceMesh:
         triangles.astype(np.int32),
         np.zeros((count, 4), np.float32),
         np.ones(count, np.float32),
-        coarser=Coarser(places, 1, triangles.astype(np.int32)),
+        coarser=DetailLevels(places, 1, triangles.astype(np.int32)),
     )
     matrix = np.eye(4)
     matrix[:3, 3] = centre

@@ -10,9 +10,9 @@ import pytest
 
 from fba.cache import kept
 from fba.compiled import is_compiled
-from fba_player.gl.lod import Details, distance, same
+from fba_player.gl.lod import Details, distance, share_memory
 from fba_player.mesh.primitives import sphere_mesh
-from fba_player.mesh.simplify import TOLERANCES, Coarser, coarser
+from fba_player.mesh.simplify import TOLERANCES, DetailLevels, simplify
 from fba_player.view.view import FaceMesh, FaceShape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba meshes are drawn as they are")
@@ -45,7 +45,7 @@ def mesh_of(vertices: npt.NDArray[np.float32], triangles: Int32) -> FaceMesh:
         triangles,
         np.zeros((count, 4), np.float32),
         np.ones(count, np.float32),
-        coarser=Coarser(vertices, 1, triangles),
+        coarser=DetailLevels(vertices, 1, triangles),
     )
     return FaceMesh(
         shape,
@@ -60,7 +60,7 @@ def mesh_of(vertices: npt.NDArray[np.float32], triangles: Int32) -> FaceMesh:
 
 def test_a_flat_square_needs_few_triangles_and_keeps_its_border() -> None:
     vertices, triangles = grid(21, 0.1)
-    found = Coarser(vertices.astype(np.float32), 1, triangles).within(0.0004)
+    found = DetailLevels(vertices.astype(np.float32), 1, triangles).triangles_within(0.0004)
     assert found is not None
     assert len(found) < len(triangles) / 4
     assert area(vertices, found) == pytest.approx(0.01, rel=1e-6)
@@ -75,7 +75,7 @@ def test_a_ball_stays_a_ball_of_that_size(tolerance: float) -> None:
     """Vertices stay on the sphere; what lies between is off by no more than a few times the mean error."""
     unit, triangles = sphere_mesh(48, 64)
     vertices = (unit * 0.1).astype(np.float32)
-    found = Coarser(vertices, 1, triangles.astype(np.int32)).within(tolerance)
+    found = DetailLevels(vertices, 1, triangles.astype(np.int32)).triangles_within(tolerance)
     assert found is not None
     assert len(found) < len(triangles)
     middles = vertices[found].mean(axis=1)
@@ -84,18 +84,18 @@ def test_a_ball_stays_a_ball_of_that_size(tolerance: float) -> None:
 
 def test_levels_only_leave_out() -> None:
     unit, triangles = sphere_mesh(32, 48)
-    coarse = Coarser((unit * 0.1).astype(np.float32), 1, triangles.astype(np.int32))
+    coarse = DetailLevels((unit * 0.1).astype(np.float32), 1, triangles.astype(np.int32))
     before = set(range(len(unit)))
     counts = []
     for tolerance in TOLERANCES:
-        found = coarse.within(tolerance)
+        found = coarse.triangles_within(tolerance)
         assert found is not None
         assert set(found.ravel().tolist()) <= before
         before = set(found.ravel().tolist())
         counts.append(len(found))
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] < len(triangles) / 5
-    assert coarse.within(TOLERANCES[0] / 2) is None
+    assert coarse.triangles_within(TOLERANCES[0] / 2) is None
 
 
 def test_what_moves_in_a_pose_keeps_its_vertices() -> None:
@@ -103,8 +103,8 @@ def test_what_moves_in_a_pose_keeps_its_vertices() -> None:
     vertices, triangles = grid(25, 0.1)
     bulged = vertices.copy()
     bulged[:, 2] = 0.01 * np.sin(vertices[:, 0] * 60) * np.sin(vertices[:, 1] * 60)
-    flat = coarser(np.concatenate([vertices, vertices], axis=1), 2, triangles, (0.0004,))[1]
-    moving = coarser(np.concatenate([vertices, bulged], axis=1), 2, triangles, (0.0004,))[1]
+    flat = simplify(np.concatenate([vertices, vertices], axis=1), 2, triangles, (0.0004,))[1]
+    moving = simplify(np.concatenate([vertices, bulged], axis=1), 2, triangles, (0.0004,))[1]
     assert (moving == 1).sum() > 2 * (flat == 1).sum()
 
 
@@ -114,7 +114,7 @@ def test_a_seam_does_not_gape() -> None:
     right = left + np.array([0.05, 0.0, 0.0])
     vertices = np.concatenate([left, right])
     both = np.concatenate([triangles, triangles + len(left)]).astype(np.int32)
-    onto, _ = coarser(vertices, 1, both, (0.001,))
+    onto, _ = simplify(vertices, 1, both, (0.001,))
     seam = np.flatnonzero(np.abs(vertices[:, 0] - 0.05) < 1e-9)
     assert (onto[seam] == seam).all()
 
@@ -122,32 +122,34 @@ def test_a_seam_does_not_gape() -> None:
 def test_a_file_that_was_tampered_with_is_made_anew(tmp_path: Path) -> None:
     unit, triangles = sphere_mesh(24, 32)
     points = (unit * 0.1).astype(np.float32)
-    good = Coarser(points, 1, triangles.astype(np.int32)).within(0.0016)
+    good = DetailLevels(points, 1, triangles.astype(np.int32)).triangles_within(0.0016)
     (path,) = (tmp_path / "fba").glob("coarse-*.fbk")
     count = len(points)
     zeros = np.zeros(count, dtype=np.int32)
     path.unlink()
     kept(path.stem, ((count,),) * 2, lambda: [np.full(count, 10**6, dtype=np.int32), zeros], np.int32)
-    again = Coarser(points, 1, triangles.astype(np.int32)).within(0.0016)
+    again = DetailLevels(points, 1, triangles.astype(np.int32)).triangles_within(0.0016)
     assert good is not None
     assert again is not None
     np.testing.assert_array_equal(good, again)
     circle = np.roll(np.arange(count), 1).astype(np.int32)
     path.unlink()
     kept(path.stem, ((count,),) * 2, lambda: [circle, zeros], np.int32)
-    assert Coarser(points, 1, triangles.astype(np.int32)).within(0.0016) is not None  # and no endless walk
+    assert (
+        DetailLevels(points, 1, triangles.astype(np.int32)).triangles_within(0.0016) is not None
+    )  # and no endless walk
 
 
 def test_the_farther_the_coarser() -> None:
     unit, triangles = sphere_mesh(48, 64)
     mesh = mesh_of((unit * 0.1).astype(np.float32), triangles.astype(np.int32))
     details, pixel = Details(), 0.0006
-    near, far = (details.suited([mesh], (0.0, 0.0, away), pixel)[0] for away in (0.15, 6.0))
+    near, far = (details.choose([mesh], (0.0, 0.0, away), pixel)[0] for away in (0.15, 6.0))
     assert near is mesh
     assert len(far.shape.triangles) < len(triangles) / 3
     assert len(far.positions) == len(far.normals) == len(far.light) == int(far.shape.triangles.max()) + 1
     np.testing.assert_allclose(np.linalg.norm(far.positions, axis=1), 0.1, rtol=1e-5)
-    again = details.suited([mesh], (0.0, 0.0, 6.0), pixel)[0]
+    again = details.choose([mesh], (0.0, 0.0, 6.0), pixel)[0]
     assert again.shape is far.shape
     assert again.light is far.light
     assert distance(mesh, np.array([0.0, 0.0, 6.0])) == pytest.approx(5.9, abs=0.02)
@@ -155,6 +157,6 @@ def test_the_farther_the_coarser() -> None:
 
 def test_views_of_one_array_are_known_as_the_same() -> None:
     light = np.ones((8, 4), dtype=np.float32)
-    assert same(light[2:5], light[2:5])
-    assert not same(light[2:5], light[3:6])
-    assert not same(light[2:5], light.copy()[2:5])
+    assert share_memory(light[2:5], light[2:5])
+    assert not share_memory(light[2:5], light[3:6])
+    assert not share_memory(light[2:5], light.copy()[2:5])

@@ -22,7 +22,7 @@ def encoded(pixels: np.ndarray) -> bytes:
 def test_what_is_seen_are_square_roots_of_light() -> None:
     grey = FacePicture(encoded(np.full((5, 8, 3), 128, dtype=np.uint8)))
     assert (grey.size, grey.opaque) == ((8, 5), True)
-    half = grey.seen(2)
+    half = grey.reduced(2)
     assert half.shape == (3, 4, 4)
     # sRGB 128 is 0.2159 of the light: its root is 0.4646 of 255
     assert np.unique(half[..., :3]).tolist() == [118]
@@ -41,7 +41,7 @@ def test_a_large_one_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     data = encoded(noise)
     assert len(data) > LARGE
     first = FacePicture(data)
-    seen = first.seen(4)
+    seen = first.reduced(4)
 
     def fails(self: FacePicture) -> None:
         raise AssertionError("decoded again")
@@ -49,6 +49,6 @@ def test_a_large_one_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(FacePicture, "pixels", property(fails))
     again = FacePicture(data)
     assert (again.size, again.opaque) == (first.size, first.opaque) == ((200, 300), True)
-    np.testing.assert_array_equal(again.seen(4), seen)
+    np.testing.assert_array_equal(again.reduced(4), seen)
     with pytest.raises(AssertionError, match="decoded again"):
-        again.seen(2)
+        again.reduced(2)

@@ -12,7 +12,7 @@ from fba.animation import Animation
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, point_row
 from fba.player import Scene, default_camera
-from fba_player.figure._face_parts import sway
+from fba_player.figure._face_parts import compute_sway
 from fba_player.figure.face import FaceFigure
 from player_tracks import body_track, face_track
 
@@ -72,7 +72,7 @@ def test_eyes_have_the_size_of_the_face(figure: FaceFigure) -> None:
 
 def test_the_neck_bends_and_the_shoulders_stay(figure: FaceFigure) -> None:
     skin = figure.model.vertices[: len(figure.model.parts[0].vertices)]
-    share = sway(figure.model)[: len(skin)]
+    share = compute_sway(figure.model)[: len(skin)]
     chin = figure.model.points[point_row("2.10")]
     assert (share[(skin[:, 1] > chin[1] + 0.01) & (skin[:, 2] > chin[2] - 0.03)] > 0.8).all()
     assert (share[skin[:, 1] > figure.between_eyes[1]] == 1).all()
@@ -85,7 +85,7 @@ def test_a_face_without_feature_points_of_the_neck_turns_whole() -> None:
     points, bound = model.points.copy(), model.bound.copy()
     for name in ("2.1", "2.10"):
         points[point_row(name)], bound[point_row(name)] = np.nan, -1
-    assert (sway(replace(model, points=points, bound=bound)) == 1).all()
+    assert (compute_sway(replace(model, points=points, bound=bound)) == 1).all()
 
 
 def test_on_a_body_shoulders_are_left_out(figure: FaceFigure) -> None:

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel, Part
 from fba_player.figure._eyeball import find_eyeball
-from fba_player.figure._face_parts import hairs
-from fba_player.gl._antialias_region import filled
+from fba_player.figure._face_parts import find_hairs
+from fba_player.gl._antialias_region import bounding_rectangles
 from fba_player.gl._silhouette import TILE, Outliner
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.view.camera import Camera
@@ -42,7 +42,7 @@ def test_rectangles_hold_what_is_drawn() -> None:
     camera, size = Camera(distance=1 / np.tan(np.radians(12))), (200, 100)
     matrix = camera.projection_matrix(2.0) @ camera.view_matrix()  # 1 m is half the height
     left, right = square(-1.0, 0.2), square(0.8, 0.4)
-    found = sorted(filled(View([left, right]), matrix, size))
+    found = sorted(bounding_rectangles(View([left, right]), matrix, size))
     assert len(found) == 2
     for (x, y, wide, high), middle, half in zip(found, (50, 140), (10, 20), strict=True):
         assert x <= middle - half
@@ -50,11 +50,11 @@ def test_rectangles_hold_what_is_drawn() -> None:
         assert y <= 50 - half
         assert y + high >= 50 + half
         assert wide < 2.5 * half + 12
-    assert filled(View([square(0, 0.1), square(0, 0.4)]), matrix, size) == filled(
+    assert bounding_rectangles(View([square(0, 0.1), square(0, 0.4)]), matrix, size) == bounding_rectangles(
         View([square(0, 0.4)]), matrix, size
     )
-    assert filled(View(), matrix, size) == []
-    assert filled(View([square(50, 0.1)]), matrix, size) == []
+    assert bounding_rectangles(View(), matrix, size) == []
+    assert bounding_rectangles(View([square(50, 0.1)]), matrix, size) == []
 
 
 def test_what_reaches_behind_the_camera_may_fill_everything() -> None:
@@ -64,7 +64,7 @@ def test_what_reaches_behind_the_camera_may_fill_everything() -> None:
     deep = replace(
         around, positions=around.positions + np.array([[0, 0, 9], [0, 0, 0]] * 2, dtype=np.float32)
     )
-    assert filled(View([deep]), matrix, (64, 64)) == [(0, 0, 64, 64)]
+    assert bounding_rectangles(View([deep]), matrix, (64, 64)) == [(0, 0, 64, 64)]
 
 
 def eye_part(vertices: np.ndarray) -> Part:
@@ -97,7 +97,7 @@ def test_hairs_know_their_sides_and_their_tip() -> None:
     root = np.array([[-1, 0, 0], [1, 0, 0], [-0.5, 5, 0], [0.5, 5, 0], [0, 9, 0]]) * 2e-4
     triangles = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4]])
     two = np.concatenate([root, root + np.array([0.01, 0, 0])])
-    found = hairs(Part("lash", "lash", two, np.concatenate([triangles, triangles + 5])))
+    found = find_hairs(Part("lash", "lash", two, np.concatenate([triangles, triangles + 5])))
     assert found is not None
     for start in (0, 5):
         rows = found[start : start + 5]
@@ -111,8 +111,8 @@ def test_hairs_know_their_sides_and_their_tip() -> None:
 
 def test_broad_strips_are_no_hairs() -> None:
     vertices = np.array([[0, 0, 0], [0.02, 0, 0], [0, 0.01, 0], [0.02, 0.01, 0]])
-    assert hairs(Part("strip", "lash", vertices, np.array([[0, 1, 2], [1, 3, 2]]))) is None
-    assert hairs(Part("nothing", "lash", vertices, np.zeros((0, 3), dtype=int))) is None
+    assert find_hairs(Part("strip", "lash", vertices, np.array([[0, 1, 2], [1, 3, 2]]))) is None
+    assert find_hairs(Part("nothing", "lash", vertices, np.zeros((0, 3), dtype=int))) is None
 
 
 @pytest.mark.skipif(not is_compiled(), reason="without numba, rectangles are smoothed instead")
