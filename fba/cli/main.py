@@ -13,9 +13,9 @@ from typing import Any, NoReturn
 import click
 
 from fba import __version__
-from fba.cli._program import NAME, program_words, with_program
 from fba.cli._sigint import Interruptions
 from fba.cli.options import Group, described, examples
+from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import INTERRUPTED, TEXT, collect_less
 from fba.compiled import compilation_listener
 from fba.errors import FbaError, FbaWarning, did_you_mean

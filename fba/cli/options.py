@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from fba.animation import Animation
-from fba.cli._program import NAME, with_program
+from fba.cli import step_tables
+from fba.cli.program import as_typed
 from fba.errors import FbaError, FbaWarning, FormatError, OptionError, Remedy
 
 if TYPE_CHECKING:
@@ -72,13 +73,6 @@ class Group(Command, click.Group):
     """Several subcommands under one name."""
 
     command_class = Command
-
-
-def as_typed(text: str, context: click.Context | None = None) -> str:
-    """The text with its commands as the user types them here, e.g. `./dev fba info` for `fba info`."""
-    root = (context or click.get_current_context()).find_root()
-    assert isinstance(root.command, click.Group)
-    return with_program(text, root.info_name or NAME, root.command.list_commands(root))
 
 
 OPTIONS = {
@@ -382,7 +376,6 @@ def read_input(
     stand in for a header that a file lacks. capture: options for the readers of motion capture. said: takes
     the text of that warning.
     """
-    from fba.cli import step_tables
     from fba.formats import read
 
     wanted: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}

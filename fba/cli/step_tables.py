@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from fba.cli import options
+from fba.cli.program import as_typed
 from fba.errors import FbaWarning
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
 
@@ -31,7 +31,7 @@ def remind(output: Path, animation: Animation, table: str, quant: int = 1) -> No
     Unquantised BAPs (quant 0) are the same under every table.
     """
     if animation.body is not None and table != DEFAULT and quant > 0:
-        again = options.as_typed(f"fba play {shlex.quote(str(output))} --bap-steps {table}")
+        again = as_typed(f"fba play {shlex.quote(str(output))} --bap-steps {table}")
         click.echo(f"Play it with: {again}", err=True)
 
 

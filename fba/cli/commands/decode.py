@@ -21,6 +21,7 @@ from fba.cli.outputs import (
     to_option,
     writer_of,
 )
+from fba.cli.program import as_typed
 from fba.errors import BitstreamError
 
 if TYPE_CHECKING:
@@ -158,7 +159,7 @@ def _targets(
             raise click.UsageError(f"{output} is a folder; name the format with --to, as in --to bvh")
         writing = writer_of(output, to)
         if writing.name == "fba":
-            others = options.as_typed("fba convert and fba encode")
+            others = as_typed("fba convert and fba encode")
             raise click.UsageError(f"{output}: streams are decoded here; {others} write them")
         targets.append(_Target("--output", output, writing.suffixes[0], writing))
     else:

@@ -16,6 +16,7 @@ import click
 from fba.animation import Animation
 from fba.cli import options
 from fba.cli.outputs import Output, Outputs, no_clobber_option
+from fba.cli.program import as_typed
 from fba.errors import DisplayError
 
 BAP_STEPS = "visage"
@@ -75,7 +76,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     )
     decoded = read(stream, bap_steps=BAP_STEPS)
     click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")
-    again = options.as_typed(f"fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
+    again = as_typed(f"fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
     click.echo(f"to see it again: {again}")
     if play is not False and _played(player, decoded, asked=play is True):
         return

@@ -9,6 +9,8 @@ import shutil
 import sys
 from collections.abc import Iterable
 
+import click
+
 NAME = "fba"
 DEV = "FBA_DEV"
 """Environment variable that `./dev` sets for the commands it starts: its own path, as the user typed it."""
@@ -37,6 +39,13 @@ def with_program(text: str, program: str, commands: Iterable[str]) -> str:
         return text
     mention = rf"(?<![\w./-]){NAME} (?=(?:{'|'.join(commands)})\b)"
     return re.sub(rf"{re.escape(program)} |{mention}", lambda _: f"{program} ", text)
+
+
+def as_typed(text: str, context: click.Context | None = None) -> str:
+    """The text with its commands as the user types them here, e.g. `./dev fba info` for `fba info`."""
+    root = (context or click.get_current_context()).find_root()
+    assert isinstance(root.command, click.Group)
+    return with_program(text, root.info_name or NAME, root.command.list_commands(root))
 
 
 def _typed(path: str) -> str:
