@@ -89,6 +89,9 @@ fba.__main__
 FLOORS = _FLOORS.split()
 """From the ground up."""
 
+FOLLOWED_BY_A_NAME = ("fba.cli.commands.",)
+"""Beginnings of module names that are put together while the program runs."""
+
 FACADES = {
     ("fba", "*"): "the public names of the library, imported where they are first used",
     ("fba.face", "*"): "public names of the face",
@@ -140,6 +143,9 @@ def imported(module: str) -> Iterator[str]:
                 yield from (one for one in (name if name in modules() else node.module,) if one in modules())
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in modules())
+        elif isinstance(node, ast.JoinedStr) and isinstance(node.values[0], ast.Constant):
+            begin = str(node.values[0].value)  # import_module(f"fba.cli.commands.{name}")
+            yield from (one for one in modules() if begin in FOLLOWED_BY_A_NAME and one.startswith(begin))
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             name = node.value.partition(":")[0]
             yield from (one for one in (name, f"fba.formats.{name}") if "." in name and one in modules())
