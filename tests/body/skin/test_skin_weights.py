@@ -13,7 +13,7 @@ def test_a_weight_below_the_least_takes_no_place_from_a_chain() -> None:
     # A limb with 0.01 and four vertebrae: the vertebrae keep all four places.
     alike = [False, True, True, True, True]
     dense = np.array([[0.010, 0.40, 0.30, 0.20, 0.09]])
-    joints, weights = skin_weights.strongest(dense, alike)
+    joints, weights = skin_weights.strongest_weights(dense, alike)
     assert sorted(joints[0].tolist()) == [1, 2, 3, 4]
     lessened = dense[0, 1:] - 0.012
     assert weights[0, np.argsort(joints[0])] == pytest.approx(lessened / lessened.sum(), abs=1e-4)
@@ -22,7 +22,7 @@ def test_a_weight_below_the_least_takes_no_place_from_a_chain() -> None:
 def test_a_weight_above_the_least_takes_a_place_from_a_chain() -> None:
     alike = [False, True, True, True, True]
     dense = np.array([[0.015, 0.40, 0.30, 0.20, 0.085]])
-    joints, weights = skin_weights.strongest(dense, alike)
+    joints, weights = skin_weights.strongest_weights(dense, alike)
     assert {0, 1, 2, 3} == set(joints[0].tolist())
     assert weights[0, joints[0] == 0] == pytest.approx(0.003 / (1 - 5 * 0.012), abs=1e-4)
 
