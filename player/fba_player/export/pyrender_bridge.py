@@ -223,7 +223,7 @@ def _ambient() -> Float64:
 
 def _studio() -> dict[str, tuple[float, float, float]]:
     """The studio's lights, from the shaders that draw with them: linear light, and where they stand."""
-    text = (files(__package__) / "shaders" / "lighting.glsl").read_text(encoding="utf-8")
+    text = (files("fba_player.gl") / "shaders" / "lighting.glsl").read_text(encoding="utf-8")
     found = re.findall(r"const vec3 ([A-Z_]+) = (?:normalize\()?vec3\(([^)]*)\)", text)
     return {name: tuple(float(v) for v in values.split(",")) for name, values in found}  # type: ignore[misc]
 
