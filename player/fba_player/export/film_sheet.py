@@ -12,7 +12,7 @@ from fba.arrays import UInt8
 from fba.errors import RangeError
 from fba_player.export.offscreen import Offscreen
 from fba_player.export.render import as_scene, check_inside
-from fba_player.playback.timecode import timecode
+from fba_player.playback.timeline import timecode
 from fba_player.view.camera import Camera
 from fba_player.view.font import label_font, shortened
 from fba_player.view.protocols import Showable

@@ -18,7 +18,7 @@ from typing import Any
 from fba.animation import Animation
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaError
-from fba_player.playback.timecode import clock_text
+from fba_player.playback.timeline import clock_text
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import csv
+import re
+import sys
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+
+from fba_player.view.switches import SWITCHES
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,3 +70,30 @@ def _shown(key: str) -> str:
 def _rows(name: str) -> list[dict[str, str]]:
     text = (files(__package__) / name).read_text(encoding="utf-8")
     return list(csv.DictReader(text.splitlines()))
+
+
+def tables() -> str:
+    """Markdown: a table for each group of keys, for switches and for the mouse."""
+    lines: list[str] = []
+    group = ""
+    for row in keys():
+        if row.group != group:
+            group = row.group
+            lines += _head(group.lower())
+        lines.append(f"| {', '.join(_marked(key) for key in row.shown.split(', '))} | {row.does} |")
+    lines += _head("switch") + [f"| {one.key} | {one.label} |" for one in SWITCHES.values() if one.key]
+    lines += _head("mouse") + [f"| {what} | {does} |" for what, does in mouse()]
+    return "\n".join(lines[1:]) + "\n"
+
+
+def _head(title: str) -> list[str]:
+    return ["", f"| {title} | |", "|---|---|"]
+
+
+def _marked(key: str) -> str:
+    """Signs as code, so that they are not taken for marks of the page."""
+    return key if re.fullmatch(r"\w+([+]\w+)*", key) else f"`{key}`"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(tables())

@@ -7,7 +7,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from fba_player.playback.timecode import clock_text
+from fba_player.playback.timeline import clock_text
 from fba_player.session.session import Session
 from fba_player.session.timeline_trace import trace_picture
 from fba_player.ui import theme

@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from fba_player.playback.live import LiveAnimation
-from fba_player.playback.timecode import clock_text
+from fba_player.playback.timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session

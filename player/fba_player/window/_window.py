@@ -15,11 +15,10 @@ from fba_player.gl.renderer import Renderer
 from fba_player.gl.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
 from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
-from fba_player.session.captures import Keeper
+from fba_player.session.captures import Keeper, pixels_of, still
 from fba_player.session.controls import Controls
 from fba_player.session.session import Session
 from fba_player.session.source import Source
-from fba_player.session.stills import pixels_of, still
 from fba_player.view.camera import Camera
 from fba_player.window._fullscreen import FullScreen
 from fba_player.window._glfw_input import GlfwInput

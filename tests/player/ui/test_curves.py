@@ -12,10 +12,8 @@ from hypothesis import strategies as st
 from fba.animation import Animation, FaceTrack
 from fba.parameters import faps
 from fba_player.playback.timeline import Timeline
-from fba_player.ui.panels._curve_data import BLOCK, Columns, amount
-from fba_player.ui.panels._envelope import envelope
+from fba_player.ui.panels._curve_data import BLOCK, SHORTEST, Columns, Stretch, amount, envelope
 from fba_player.ui.panels._parameter_chooser import found
-from fba_player.ui.panels._time_zoom import SHORTEST, Stretch
 from player_tracks import body_track, face_track
 
 

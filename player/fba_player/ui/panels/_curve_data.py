@@ -18,6 +18,10 @@ UNTOLD = 0.5
 TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
 """What counts as moving as much as a FAP at full: degrees, millimetres."""
 
+SHORTEST = 0.05
+"""Seconds that are always shown."""
+NEAR = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Course:
@@ -186,3 +190,95 @@ def _alike(kind: str, number: int, chosen: list[tuple[str, int]]) -> bool:
 
 def _nothing(kind: str, number: int) -> Course:
     return Course(kind, number, np.zeros(0), np.zeros(0), np.zeros(0, bool))
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """Points (N,) of a line: x as a share of the width, values, and whether the frame there was sent."""
+
+    x: Float64
+    values: Float64
+    sent: Bool
+
+    def runs(self) -> list[tuple[int, int]]:
+        """(first, behind the last) of the stretches of points that were sent; single points have a pair."""
+        edges = np.flatnonzero(np.diff(np.r_[False, self.sent, False].astype(np.int8)))
+        return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: float, columns: int) -> Envelope:
+    """The curve between two times in so many columns.
+
+    times: ascending. Where there are few frames, each is a point, and one before and one after the stretch
+    as well; where there are many, each column has its least and its largest value.
+    """
+    if not len(times) or columns < 1 or not high > low:
+        return Envelope(np.zeros(0), np.zeros(0), np.zeros(0, bool))
+    first = np.searchsorted(times, low, side="left")
+    last = np.searchsorted(times, high, side="right")
+    if last - first <= 2 * columns:
+        part = slice(max(int(first) - 1, 0), min(int(last) + 1, len(times)))
+        return Envelope((times[part] - low) / (high - low), values[part], sent[part])
+    edges = np.searchsorted(times, np.linspace(low, high, columns + 1)[:-1], side="left")
+    starts, places = np.unique(edges, return_index=True)  # the last of those that begin alike has the frames
+    places = np.r_[places[1:] - 1, columns - 1]
+    kept = starts < last
+    starts, places = starts[kept], places[kept]
+    seen = values[: int(last)]
+    least, largest = np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)
+    any_sent = np.logical_or.reduceat(sent[: int(last)], starts)
+    # there and back, so that neighbours are joined
+    up = (np.arange(len(starts)) % 2).astype(bool)
+    pairs = np.where(up, [largest, least], [least, largest]).T
+    return Envelope(np.repeat((places + 0.5) / columns, 2), pairs.ravel(), np.repeat(any_sent, 2))
+
+
+class Stretch:
+    """From `low` to `high`, seconds, within the first and the last time of what is shown."""
+
+    def __init__(self) -> None:
+        self.first = self.last = self.low = self.high = 0.0
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of it is shown."""
+        return self.low <= self.first + NEAR and self.high >= self.last - NEAR
+
+    def bound(self, first: float, last: float) -> None:
+        """What there is; where all of it was shown, it still is."""
+        if (first, last) == (self.first, self.last):
+            return
+        everything = self.whole
+        self.first, self.last = first, max(last, first)
+        if everything:
+            self.reset()
+        else:
+            self._set(self.low, self.high)
+
+    def reset(self) -> None:
+        """Show all."""
+        self.low, self.high = self.first, self.last
+
+    def zoom(self, factor: float, about: float) -> None:
+        """Show so many times as much; the time `about` stays where it is."""
+        self._set(about - (about - self.low) * factor, about + (self.high - about) * factor)
+
+    def pan(self, seconds: float) -> None:
+        """Move on by seconds, as far as there is something."""
+        wide = self.high - self.low
+        low = min(max(self.low + seconds, self.first), max(self.last - wide, self.first))
+        self.low, self.high = low, low + wide
+
+    def follow(self, time: float) -> None:
+        """Turn the page where a time lies outside: it is then near the left edge."""
+        wide = self.high - self.low
+        if not self.low - NEAR <= time <= self.high + NEAR:
+            self.pan(time - wide * 0.1 - self.low)
+
+    def _set(self, low: float, high: float) -> None:
+        if high - low < SHORTEST:
+            middle = (low + high) / 2
+            low, high = middle - SHORTEST / 2, middle + SHORTEST / 2
+        wide = min(high - low, self.last - self.first)
+        low = min(max(low, self.first), max(self.last - wide, self.first))
+        self.low, self.high = low, low + wide

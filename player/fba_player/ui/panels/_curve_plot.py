@@ -9,12 +9,10 @@ from typing import Any, cast
 import numpy as np
 from imgui_bundle import imgui
 
-from fba_player.playback.timecode import clock_text
+from fba_player.playback.timeline import clock_text
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels._curve_data import Course
-from fba_player.ui.panels._envelope import Envelope, envelope
-from fba_player.ui.panels._time_zoom import Stretch
+from fba_player.ui.panels._curve_data import Course, Envelope, Stretch, envelope
 from fba_player.ui.panels.panel import EITHER_BUTTON, shortened
 from fba_player.ui.ruler import Ruler, label
 

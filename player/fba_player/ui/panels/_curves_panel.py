@@ -11,10 +11,9 @@ from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels._curve_data import Columns, amount, parameter
+from fba_player.ui.panels._curve_data import Columns, Stretch, amount, parameter
 from fba_player.ui.panels._curve_plot import COLOURS, Lane, Lanes
 from fba_player.ui.panels._parameter_chooser import Chooser
-from fba_player.ui.panels._time_zoom import Stretch
 from fba_player.ui.panels.panel import Panel, chosen_name, tooltip
 
 BEGINS_WITH = 3

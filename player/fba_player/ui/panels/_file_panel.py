@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from fba.codec import PartInfo, StreamInfo
-from fba_player.playback.timecode import clock_text
+from fba_player.playback.timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.session.session import Session
 from fba_player.ui import theme

@@ -10,15 +10,14 @@ from imgui_bundle import imgui
 
 from fba.animation import Animation
 from fba.codec import StreamInfo
-from fba_player.playback.timecode import clock_text
+from fba_player.playback.timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels._bit_rates import Rates, columns, encoded, rates
-from fba_player.ui.panels._curve_data import Course
+from fba_player.ui.panels._curve_data import Course, Stretch
 from fba_player.ui.panels._curve_plot import CURVE, WORDS, Lane, Lanes
-from fba_player.ui.panels._time_zoom import Stretch
 from fba_player.ui.panels.panel import Panel, tooltip
 from fba_player.ui.ruler import Ruler
 
