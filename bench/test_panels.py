@@ -59,7 +59,7 @@ def studio(request: pytest.FixtureRequest, moving: tuple[Animation, Path]) -> It
     animation, path = moving
     scene = Scene(animation)
     session = Session(scene, source=Source(scene, path), size=(1280, 720))
-    session.source.look(wait=True)
+    session.source.probe(wait=True)
     try:
         made = Studio(session)
     except DisplayError as error:

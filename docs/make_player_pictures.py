@@ -42,7 +42,7 @@ def window() -> None:
 def panels() -> None:
     """Curves, bit rate, and a face moved by hand."""
     with _played(fba.read(SAMPLES / "hello.fap")) as session:
-        session.source.look(wait=True)
+        session.source.probe(wait=True)
         session.open |= {"curves", "rate", "puppet"}
         session.selection.faps = CURVES
         with Studio(session) as studio:

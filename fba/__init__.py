@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_PLACES = {
+_MODULE_OF = {
     "Animation": "fba.animation",
     "BodyTrack": "fba.animation",
     "FaceTrack": "fba.animation",
@@ -91,8 +91,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     from importlib import import_module
 
-    if name in _PLACES:
-        value = getattr(import_module(_PLACES[name]), name)
+    if name in _MODULE_OF:
+        value = getattr(import_module(_MODULE_OF[name]), name)
     elif name in _MODULES:
         value = import_module(f"fba.{name}")
     else:

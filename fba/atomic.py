@@ -36,7 +36,7 @@ def atomic(path: PathLike) -> Iterator[BinaryIO]:
     name = os.fspath(path)
     target, mode, direct = check_target(name)
     if direct:
-        with _directly(name) as file:
+        with _open_directly(name) as file:
             yield file
         return
     with temporary_beside(target, ".tmp", name) as (temporary, handle):
@@ -183,7 +183,7 @@ def _remove_unfinished() -> None:
 
 
 @contextlib.contextmanager
-def _directly(name: str) -> Iterator[BinaryIO]:
+def _open_directly(name: str) -> Iterator[BinaryIO]:
     """What must not be replaced by a file: a device, a pipe, an open file."""
     number = _descriptor(name)
     try:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from fba_player.window.display import check_display
     from fba_player.window.play import play
 
-_PLACES = {
+_MODULE_OF = {
     "Audio": "fba_player.sound.player",
     "Camera": "fba_player.view.camera",
     "CompareScene": "fba_player.scene.compare",
@@ -87,9 +87,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'fba.player' has no attribute {name!r}")
-    value = getattr(import_module(_PLACES[name]), name)
+    value = getattr(import_module(_MODULE_OF[name]), name)
     globals()[name] = value
     return value
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fba.body.solve.limits import Excess, Limit, Limits
     from fba.body.solve.solver import BapSolver
 
-_PLACES = {
+_MODULE_OF = {
     "BapSolver": "fba.body.solve.solver",
     "BodyDefinition": "fba.body._definition",
     "Excess": "fba.body.solve.limits",
@@ -39,9 +39,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name == "gait":
         return import_module("fba.body.gait")
-    if name not in _PLACES:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'fba.body' has no attribute {name!r}")
-    value = getattr(import_module(_PLACES[name]), name)
+    value = getattr(import_module(_MODULE_OF[name]), name)
     globals()[name] = value
     return value
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from fba.capture.motion import SkeletonMotion
     from fba.capture.skeleton import from_skeleton
 
-_PLACES = {
+_MODULE_OF = {
     "BoneError": "fba.capture._report",
     "FeetError": "fba.capture._report",
     "RetargetReport": "fba.capture._report",
@@ -30,9 +30,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'fba.capture' has no attribute {name!r}")
-    value = getattr(import_module(_PLACES[name]), name)
+    value = getattr(import_module(_MODULE_OF[name]), name)
     globals()[name] = value
     return value
 

@@ -110,19 +110,19 @@ def voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | 
 
 
 def _voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
-    from fba_player.sound.soundtrack import beside, check
+    from fba_player.sound.soundtrack import check_sound, find_sound_beside
 
     if sound.audio is not None:
-        check(sound.audio)
+        check_sound(sound.audio)
         return sound.audio
     if sound.no_audio:
         return None
     for file in files:
-        found = None if str(file) == "-" or is_pipe(file) else beside(file)
+        found = None if str(file) == "-" or is_pipe(file) else find_sound_beside(file)
         if found is None:
             continue
         try:
-            check(found)
+            check_sound(found)
         except FormatError as error:
             warnings.warn(f"{without}: {error}", FbaWarning, stacklevel=3)
             continue

@@ -102,7 +102,7 @@ OVERWRITING = [
 def test_an_input_is_never_overwritten(
     run: Run, here: Path, monkeypatch: pytest.MonkeyPatch, line: str, name: str
 ) -> None:
-    monkeypatch.setattr("fba_player.sound.soundtrack.check", lambda _: None)
+    monkeypatch.setattr("fba_player.sound.soundtrack.check_sound", lambda _: None)
     suffix = next(word for word in line.split() if word.startswith("IN")).removeprefix("IN")
     source, target = here / f"IN{suffix}", here / f"{name}{suffix}"
     source.write_bytes(b"precious")

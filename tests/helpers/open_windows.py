@@ -27,7 +27,7 @@ def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int,
 def settle(window: Window) -> None:
     """Draw what is due, until the view has come to rest."""
     glided = False
-    while window._due or window.session.viewpoint.gliding or glided:
+    while window._pictures_due or window.session.viewpoint.gliding or glided:
         glided = window.session.viewpoint.gliding
         if not window.update():
             break

@@ -248,7 +248,7 @@ class _Target:
         """The files that are written; of numbered pictures, those that are replaced."""
         if self.pictures is None:
             return Outputs([Output("--output", self.path)], inputs, no_clobber=no_clobber)
-        numbers = self.pictures.there() if replace else []
+        numbers = self.pictures.existing() if replace else []
         return Outputs([Output("--output", self.pictures.path(number)) for number in numbers], inputs)
 
     @contextmanager

@@ -44,9 +44,9 @@ class Gif:
         self.stopped = False
         self._path, self._size, self._rate = Path(path), size, rate
         self._numbers: list[int] = []
-        self._keep = contextlib.ExitStack()
-        self._temporary = self._keep.enter_context(atomic_path(path))
-        self._pictures = self._keep.enter_context(tempfile.SpooledTemporaryFile(IN_MEMORY))  # noqa: SIM115
+        self._cleanup = contextlib.ExitStack()
+        self._temporary = self._cleanup.enter_context(atomic_path(path))
+        self._pictures = self._cleanup.enter_context(tempfile.SpooledTemporaryFile(IN_MEMORY))  # noqa: SIM115
         self._colours, self._into, self._palette = self._graph("palettegen=stats_mode=full", 1)
 
     def write(self, pixels: UInt8, number: int) -> None:
@@ -72,12 +72,12 @@ class Gif:
             raise write_error(self._path, error) from error
         if self.stopped:
             self.abort()
-        self._keep.close()
+        self._cleanup.close()
         return self._path
 
     def abort(self) -> None:
         """Remove what there is of it."""
-        with contextlib.suppress(InterruptedError), self._keep:
+        with contextlib.suppress(InterruptedError), self._cleanup:
             raise InterruptedError
 
     def _encode(self, container: Any, palette: Any, times: list[int]) -> None:

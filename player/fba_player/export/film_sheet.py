@@ -56,11 +56,11 @@ def film_sheet(
         raise ValueError(f"a contact sheet has at least one picture, not {count}")
     if min(size) < SMALLEST:
         raise ValueError(f"a picture of a contact sheet must have at least 16x16 pixels, not {size}")
-    frames = chosen(scene, count, start, end)
+    frames = choose_frames(scene, count, start, end)
     width, height = size
     letters = max(min(width // 20, 16), 7)
     step = (width + SPACE, height + round(letters * 1.6) + SPACE)
-    columns = columns_of(len(frames), step)
+    columns = choose_columns(len(frames), step)
     rows = -(-len(frames) // columns)
     whole = (columns * step[0] + SPACE, rows * step[1] + SPACE)
     if whole[0] * whole[1] > MOST_PIXELS:
@@ -68,10 +68,10 @@ def film_sheet(
             f"{len(frames)} pictures of {width}x{height} make a sheet of {whole[0]}x{whole[1]} pixels, too "
             "large to be one: choose fewer, or a smaller size"
         )
-    return _drawn(scene, frames, size, camera, (columns, *whole, letters), progress)
+    return _draw_sheet(scene, frames, size, camera, (columns, *whole, letters), progress)
 
 
-def chosen(scene: Showable, count: int, start: float | None, end: float | None) -> list[int]:
+def choose_frames(scene: Showable, count: int, start: float | None, end: float | None) -> list[int]:
     """Positions of frames in the animation, at even distances in time; each once, in order."""
     timeline = scene.timeline
     times = np.array([float(timeline.time_of(frame)) for frame in range(timeline.frames)])
@@ -95,14 +95,14 @@ def chosen(scene: Showable, count: int, start: float | None, end: float | None) 
     return [int(frame) for frame in np.unique(nearer)]
 
 
-def columns_of(count: int, step: tuple[int, int]) -> int:
+def choose_columns(count: int, step: tuple[int, int]) -> int:
     """How many pictures stand side by side: the sheet a little wider than high, few places empty."""
     ideal = math.sqrt(count * SHAPE * step[1] / step[0])
     near = range(max(math.floor(ideal * 0.8), 1), min(math.ceil(ideal * 1.3), count) + 1)
     return min(near or (count,), key=lambda columns: (-count % columns / count, abs(columns - ideal)))
 
 
-def _drawn(
+def _draw_sheet(
     scene: Showable,
     frames: list[int],
     size: tuple[int, int],

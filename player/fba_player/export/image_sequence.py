@@ -48,7 +48,7 @@ class Numbered:
         """The picture of a frame, counted from 0."""
         return self.folder / f"{self._before}{number:0{self._width}d}{self._after}"
 
-    def there(self) -> list[int]:
+    def existing(self) -> list[int]:
         """Numbers of the pictures that exist already, sorted."""
         try:
             names = os.listdir(self.folder)
@@ -86,14 +86,14 @@ class Sequence:
         self, names: Numbered, count: int, *, transparent: bool = False, replace: bool = False
     ) -> None:
         check_picture(Path(names.name), transparent=transparent)
-        there = names.there()
+        there = names.existing()
         if there and not replace:
             raise FormatError(
-                f"{_several(names, there)} there already; choose another folder", path=names.folder
+                f"{_range_text(names, there)} there already; choose another folder", path=names.folder
             ).with_remedies(Remedy("replace", "or have them replaced with {}", "True"))
         if beyond := [number for number in there if number >= count]:
             raise FormatError(
-                f"{_several(names, beyond)} left from a longer sequence, and would follow the {count} new "
+                f"{_range_text(names, beyond)} left from a longer sequence, and would follow the {count} new "
                 "pictures; delete them, or choose another folder",
                 path=names.folder,
             )
@@ -117,7 +117,7 @@ class Sequence:
         """Pictures that are finished stay."""
 
 
-def _several(names: Numbered, numbers: list[int]) -> str:
+def _range_text(names: Numbered, numbers: list[int]) -> str:
     first = names.path(numbers[0]).name
     if len(numbers) == 1:
         return f"{first} is"

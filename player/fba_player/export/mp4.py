@@ -45,7 +45,7 @@ class Mp4:
             raise ValueError(f"a film must have at least 2x2 pixels, not {size[0]}x{size[1]}")
         self.stopped = False
         self._path, self._rate = Path(path), rate
-        self._keep = contextlib.ExitStack()
+        self._cleanup = contextlib.ExitStack()
         self._container: Any = None
         with contextlib.ExitStack() as undo:
             undo.callback(self.abort)
@@ -55,14 +55,14 @@ class Mp4:
             else:
                 soundtrack = Soundtrack(audio, Fraction(audio_start))
             if soundtrack is not None:
-                self._keep.callback(soundtrack.close)
-            name = _encoder(self._av)
-            temporary = self._keep.enter_context(atomic_path(path))
-            with self._failures():
+                self._cleanup.callback(soundtrack.close)
+            name = _choose_encoder(self._av)
+            temporary = self._cleanup.enter_context(atomic_path(path))
+            with self._convert_errors():
                 options = {"movflags": "+faststart"}  # plays while it is still loading
                 self._container = self._av.open(str(temporary), "w", format="mp4", options=options)
                 self._stream = _video_stream(self._container, name, rate, self._size)
-                self._voice = None if soundtrack is None else _Voice(self._container, soundtrack)
+                self._audio = None if soundtrack is None else _AudioTrack(self._container, soundtrack)
             self._reformatter = self._av.video.reformatter.VideoReformatter()
             version, frames = av_version(self._av), self._av.VideoFrame
             # Versions before 14 have to copy the pixels.
@@ -79,25 +79,25 @@ class Mp4:
     def write(self, pixels: UInt8, number: int) -> None:
         """A picture, uint8 (H, W, 4), at number / rate seconds."""
         width, height = self._size
-        with self._failures():
+        with self._convert_errors():
             shown = self._framed(pixels[:height, :width], format="rgba")
             picture = self._reformatter.reformat(shown, **self._conversion)
             picture.pts, picture.time_base = number, 1 / self._rate
             self._container.mux(self._stream.encode(picture))
-            if self._voice is not None:
-                self._voice.until(number / self._rate)
+            if self._audio is not None:
+                self._audio.encode_until(number / self._rate)
 
     def finish(self, count: int) -> Path:
         """The film, count / rate seconds long, stands under its name."""
-        with self._failures():
+        with self._convert_errors():
             self._container.mux(self._stream.encode(None))
-            if self._voice is not None:
-                self._voice.until(count / self._rate)
-                self._voice.finish()
+            if self._audio is not None:
+                self._audio.encode_until(count / self._rate)
+                self._audio.finish()
             self._container.close()
         if self.stopped:
             self.abort()
-        self._keep.close()
+        self._cleanup.close()
         return self._path
 
     def abort(self) -> None:
@@ -105,11 +105,11 @@ class Mp4:
         with contextlib.suppress(Exception):
             if self._container is not None:
                 self._container.close()
-        with contextlib.suppress(_Abandoned), self._keep:
+        with contextlib.suppress(_Abandoned), self._cleanup:
             raise _Abandoned
 
     @contextlib.contextmanager
-    def _failures(self) -> Any:
+    def _convert_errors(self) -> Any:
         try:
             yield
         except self._av.error.FFmpegError as error:
@@ -125,7 +125,7 @@ class _Abandoned(Exception):  # noqa: N818 - never seen outside
     """Leaves the `with` blocks as an error does, so that they remove their files."""
 
 
-class _Voice:
+class _AudioTrack:
     """The sound as AAC: encoded as far as the pictures are."""
 
     def __init__(self, container: Any, soundtrack: FilmedSound) -> None:
@@ -136,7 +136,7 @@ class _Voice:
         self._stream.bit_rate = 96_000 * soundtrack.channels
         self._done = 0
 
-    def until(self, time: Fraction) -> None:
+    def encode_until(self, time: Fraction) -> None:
         """Encode up to a time in seconds."""
         stop = round(time * self._soundtrack.rate)
         if stop <= self._done:
@@ -151,7 +151,7 @@ class _Voice:
         self._container.mux(self._stream.encode(None))
 
 
-def _encoder(av: Any) -> str:
+def _choose_encoder(av: Any) -> str:
     for name in ENCODERS:
         if name in av.codec.codecs_available:
             return name

@@ -68,16 +68,16 @@ class Preview:
         self._html: str | None = None
 
     def __repr__(self) -> str:
-        return f"<preview of {described(self._animation)}>"
+        return f"<preview of {describe(self._animation)}>"
 
     def _repr_html_(self) -> str:
         """The film as HTML that needs nothing else; made once."""
         if self._html is None:
-            self._html = self._made()
+            self._html = self._make_html()
         return self._html
 
-    def _made(self) -> str:
-        caption = described(self._animation)
+    def _make_html(self) -> str:
+        caption = describe(self._animation)
         if not len(self._animation):
             return _figure("", caption)
         from fba_player.export.render import as_scene
@@ -146,7 +146,7 @@ def show_animations(shell: Any) -> None:
     formatter.for_type_by_name("fba.animation", "Animation", lambda one: Preview(one)._repr_html_())
 
 
-def described(animation: Animation) -> str:
+def describe(animation: Animation) -> str:
     """One line about an animation: its name, length, rate, and what it moves."""
     parts = [
         name for name, track in (("face", animation.face), ("body", animation.body)) if track is not None

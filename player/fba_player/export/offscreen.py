@@ -80,7 +80,7 @@ class Offscreen:
         """Like `frame`, into memory that the next call overwrites."""
         if self._target is None:
             raise ValueError("this Offscreen is closed")
-        return self._drawn(self.scene.at(time), following(self.camera, self.scene, time))
+        return self._draw_view(self.scene.at(time), follow_camera(self.camera, self.scene, time))
 
     def still(self, faps: npt.ArrayLike) -> UInt8:
         """A picture of the face for FAPs (68,) as `fba.face.resolve` gives them: uint8 (H, W, 4).
@@ -90,16 +90,16 @@ class Offscreen:
         values = np.asarray(faps, dtype=np.float32)
         if values.shape != (FAP_COUNT,):
             raise ValueError(f"FAPs must have shape ({FAP_COUNT},), not {values.shape}")
-        return self._drawn(self.scene.still(values), self.camera).copy()
+        return self._draw_view(self.scene.still(values), self.camera).copy()
 
-    def _drawn(self, view: View, camera: Camera) -> UInt8:
+    def _draw_view(self, view: View, camera: Camera) -> UInt8:
         if self._target is None or self._renderer is None:
             raise ValueError("this Offscreen is closed")
         if self.scene.switches["background"] == "transparent":
-            return cut_out(*self._before_black_and_white(view, camera))
+            return cut_out(*self._draw_over_black_and_white(view, camera))
         return self._read(view, camera, self._target)
 
-    def _before_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
+    def _draw_over_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
         """Both by several samples a pixel: a pass that smooths edges overlooks dark ones before black."""
         with self._gl:
             if self._exact is None:
@@ -150,7 +150,7 @@ def cut_out(black: UInt8, white: UInt8) -> UInt8:
     return found
 
 
-def following(camera: Camera, scene: Scene, time: float) -> Camera:
+def follow_camera(camera: Camera, scene: Scene, time: float) -> Camera:
     """The camera, moved along with a performance that walks away."""
     moved = scene.travel(time)
     if not any(moved):

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import DisplayError
-from fba_player.export.offscreen import following
+from fba_player.export.offscreen import follow_camera
 from fba_player.gl.system_libraries import missing_libraries, missing_text
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.scene.scene import Scene
@@ -66,8 +66,8 @@ def to_pyrender(
 
     Raises DisplayError where pyrender cannot be imported, and what `Scene` raises.
     """
-    with _numpy_1():
-        pyrender = _imported()
+    with _numpy_1_names():
+        pyrender = _import_pyrender()
         shown = Scene(animation, model, body=body, axes=axes)
         view = shown.at(t)
         eye = camera if isinstance(camera, Camera) else shown.camera(camera, aspect)
@@ -78,12 +78,12 @@ def to_pyrender(
             _add(pyrender, scene, "mesh", *_of_mesh(pyrender, mesh))
         for number, ball in enumerate(view.eyes):
             _add(pyrender, scene, ("left eye", "right eye")[number % 2], *_of_eye(pyrender, ball))
-        _add_camera(pyrender, scene, following(eye, shown, t), aspect)
+        _add_camera(pyrender, scene, follow_camera(eye, shown, t), aspect)
         _add_lights(pyrender, scene)
         return scene
 
 
-def _imported() -> Any:
+def _import_pyrender() -> Any:
     try:
         import pyrender
     except Exception as error:  # PyOpenGL raises errors of its own where OpenGL is missing
@@ -98,7 +98,7 @@ def _imported() -> Any:
 
 
 @contextmanager
-def _numpy_1() -> Iterator[None]:
+def _numpy_1_names() -> Iterator[None]:
     lent = [name for name in NUMPY_1 if name not in vars(np)]
     for name in lent:
         setattr(np, name, NUMPY_1[name])
@@ -118,9 +118,9 @@ def _add(pyrender: Any, scene: Any, name: str, attributes: dict[str, Any], mater
 
 def _of_face(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
     shape = face.shape
-    positions = swayed(face.positions, shape.sway, face.turn, face.centre)
-    normals = swayed(face.normals, shape.sway, face.turn, np.zeros(3))
-    attributes = _placed(positions, normals, face.matrix, shape.triangles, shape.colours)
+    positions = sway_with_head(face.positions, shape.sway, face.turn, face.centre)
+    normals = sway_with_head(face.normals, shape.sway, face.turn, np.zeros(3))
+    attributes = _world_attributes(positions, normals, face.matrix, shape.triangles, shape.colours)
     texture = None
     if shape.picture is not None and shape.texcoords is not None:
         texture = pyrender.Texture(source=shape.picture.pixels, source_channels="RGBA")
@@ -137,7 +137,7 @@ def _of_face(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
 
 def _of_mesh(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
     shape = mesh.shape
-    attributes = _placed(mesh.positions, mesh.normals, mesh.matrix, shape.triangles, shape.colours)
+    attributes = _world_attributes(mesh.positions, mesh.normals, mesh.matrix, shape.triangles, shape.colours)
     rough = _roughness(shape.colours)
     material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=rough, doubleSided=True)
     return attributes, material
@@ -150,12 +150,12 @@ def _of_eye(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
     colours = np.tile(np.array([*WHITE, 1.0], dtype=np.float32), (len(places), 1))
     colours[front & (across < ball.iris), :3] = np.array(ball.tint) * IRIS_LIGHT
     colours[front & (across < ball.pupil), :3] = PUPIL
-    attributes = _placed(places, places, ball.matrix, triangles, colours)
+    attributes = _world_attributes(places, places, ball.matrix, triangles, colours)
     material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=WET, doubleSided=True)
     return attributes, material
 
 
-def _placed(
+def _world_attributes(
     positions: Float32 | Float64,
     normals: Float32 | Float64,
     matrix: Float64,
@@ -174,7 +174,7 @@ def _placed(
     }
 
 
-def swayed(places: npt.ArrayLike, sway: Float32, turn: Float64, centre: Float64) -> Float64:
+def sway_with_head(places: npt.ArrayLike, sway: Float32, turn: Float64, centre: Float64) -> Float64:
     """(V, 3) turned about a centre as far as each goes with the head: by sway (V,) times `turn`."""
     at = np.asarray(places, dtype=np.float64)
     angle = float(np.linalg.norm(turn))

@@ -111,7 +111,7 @@ class Recorder:
         width, height = (int(v) for v in size)
         self.path = Path(path)
         self.rate = exact_rate(rate)
-        self._start(_opened(self.path, (width, height), self.rate, audio, audio_start), (width, height))
+        self._start(_open_sink(self.path, (width, height), self.rate, audio, audio_start), (width, height))
 
     @classmethod
     def into(cls, sink: Sink, path: PathLike, size: tuple[int, int], rate: Fraction) -> Recorder:
@@ -180,7 +180,7 @@ class Recorder:
             return False
         self._check()
         if pixels.shape[:2] != buffer.shape[:2]:
-            pixels = _fitted(pixels, self.size)
+            pixels = _fit(pixels, self.size)
         buffer[..., : pixels.shape[2]] = pixels
         if pixels.shape[2] == 3:
             buffer[..., 3] = 255
@@ -271,7 +271,7 @@ def exact_rate(rate: Fraction | int | str) -> Fraction:
     return exact.limit_denominator(1001) if exact.denominator > 100_000 else exact
 
 
-def _opened(
+def _open_sink(
     path: Path,
     size: tuple[int, int],
     rate: Fraction,
@@ -295,7 +295,7 @@ def _opened(
     )
 
 
-def _fitted(pixels: UInt8, size: tuple[int, int]) -> UInt8:
+def _fit(pixels: UInt8, size: tuple[int, int]) -> UInt8:
     """As large as fits, in the middle, with black around it."""
     from PIL import Image, ImageOps
 

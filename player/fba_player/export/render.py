@@ -85,7 +85,7 @@ def render(
             scene, path, fps=fps, size=size, camera=camera, start=start, end=end, audio=audio,
             audio_offset=audio_offset, transparent=transparent, replace=replace, progress=progress,
         )  # fmt: skip
-    transparent = transparent or _clear(scene)
+    transparent = transparent or _is_transparent(scene)
     check_picture(target, transparent=transparent)
     if fps is not None or end is not None or (start is not None and time is not None):
         raise ValueError("fps, start and end belong to a film; give frame or time for a .png")
@@ -93,7 +93,7 @@ def render(
         raise ValueError("a picture has no sound; leave the audio out, or write an .mp4")
     if start is not None:
         check_inside(scene, "start", start)
-    at = _moment(scene, frame, time if time is not None else start)
+    at = _picture_time(scene, frame, time if time is not None else start)
     with (
         _background(scene, clear=transparent),
         Offscreen(scene, size or SIZE, camera, samples=PICTURE_SAMPLES) as offscreen,
@@ -128,7 +128,7 @@ def record(
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     gif, numbered = suffix == ".gif", is_sequence(path)
-    transparent = transparent or _clear(shown)
+    transparent = transparent or _is_transparent(shown)
     if transparent and not numbered:
         raise UnsupportedError(
             f"{path}: a film cannot be transparent; write numbered pictures, frames/%05d.png",
@@ -145,7 +145,7 @@ def record(
     else:
         rate = Fraction(fps)
     rate = exact_rate(rate)
-    first, count = _stretch(shown, rate, start, end)
+    first, count = _frame_range(shown, rate, start, end)
     width, height = picture_size(size, path)
     if size is not None and min(width, height) < 1:
         raise ValueError(f"a film must have at least 2x2 pixels, not {size[0]}x{size[1]}")
@@ -200,7 +200,7 @@ def _check_name(path: PathLike) -> None:
         )
 
 
-def _clear(scene: Showable) -> bool:
+def _is_transparent(scene: Showable) -> bool:
     """Whether the scene is switched to no background."""
     return scene.switches["background"] == "transparent"
 
@@ -218,7 +218,7 @@ def _background(scene: Any, *, clear: bool) -> Iterator[None]:
             scene.show("background", before)
 
 
-def _moment(scene: Showable, frame: int | None, time: float | None) -> float:
+def _picture_time(scene: Showable, frame: int | None, time: float | None) -> float:
     if frame is not None and time is not None:
         raise ValueError("give frame or time, not both")
     if frame is not None:
@@ -248,7 +248,9 @@ def check_inside(scene: Showable, name: str, time: float) -> None:
         )
 
 
-def _stretch(scene: Showable, rate: Fraction, start: float | None, end: float | None) -> tuple[Fraction, int]:
+def _frame_range(
+    scene: Showable, rate: Fraction, start: float | None, end: float | None
+) -> tuple[Fraction, int]:
     """Time of the first picture and how many there are."""
     for name, value in (("start", start), ("end", end)):
         if value is not None:

@@ -69,11 +69,11 @@ class LiveAnimation:
         self._decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
         self._buffer = FrameBuffer()
         self._now = self._buffer.decoded()
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._closing = False
         self._failure: BaseException | None = None
         self._losses = 0
-        self._bap_steps, self._judged = bap_steps, False
+        self._bap_steps, self._checked_bap_steps = bap_steps, False
         self._thread = threading.Thread(target=self._read, args=(head,), name="fba live", daemon=True)
         self._thread.start()
 
@@ -145,10 +145,10 @@ class LiveAnimation:
         Raises BitstreamError or UnsupportedError where the stream ends, or is ended, without a frame that
         can be decoded, OSError where it cannot be read.
         """
-        with self._news:
-            if not self._news.wait_for(lambda: len(self) or not self.growing, timeout):
+        with self._changed:
+            if not self._changed.wait_for(lambda: len(self) or not self.growing, timeout):
                 return False
-            self._news.wait_for(self._enough, PATIENCE)
+            self._changed.wait_for(self._enough, PATIENCE)
             if not len(self):
                 raise self._failure or BitstreamError("the stream ended before its first I plane", plane=0)
             self._buffer.fix_parts()
@@ -156,8 +156,8 @@ class LiveAnimation:
 
     def wait_end(self, timeout: float | None = None) -> bool:
         """Wait until all has arrived. False where time, seconds, ran out before."""
-        with self._news:
-            return self._news.wait_for(lambda: not self.growing, timeout)
+        with self._changed:
+            return self._changed.wait_for(lambda: not self.growing, timeout)
 
     def close(self) -> None:
         """Take in nothing more; the thread ends with the next bytes."""
@@ -174,12 +174,12 @@ class LiveAnimation:
             chunk = head or self._source.read1(CHUNK)
             while chunk and not self._closing:
                 self.received += len(chunk)
-                self._take(self._decoder.push_blocks(chunk))
-                self._judge()
+                self._add_blocks(self._decoder.push_blocks(chunk))
+                self._check_bap_steps()
                 chunk = self._source.read1(CHUNK)
             if not self._closing:
-                self._take(self._decoder.finish_blocks())
-                self._judge(at_end=True)
+                self._add_blocks(self._decoder.finish_blocks())
+                self._check_bap_steps(at_end=True)
         except (FbaError, FbaWarning, OSError, ValueError) as error:
             self._failure = error
             self.message, self.details = "the stream broke off", f"the stream broke off: {error}"
@@ -188,8 +188,8 @@ class LiveAnimation:
                 self._at_end()
             self._end()
 
-    def _take(self, blocks: list[Block]) -> None:
-        with self._news:
+    def _add_blocks(self, blocks: list[Block]) -> None:
+        with self._changed:
             for block in blocks:
                 self._buffer.add(block)
             self._now = self._buffer.decoded()
@@ -206,21 +206,21 @@ class LiveAnimation:
             if self._buffer.left_out:
                 self.message = f"{self._buffer.left_out} came too late to be shown"
                 self.details = f"{self.message}: the stream brings it, but had none when playing started"
-            self._news.notify_all()
+            self._changed.notify_all()
 
-    def _judge(self, *, at_end: bool = False) -> None:
+    def _check_bap_steps(self, *, at_end: bool = False) -> None:
         now = self._now
-        if self._judged or now.body is None or (self.duration < JUDGED and not at_end):
+        if self._checked_bap_steps or now.body is None or (self.duration < JUDGED and not at_end):
             return
         from fba.body.plausibility import find_doubt
 
-        self._judged = True
+        self._checked_bap_steps = True
         self.doubt = str(find_doubt(now.body, now.index, now.rate, self._bap_steps) or "")
 
     def _end(self) -> None:
-        with self._news:
+        with self._changed:
             self.growing = False
-            self._news.notify_all()
+            self._changed.notify_all()
 
 
 class LiveTimeline(Timeline):
@@ -251,8 +251,8 @@ def wait_for(live: LiveAnimation, say: Callable[[str], None], after: float = 1.0
 
     Goes on listening to Ctrl-C meanwhile.
     """
-    begun, told = wall.monotonic(), False
+    begun, said = wall.monotonic(), False
     while not live.wait(0.2):
-        if not told and wall.monotonic() - begun > after:
+        if not said and wall.monotonic() - begun > after:
             say(f"waiting for the first I plane of {live.name or 'the stream'}")
-            told = True
+            said = True

@@ -13,8 +13,8 @@ from fba_player.view.protocols import Showable
 
 GLIDE = 0.35
 """Seconds that a change of view takes."""
-NOWHERE = (0.0, 1.0)
-LEAST_FREE = 0.2
+NOT_SHIFTED = (0.0, 1.0)
+MIN_FREE_WIDTH = 0.2
 """Share of the width between two columns for which a view is still made."""
 
 
@@ -45,16 +45,16 @@ class Viewpoint:
         self._clock = clock
         self._from = self._to = self.beginning
         self._until = -math.inf
-        self._named = camera if not isinstance(camera, Camera) else ""
+        self._preset = camera if not isinstance(camera, Camera) else ""
         self._fitted_to = (aspect, self._to)
         self._sides = (0.0, 0.0)
-        self._before = self._aside = NOWHERE
-        self._aside_until = -math.inf
+        self._shift_before = self._shift = NOT_SHIFTED
+        self._shift_until = -math.inf
 
     @property
     def camera(self) -> Camera:
         """The camera now; setting it cuts to the new one."""
-        share = self._eased(self._until)
+        share = self._progress(self._until)
         return self._to if share >= 1.0 else self._from.between(self._to, share)
 
     @camera.setter
@@ -65,14 +65,14 @@ class Viewpoint:
     @property
     def gliding(self) -> bool:
         """Whether it is on its way to another view."""
-        return self._clock() < max(self._until, self._aside_until)
+        return self._clock() < max(self._until, self._shift_until)
 
     @property
     def beginning(self) -> Camera:
         """The first view, for the picture as it is now."""
-        return self._chosen if isinstance(self._chosen, Camera) else self.fitted(self._chosen)
+        return self._chosen if isinstance(self._chosen, Camera) else self.fit(self._chosen)
 
-    def fitted(self, preset: str | None) -> Camera:
+    def fit(self, preset: str | None) -> Camera:
         """A named view, or None for the one that suits the content, above what is covered."""
         free = 1.0 - min(max(self.covered, 0.0), 0.5)
         camera = self.scene.camera(preset, self.aspect / free)
@@ -85,9 +85,9 @@ class Viewpoint:
         aspect, camera = self._fitted_to
         if self.aspect == aspect:
             return
-        if self._named != "" and self._to == camera:
-            self.camera = self.fitted(self._named)
-            self._aside = self._between(*self._sides)
+        if self._preset != "" and self._to == camera:
+            self.camera = self.fit(self._preset)
+            self._shift = self._shift_between(*self._sides)
         self._fitted_to = (self.aspect, self._fitted_to[1])
 
     def glide(self, camera: Camera) -> None:
@@ -96,63 +96,66 @@ class Viewpoint:
 
     def preset(self, name: str) -> None:
         """Go to a named view; ValueError for a name that does not exist."""
-        self.glide(self.fitted(name))
-        self._named = name
+        self.glide(self.fit(name))
+        self._preset = name
 
     def uncover(self, left: float, right: float, *, smoothly: bool = True) -> None:
         """These shares of the picture's width are hidden: who is seen stands between them, whole."""
         if (left, right) == self._sides:
             return
-        self._before = self._aside_now()
+        self._shift_before = self._shift_now()
         self._sides = (left, right)
-        self._aside = self._between(left, right)
-        self._aside_until = self._clock() + GLIDE if smoothly else -math.inf
+        self._shift = self._shift_between(left, right)
+        self._shift_until = self._clock() + GLIDE if smoothly else -math.inf
 
     def reset(self) -> None:
         """Go back to the view of the beginning."""
         self.follow = True
         self.glide(self.beginning)
-        self._named = self._chosen if not isinstance(self._chosen, Camera) else ""
+        self._preset = self._chosen if not isinstance(self._chosen, Camera) else ""
 
-    def whole(self, time: float) -> Camera:
+    def camera_without_panels(self, time: float) -> Camera:
         """The camera that shows the scene at a time in seconds, where nothing is hidden at the sides."""
-        return self._moved(self.camera, time, 1.0) if self.follow else self.camera
+        return self._follow_travel(self.camera, time, 1.0) if self.follow else self.camera
 
-    def at(self, time: float) -> Camera:
+    def camera_at(self, time: float) -> Camera:
         """The camera that shows the scene at a time in seconds, between what is hidden at the sides."""
-        aside, further = self._aside_now()
-        if (aside, further) == NOWHERE:
-            return self.whole(time)
+        shift, further = self._shift_now()
+        if (shift, further) == NOT_SHIFTED:
+            return self.camera_without_panels(time)
         up = -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)  # the middle of what is free stays
-        return self.whole(time).zoom(further).pan(-aside * self.aspect, up)
+        return self.camera_without_panels(time).zoom(further).pan(-shift * self.aspect, up)
 
     def toggle_follow(self, time: float) -> None:
         """Follow a performance that walks away, or stay; the picture at `time` does not jump."""
-        self.camera = self._moved(self.camera, time, 1.0 if self.follow else -1.0)
+        self.camera = self._follow_travel(self.camera, time, 1.0 if self.follow else -1.0)
         self.follow = not self.follow
 
-    def _eased(self, until: float) -> float:
+    def _progress(self, until: float) -> float:
         """How far a change is that ends then: from 0 to 1, beginning and ending slowly."""
         return float(smoothstep(1.0 - (until - self._clock()) / GLIDE))
 
-    def _aside_now(self) -> tuple[float, float]:
-        share = self._eased(self._aside_until)
+    def _shift_now(self) -> tuple[float, float]:
+        share = self._progress(self._shift_until)
         a, b = (
-            before + (after - before) * share for before, after in zip(self._before, self._aside, strict=True)
+            before + (after - before) * share
+            for before, after in zip(self._shift_before, self._shift, strict=True)
         )
-        return (a, b) if share < 1.0 else self._aside
+        return (a, b) if share < 1.0 else self._shift
 
-    def _between(self, left: float, right: float) -> tuple[float, float]:
+    def _shift_between(self, left: float, right: float) -> tuple[float, float]:
         """By which share of the width the middle moves, and how much further away the camera goes."""
-        free = max(1.0 - left - right, LEAST_FREE)
-        if self._named == "" or free >= 1.0:
+        free = max(1.0 - left - right, MIN_FREE_WIDTH)
+        if self._preset == "" or free >= 1.0:
             return (left - right) / 2, 1.0
         aspect = self.aspect / (1.0 - min(max(self.covered, 0.0), 0.5))
-        narrow = self.scene.camera(self._named, aspect * free).distance
-        whole = self.scene.camera(self._named, aspect).distance  # last: scenes stand as this camera sees them
+        narrow = self.scene.camera(self._preset, aspect * free).distance
+        whole = self.scene.camera(
+            self._preset, aspect
+        ).distance  # last: scenes stand as this camera sees them
         return (left - right) / 2, max(narrow / whole, 1.0)
 
-    def _moved(self, camera: Camera, time: float, way: float) -> Camera:
+    def _follow_travel(self, camera: Camera, time: float, way: float) -> Camera:
         travel = self.scene.travel(time)
         if not any(travel):
             return camera

@@ -16,10 +16,10 @@ def act(session: Session, name: str) -> bool:
     Returns whether there is such a thing.
     """
     word, _, rest = name.partition(" ")
-    if rest and word in _WITH:
-        _WITH[word](session, rest)
-    elif not rest and word in _PLAIN:
-        _PLAIN[word](session)
+    if rest and word in _ACTIONS_WITH_NAME:
+        _ACTIONS_WITH_NAME[word](session, rest)
+    elif not rest and word in _ACTIONS:
+        _ACTIONS[word](session)
     else:
         return False
     return True
@@ -126,11 +126,11 @@ def _step(frames: int) -> Callable[[Session], None]:
     return lambda session: session.transport.step(frames)
 
 
-def _wish(what: str) -> Callable[[Session], None]:
-    return lambda session: session.wish(what)
+def _request(what: str) -> Callable[[Session], None]:
+    return lambda session: session.request(what)
 
 
-_PLAIN: dict[str, Callable[[Session], None]] = {
+_ACTIONS: dict[str, Callable[[Session], None]] = {
     "toggle": _toggle,
     "stop": _stop,
     "back": _step(-1),
@@ -156,9 +156,9 @@ _PLAIN: dict[str, Callable[[Session], None]] = {
     "bare": _bare,
     "close": _close,
     "escape": _escape,
-    **{name: _wish(name) for name in ("screenshot", "transparent", "record", "fullscreen")},
+    **{name: _request(name) for name in ("screenshot", "transparent", "record", "fullscreen")},
 }
-_WITH: dict[str, Callable[[Session, str], None]] = {
+_ACTIONS_WITH_NAME: dict[str, Callable[[Session, str], None]] = {
     "camera": lambda session, name: session.viewpoint.preset(name),
     "panel": lambda session, name: session.toggle_panel(name),
 }

@@ -27,7 +27,7 @@ SAMPLES = 4
 """Samples a pixel of a screenshot, which may take its time."""
 
 
-class Keeper:
+class Captures:
     """Takes the screenshots and records the films that a session asks for.
 
     folder: where they are saved, by default the current one. They are named after the file shown, and
@@ -48,7 +48,7 @@ class Keeper:
 
     def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
         """Save a picture, uint8 (H, W, 4), as a PNG file; returns its path, or None where it fails."""
-        path = self._name(f"-{self.session.transport.frame + 1:04d}", ".png")
+        path = self._unused_path(f"-{self.session.transport.frame + 1:04d}", ".png")
         try:
             write_picture(path, pixels, transparent=transparent)
         except (OSError, FbaError) as error:
@@ -62,8 +62,8 @@ class Keeper:
         if self._recorder is not None:
             self._finish()
             return
-        path = self._name("-film", ".mp4")
-        sound = self._heard()
+        path = self._unused_path("-film", ".mp4")
+        sound = self._open_sound()
         try:
             self._recorder = Recorder(path, self.session.size, rate=RATE, audio=sound)
         except (OSError, FbaError, ValueError) as error:
@@ -75,7 +75,7 @@ class Keeper:
         self._begun = self.session.clock()
         self.session.recording = 0.0
 
-    def moment(self) -> None:
+    def begin_picture(self) -> None:
         """Note the film's time, and mix its sound up to here: call before each picture is drawn."""
         if self._recorder is None:
             return
@@ -83,8 +83,8 @@ class Keeper:
         if self._sound is not None:
             self._sound.advance(self.session.recording)
 
-    def picture(self, read: Callable[[], UInt8]) -> None:
-        """Add the picture drawn after the last `moment`. read: returns it, uint8 (H, W, 4)."""
+    def add_picture(self, read: Callable[[], UInt8]) -> None:
+        """Add the picture drawn after the last `begin_picture`. read: returns it, uint8 (H, W, 4)."""
         seconds = self.session.recording
         if self._recorder is None or seconds is None or not self._recorder.wants(seconds):
             return
@@ -105,7 +105,7 @@ class Keeper:
             sound.end()
         return recorder.close()
 
-    def _heard(self) -> FilmSound | None:
+    def _open_sound(self) -> FilmSound | None:
         """The sound for a new film; None, with a notice where that is unexpected, where there is none."""
         session = self.session
         if session.sound is None:
@@ -132,7 +132,7 @@ class Keeper:
         if path is not None:
             self.session.say(f"Saved as {path}")
 
-    def _name(self, what: str, suffix: str) -> Path:
+    def _unused_path(self, what: str, suffix: str) -> Path:
         """A path that does not exist yet."""
         stem = Path(self.session.source.name or "fba").stem
         stem = re.sub(r"[^\w. -]", "_", stem)[:60].strip(" .") or "fba"
@@ -142,7 +142,9 @@ class Keeper:
         return path
 
 
-def still(context: Any, renderer: Renderer, session: Session, *, transparent: bool = False) -> UInt8:
+def draw_screenshot(
+    context: Any, renderer: Renderer, session: Session, *, transparent: bool = False
+) -> UInt8:
     """What the session shows now, without panels: uint8 (H, W, 4), top row first.
 
     transparent: opaque only where something is. Raises DisplayError where there is no room for it.
@@ -153,20 +155,20 @@ def still(context: Any, renderer: Renderer, session: Session, *, transparent: bo
     try:
         if transparent:
             scene.show("background", "transparent")
-        view, camera = session.view(time), session.viewpoint.whole(time)
+        view, camera = session.view(time), session.viewpoint.camera_without_panels(time)
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)] if transparent else [view]
         pictures = []
         for one in views:
             target.begin()
             within = renderer.draw(one, camera, session.size)
-            pictures.append(pixels_of(target.finish(within=within), session.size))
+            pictures.append(read_pixels(target.finish(within=within), session.size))
     finally:
         scene.show("background", before)
         target.close()
     return cut_out(*pictures) if transparent else pictures[0]
 
 
-def pixels_of(framebuffer: Any, size: tuple[int, int]) -> UInt8:
+def read_pixels(framebuffer: Any, size: tuple[int, int]) -> UInt8:
     """What a framebuffer holds: uint8 (H, W, 4), top row first."""
     width, height = size
     data = framebuffer.read((0, 0, width, height), components=4, alignment=1)

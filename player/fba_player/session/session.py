@@ -81,7 +81,7 @@ class Session:
     before_frame: functions called as hook(faps, baps) before each picture with what is shown next, FAPs
     (68,) float32 and BAPs (296,) float64 (zeros where there is no body), to change in place.
 
-    wishes: what the window is to do after this picture; see `wish`. recording: seconds recorded so far,
+    requests: what the window is to do after this picture; see `request`. recording: seconds recorded so far,
     None where nothing is being recorded. values: faps and baps of the last picture, after the hooks.
     sound: the file that belongs to what is played, whether a device makes it heard (audio) or not; it begins
     sound_offset seconds after the first frame, see `shift_sound`.
@@ -112,12 +112,12 @@ class Session:
         self.bare = False
         self.closing = False
         self.before_frame: list[Hook] = []
-        self.wishes: deque[str] = deque()
+        self.requests: deque[str] = deque()
         self.recording: float | None = None
         self.rolling: set[str] = set()
         self.unsaved: set[str] = set()
         self.dropped: tuple[Path, ...] = ()
-        self.whole_screen = False
+        self.full_screen = False
         self.popup = False
         self.audio: Audio | None = None
         self.sound: PathLike | None = None
@@ -126,7 +126,7 @@ class Session:
         self.clock = clock
         self.last_input = clock()
         self._notices: list[Notice] = []
-        self._asked = -math.inf
+        self._leave_again_until = -math.inf
 
     def toggle_panel(self, name: str) -> None:
         """Open a panel, or close it. Where all is hidden, show it."""
@@ -151,23 +151,23 @@ class Session:
         self._notices = [one for one in self._notices if one.until > now]
         return list(self._notices)
 
-    def wish(self, what: str) -> None:
+    def request(self, what: str) -> None:
         """Ask the window for "screenshot", "transparent", "record" or "fullscreen"."""
-        self.wishes.append(what)
+        self.requests.append(what)
 
     def escape(self) -> None:
         """Close the list that is open, else leave the full screen, else the window."""
         if self.popup:
             self.popup = False
-        elif self.whole_screen:
-            self.wish("fullscreen")
+        elif self.full_screen:
+            self.request("fullscreen")
         else:
             self.leave()
 
     def leave(self) -> None:
         """Close the window; where something is not saved, only when asked a second time."""
-        if self.unsaved and self.clock() > self._asked:
-            self._asked = self.clock() + LEAVING
+        if self.unsaved and self.clock() > self._leave_again_until:
+            self._leave_again_until = self.clock() + LEAVING
             what = " and ".join(sorted(self.unsaved))
             self.say(f"Unsaved: {what}. Close again to discard", "warning", LEAVING, about="leave")
             return
@@ -255,4 +255,4 @@ class Session:
 
     def camera(self, time: float) -> Camera:
         """The camera at a time."""
-        return self.viewpoint.at(time)
+        return self.viewpoint.camera_at(time)

@@ -28,7 +28,7 @@ class Source:
     """The file behind a scene.
 
     path: None where there is no file. bap_steps: the table of BAP steps it was decoded with. warnings: those
-    given while it was read. `info` describes its content: at first from the scene alone, once `look` is done
+    given while it was read. `info` describes its content: at first from the scene alone, once `probe` is done
     with planes, bits and damage too.
     """
 
@@ -45,14 +45,14 @@ class Source:
         self.warnings = list(warnings)
         self._scene = scene
         self._probed: StreamInfo | None = None
-        self._own: StreamInfo | None = None
-        self._of = ("animation", 0)
+        self._scene_info: StreamInfo | None = None
+        self._format_and_size = ("animation", 0)
         animation: object = scene.animation if isinstance(scene, Scene) else None
         self._live: Callable[[], StreamInfo] | None = None
         if isinstance(animation, LiveAnimation):
             self._live = animation.info
-        self._told = -REFRESH
-        self._traced: StreamInfo | None = None
+        self._updated = -REFRESH
+        self._trace_info: StreamInfo | None = None
         self._trace: Trace | None = None
         self._thread: threading.Thread | None = None
 
@@ -66,43 +66,43 @@ class Source:
         """What it holds; the same object until something changes."""
         if self._probed is not None:
             return self._probed
-        own, timeline, now = self._own, self._scene.timeline, wall.monotonic()
-        due = not timeline.growing or now - self._told >= REFRESH
+        own, timeline, now = self._scene_info, self._scene.timeline, wall.monotonic()
+        due = not timeline.growing or now - self._updated >= REFRESH
         if own is None or (own.frames != timeline.frames and due):
-            self._own, self._told = self._of_scene(), now
-        assert self._own is not None
-        return self._own
+            self._scene_info, self._updated = self._info_of_scene(), now
+        assert self._scene_info is not None
+        return self._scene_info
 
-    def look(self, *, wait: bool = False) -> None:
+    def probe(self, *, wait: bool = False) -> None:
         """Read what the file holds, in the background unless `wait`: the window need not wait for it."""
         if self._thread is not None:
             return
-        self._thread = threading.Thread(target=self._probe, name="fba source", daemon=True)
+        self._thread = threading.Thread(target=self._read_details, name="fba source", daemon=True)
         self._thread.start()
         if wait:
             self._thread.join()
 
     @property
-    def looking(self) -> bool:
+    def probing(self) -> bool:
         """Whether that is still going on."""
         return self._thread is not None and self._thread.is_alive()
 
     @property
     def trace(self) -> Trace | None:
-        """What is behind the timeline, once `look` has found it: the planes' bits, or how much moves."""
-        if self._live is not None and self._traced is not self.info:
-            self._traced = self.info
-            self._trace = trace_of_planes(self._traced)
+        """What is behind the timeline, once `probe` has found it: the planes' bits, or how much moves."""
+        if self._live is not None and self._trace_info is not self.info:
+            self._trace_info = self.info
+            self._trace = trace_of_planes(self._trace_info)
         return self._trace
 
-    def _of_scene(self) -> StreamInfo:
+    def _info_of_scene(self) -> StreamInfo:
         from fba.codec import StreamInfo
 
         if self._live is not None:
             return self._live()
         animation, times = self._animation(), self._scene.timeline
         if isinstance(animation, Animation) and len(animation) == times.frames:
-            return StreamInfo.of_animation(animation, *self._of)
+            return StreamInfo.of_animation(animation, *self._format_and_size)
         return StreamInfo(
             format="stream",
             size=0,
@@ -118,15 +118,15 @@ class Source:
     def _animation(self) -> object:
         return self._scene.animation if isinstance(self._scene, Scene | CompareScene) else None
 
-    def _probe(self) -> None:
+    def _read_details(self) -> None:
         from fba.formats import format_of, probe
 
         try:
             if self.path is not None and (found := format_of(self.path).name) == "fba":
                 self._probed = probe(self.path, bap_steps=self.bap_steps)
             elif self.path is not None:  # what was read of it counts: at the rate that was asked for
-                self._of = (found, os.stat(self.path).st_size)
-                self._own = None
+                self._format_and_size = (found, os.stat(self.path).st_size)
+                self._scene_info = None
         except (FbaError, OSError) as error:
             self.warnings.append(f"what the file holds cannot be read: {error}")
         trace = trace_of_planes(self.info)

@@ -22,7 +22,7 @@ class SoundClock:
     counts on, and the samples it did not take in time are never heard.
 
     rate: samples a second. latency: seconds from handing over samples to hearing them. monotonic: the wall
-    clock, for tests. `taken` is for the device's thread, reading the clock for any.
+    clock, for tests. `take` is for the device's thread, reading the clock for any.
     """
 
     def __init__(self, rate: int, latency: float, *, monotonic: Callable[[], float] = wall.monotonic) -> None:
@@ -44,7 +44,7 @@ class SoundClock:
             self._last = max(self._last, self._monotonic() + ahead)
         return self._last
 
-    def taken(self, samples: int) -> float:
+    def take(self, samples: int) -> float:
         """The device takes so many samples; the reading at which the first of them is heard."""
         now = self._monotonic()
         if self._ahead is None:

@@ -12,7 +12,7 @@ from fba_player.playback.playhead import Motion
 
 FADE = 0.004
 """Seconds in which sound begins, ends, and goes over into another place: without them it would click."""
-AFTER = 1e-7
+ROUNDING = 1e-7
 """Seconds: a turn this far ahead, by rounding, is now."""
 SLIP = 0.002
 """Seconds by which the place that is due may differ from the one that follows the last."""
@@ -39,7 +39,7 @@ class SoundMixer:
         self.origin = origin
         self._cursor: float | None = None  # sample that follows the last; None in silence
         self._speed = 1.0
-        self._risen = math.inf  # samples since the sound began or jumped
+        self._since_start = math.inf  # samples since the sound began or jumped
         self._fade = max(round(FADE * rate), 1)
         self._tail: Float32 = np.zeros((0, 2), dtype=np.float32)  # what is left of the fading end
 
@@ -49,13 +49,15 @@ class SoundMixer:
         mixed = np.zeros((count, 2), dtype=np.float32)
         done = 0
         while done < count:
-            now = clock + done / rate + AFTER
+            now = clock + done / rate + ROUNDING
             turn = motion.until_turn(now) * rate
             piece = min(count - done, max(math.ceil(turn), 1)) if turn < count else count - done
             due = (motion.time(now) - self.origin) * rate if motion.moving(now) else None
-            self._go(due, motion.speed)
+            self._continue_at(due, motion.speed)
             if self._cursor is not None:
-                mixed[done : done + piece] = self._risen_by(self._heard(self._cursor, self._speed, piece))
+                mixed[done : done + piece] = self._fade_in(
+                    self._read_at_speed(self._cursor, self._speed, piece)
+                )
                 self._cursor += piece * self._speed
             ending = min(piece, len(self._tail))
             mixed[done : done + ending] += self._tail[:ending]
@@ -64,7 +66,7 @@ class SoundMixer:
         level = 0.0 if self.muted else self.volume
         return np.asarray(np.clip(np.rint(mixed * np.float32(level)), -32768, 32767), dtype=np.int16)
 
-    def _go(self, due: float | None, speed: float) -> None:
+    def _continue_at(self, due: float | None, speed: float) -> None:
         """Go on with the sample that is due; where it does not follow the last, end that one softly."""
         here = self._cursor
         if here is not None and due is not None and abs(due - here) <= SLIP * self._rate * max(speed, 1.0):
@@ -72,18 +74,18 @@ class SoundMixer:
             return
         if here is not None:
             ramp = np.linspace(1, 0, self._fade, endpoint=False, dtype=np.float32)[:, None]
-            self._tail = self._heard(here, self._speed, self._fade) * ramp
+            self._tail = self._read_at_speed(here, self._speed, self._fade) * ramp
         self._cursor, self._speed = due, speed
-        self._risen = 0
+        self._since_start = 0
 
-    def _risen_by(self, samples: Float32) -> Float32:
-        if self._risen < self._fade:
-            ramp = (np.arange(len(samples), dtype=np.float32) + np.float32(self._risen)) / self._fade
+    def _fade_in(self, samples: Float32) -> Float32:
+        if self._since_start < self._fade:
+            ramp = (np.arange(len(samples), dtype=np.float32) + np.float32(self._since_start)) / self._fade
             samples = samples * np.minimum(ramp, np.float32(1))[:, None]
-        self._risen += len(samples)
+        self._since_start += len(samples)
         return samples
 
-    def _heard(self, first: float, speed: float, count: int) -> Float32:
+    def _read_at_speed(self, first: float, speed: float, count: int) -> Float32:
         """(count, 2) samples from a place on, so many of the file's for one."""
         if speed == 1.0:
             return self._take(round(first), count).astype(np.float32)

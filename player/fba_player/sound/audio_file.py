@@ -149,14 +149,14 @@ class SoundFile:
         convert = _Converter(self._av, self.rate, mono=stream.channels == 1)
         begun, at = stream.start_time or 0, None
         for frame in self._frames():
-            told = None
+            stated = None
             if frame.pts is not None and frame.time_base:
-                told = round(float((frame.pts - begun) * frame.time_base) * self.rate)
+                stated = round(float((frame.pts - begun) * frame.time_base) * self.rate)
             if at is None:
-                at = self._first = told or 0
-            elif told is not None and GAP * self.rate < told - at < MOST_AT_ONCE:
-                yield np.zeros((told - at, CHANNELS), dtype=np.int16)
-                at = told
+                at = self._first = stated or 0
+            elif stated is not None and GAP * self.rate < stated - at < MOST_AT_ONCE:
+                yield np.zeros((stated - at, CHANNELS), dtype=np.int16)
+                at = stated
             frame.pts = None
             try:
                 parts = convert(frame)
@@ -206,7 +206,7 @@ class _Converter:
         self._av = av
         self._rate = rate
         self._sides = 1 if mono else CHANNELS  # mixing would make mono softer
-        self._resampler = self._made()
+        self._resampler = self._new_resampler()
 
     def __call__(self, frame: Any) -> list[Int16]:
         """The samples of a frame, or what is still held back for None."""
@@ -214,7 +214,7 @@ class _Converter:
             pieces = self._resampler.resample(frame)
         except ValueError:  # another format than before
             held = self._resampler.resample(None)
-            self._resampler = self._made()
+            self._resampler = self._new_resampler()
             pieces = held + self._resampler.resample(frame)
         found = []
         for piece in pieces:
@@ -222,6 +222,6 @@ class _Converter:
             found.append(np.broadcast_to(samples, (len(samples), CHANNELS)))
         return found
 
-    def _made(self) -> Any:
+    def _new_resampler(self) -> Any:
         layout = "mono" if self._sides == 1 else "stereo"
         return self._av.AudioResampler(format="s16", layout=layout, rate=self._rate)

@@ -1,4 +1,4 @@
-"""Sound beside the picture: the device's clock leads, and what it is given follows the transport.
+"""Sound beside the picture: the device's clock leads, and the samples that it is given follow the transport.
 
 A device counts the samples it plays, and that count is the clock of the transport. What the device asks
 for next will be heard at a known reading of that clock, so it gets the sound of the time that the transport
@@ -23,9 +23,9 @@ from fba_player.sound._device_clock import SoundClock
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._read_ahead import SoundBlocks
 from fba_player.sound.audio_file import CHANNELS, SoundFile
-from fba_player.sound.soundtrack import beside
+from fba_player.sound.soundtrack import find_sound_beside
 
-__all__ = ["Audio", "beside", "open_audio"]
+__all__ = ["Audio", "find_sound_beside", "open_audio"]
 
 PERIOD, PERIODS = 0.04, 3
 """Seconds that a device asks for at a time, and how many of them it holds."""
@@ -58,15 +58,15 @@ class Audio:
         self.rate = file.rate
         self.clock = SoundClock(file.rate, (PERIODS - 1) * PERIOD)
         self._offset = offset
-        self._blocks = SoundBlocks(file, self._wanted)
+        self._blocks = SoundBlocks(file, self._samples_ahead)
         self._mixer = SoundMixer(self._blocks.take, file.rate, lambda: transport.motion, self._origin)
         self._device: Any = None
         try:
-            self._device = _device(file.rate, backend)
+            self._device = _open_device(file.rate, backend)
             self.backend = str(self._device.backend)
-            given = self._given()
-            next(given)
-            self._device.start(given)
+            samples_for_device = self._device_samples()
+            next(samples_for_device)
+            self._device.start(samples_for_device)
         except Exception as error:
             self.close()
             raise NoDeviceError(", ".join(str(one) for one in error.args) or type(error).__name__) from error
@@ -118,14 +118,14 @@ class Audio:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _given(self) -> Generator[bytes, int, None]:
+    def _device_samples(self) -> Generator[bytes, int, None]:
         """What the device gets; runs in its thread."""
         samples = yield b""
         while True:
-            first = self.clock.taken(samples)
+            first = self.clock.take(samples)
             samples = yield self._mixer.fill(first, samples).tobytes()
 
-    def _wanted(self) -> Iterator[int]:
+    def _samples_ahead(self) -> Iterator[int]:
         """Samples that will be heard soon, the next one first."""
         motion, now = self.transport.motion, self.clock()
         for ahead in AHEAD:
@@ -152,13 +152,13 @@ def open_audio(
         return None
 
 
-def _device(rate: int, backend: str | None) -> Any:
+def _open_device(rate: int, backend: str | None) -> Any:
     try:
         import miniaudio
     except ImportError as error:
         raise NoDeviceError(f"the package miniaudio is missing; pip install miniaudio: {error}") from error
     silent = miniaudio.Backend.NULL
-    with _quiet():
+    with _silence_stderr():
         device = miniaudio.PlaybackDevice(
             output_format=miniaudio.SampleFormat.SIGNED16,
             nchannels=CHANNELS,
@@ -175,21 +175,21 @@ def _device(rate: int, backend: str | None) -> Any:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def _silence_stderr() -> Iterator[None]:
     """Libraries for sound on Linux write pages to standard error where there is no device."""
     if not sys.platform.startswith("linux"):
         yield
         return
     try:
-        kept = os.dup(2)
+        saved = os.dup(2)
     except OSError:  # there is no standard error
         yield
         return
     try:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 2)
-        os.close(nowhere)
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 2)
+        os.close(null)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        os.dup2(saved, 2)
+        os.close(saved)

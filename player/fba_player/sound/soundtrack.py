@@ -34,7 +34,7 @@ class FilmedSound(Protocol):
         """Give back what it holds; safe to call twice."""
 
 
-def beside(path: PathLike) -> Path | None:
+def find_sound_beside(path: PathLike) -> Path | None:
     """The WAV file of the same name beside a stream, where there is one."""
     stream = Path(path)
     for suffix in (".wav", ".WAV", ".Wav"):
@@ -113,6 +113,6 @@ class Soundtrack:
             raise FormatError(f"the sound is damaged: {error}", path=self._path) from error
 
 
-def check(path: PathLike) -> None:
+def check_sound(path: PathLike) -> None:
     """Raise FormatError where a file cannot be read as sound."""
     Soundtrack(path, Fraction(0)).close()

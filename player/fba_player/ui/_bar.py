@@ -95,14 +95,14 @@ class Bar:
         to.add_rect_filled((at - 1, top - 5), (at + 1, bottom + 3), colour)
         to.add_triangle_filled((at - 6, top - 9), (at + 6, top - 9), (at, top - 1), colour)
         if hovered or self._held:
-            self._word(session, ruler, to, top, bottom)
+            self._hover_text(session, ruler, to, top, bottom)
 
     def _drag(self, session: Session, ruler: Ruler) -> None:
         transport = session.transport
         x = imgui.get_io().mouse_pos.x
         time = ruler.time(x)
         if imgui.is_item_activated():
-            self._held = self._taken(session, ruler, x)
+            self._held = self._grabbed(session, ruler, x)
             self._from = time
         if not imgui.is_item_active():
             self._held = ""
@@ -111,14 +111,14 @@ class Bar:
         if self._held == "head":
             transport.seek(min(time, ruler.high))
         elif self._held == "in":
-            transport.mark_in = min(time, _before(transport.mark_out))
+            transport.mark_in = min(time, _just_before(transport.mark_out))
         elif self._held == "out":
-            transport.mark_out = max(time, _after(transport.mark_in))
+            transport.mark_out = max(time, _just_after(transport.mark_in))
         elif self._held == "range" and abs(ruler.x(self._from) - x) > 3:
             transport.clear_marks()
             transport.mark_in, transport.mark_out = min(self._from, time), max(self._from, time)
 
-    def _taken(self, session: Session, ruler: Ruler, x: float) -> str:
+    def _grabbed(self, session: Session, ruler: Ruler, x: float) -> str:
         if imgui.is_mouse_down(1):
             return "range"
         marks = {"in": session.transport.mark_in, "out": session.transport.mark_out}
@@ -138,7 +138,7 @@ class Bar:
         key = (trace, size, ruler.low, ruler.high)
         if self._trace[:-1] != key:
             picture = trace_picture(trace, ruler.low, ruler.high, size)
-            self._trace = (*key, self._renderer.keep("trace", picture))
+            self._trace = (*key, self._renderer.set_picture("trace", picture))
         image: Any = self._trace[-1]
         to = imgui.get_window_draw_list()
         to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK))
@@ -176,7 +176,9 @@ class Bar:
                 to.path_line_to((at_x, at_y))
             to.path_stroke(colour, thickness=2.5)
 
-    def _word(self, session: Session, ruler: Ruler, to: imgui.ImDrawList, top: float, bottom: float) -> None:
+    def _hover_text(
+        self, session: Session, ruler: Ruler, to: imgui.ImDrawList, top: float, bottom: float
+    ) -> None:
         """What is under the mouse: time, frame, and the plane's kind and bits."""
         x = min(max(imgui.get_io().mouse_pos.x, ruler.left), ruler.right)
         time = ruler.time(x)
@@ -215,9 +217,9 @@ def _span(session: Session) -> tuple[float, float]:
     return start, max(float(timeline.time_of(timeline.frames - 1)), start)
 
 
-def _before(mark: float | None) -> float:
+def _just_before(mark: float | None) -> float:
     return math.inf if mark is None else mark - 1e-3
 
 
-def _after(mark: float | None) -> float:
+def _just_after(mark: float | None) -> float:
     return -math.inf if mark is None else mark + 1e-3

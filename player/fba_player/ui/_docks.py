@@ -19,7 +19,7 @@ NARROWEST = 280.0
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class DockRequest:
     """What a panel would like: its side, width and height, and the least height that it is of use with."""
 
     name: str
@@ -46,69 +46,69 @@ class Docks:
     def __init__(self) -> None:
         self._sides: dict[str, str] = {}
         self._used: list[str] = []
-        self._kept: tuple[object, dict[str, Dock]] = ((), {})
+        self._arranged: tuple[object, dict[str, Dock]] = ((), {})
 
     def use(self, name: str) -> None:
         """The user works with it: others are folded before it."""
         if name in self._sides and self._used[-1:] != [name]:
             self._used = [*(one for one in self._used if one != name), name]
-            self._kept = ((), {})
+            self._arranged = ((), {})
 
-    def arrange(self, wishes: list[Wish], wide: float, top: float, high: float) -> dict[str, Dock]:
+    def arrange(self, requests: list[DockRequest], wide: float, top: float, high: float) -> dict[str, Dock]:
         """Places in a display `wide` points wide, of which `high` points from `top` on are free.
 
         Those for whose title there is no room are left out.
         """
-        key = (tuple(wishes), wide, top, high)
-        if self._kept[0] == key:
-            return self._kept[1]
-        names = {wish.name for wish in wishes}
+        key = (tuple(requests), wide, top, high)
+        if self._arranged[0] == key:
+            return self._arranged[1]
+        names = {request.name for request in requests}
         self._sides = {name: side for name, side in self._sides.items() if name in names}
         self._used = [name for name in self._used if name in names]
         room = wide - 2 * EDGE
         middle = max(MIDDLE * wide, LEAST_MIDDLE)
         both = room - middle >= 2 * NARROWEST
-        columns: dict[str, list[Wish]] = {"left": [], "right": []}
+        columns: dict[str, list[DockRequest]] = {"left": [], "right": []}
         known = [name for name in self._sides if name in names]  # in the order of their opening
-        for wish in sorted(
-            wishes, key=lambda one: known.index(one.name) if one.name in known else len(known)
+        for request in sorted(
+            requests, key=lambda one: known.index(one.name) if one.name in known else len(known)
         ):
-            if wish.name not in self._sides:
-                self._sides[wish.name] = _side(wish, columns, high)
-                self._used.append(wish.name)
-            columns[self._sides[wish.name] if both else "right"].append(wish)
+            if request.name not in self._sides:
+                self._sides[request.name] = _side(request, columns, high)
+                self._used.append(request.name)
+            columns[self._sides[request.name] if both else "right"].append(request)
         widths = {side: max((one.width for one in column), default=0.0) for side, column in columns.items()}
         most = max(room - middle, min(room, NARROWEST))
         if sum(widths.values()) > most:
             half = max(most / 2, most - min(widths.values()))
             widths = {side: min(own, half) for side, own in widths.items()}
-        found: dict[str, Dock] = {}
+        docks: dict[str, Dock] = {}
         for side, column in columns.items():
             left = EDGE if side == "left" else wide - EDGE - widths[side]
-            found |= self._column(column, left, widths[side], top, high)
-        self._kept = (key, found)
-        return found
+            docks |= self._column(column, left, widths[side], top, high)
+        self._arranged = (key, docks)
+        return docks
 
     def _column(
-        self, column: list[Wish], left: float, wide: float, top: float, high: float
+        self, column: list[DockRequest], left: float, wide: float, top: float, high: float
     ) -> dict[str, Dock]:
         folded: set[str] = set()
         for name in self._used:
-            if _least(column, folded) <= high or len(folded) >= len(column) - 1:
+            if _least_height(column, folded) <= high or len(folded) >= len(column) - 1:
                 break
-            if any(wish.name == name for wish in column):
+            if any(request.name == name for request in column):
                 folded.add(name)
-        heights = _shared([TITLE if one.name in folded else one.least for one in column],
+        heights = _share_height([TITLE if one.name in folded else one.least for one in column],
                           [TITLE if one.name in folded else one.height for one in column],
                           high - _gaps(column, folded))  # fmt: skip
-        found, y = {}, top
-        for wish, height in zip(column, heights, strict=True):
+        docks, y = {}, top
+        for request, height in zip(column, heights, strict=True):
             left_over = top + high - y
             if left_over < TITLE:
                 break
-            found[wish.name] = Dock(left, y, wide, min(height, left_over), wish.name in folded)
-            y += height + (CLOSE if wish.name in folded else GAP)
-        return found
+            docks[request.name] = Dock(left, y, wide, min(height, left_over), request.name in folded)
+            y += height + (CLOSE if request.name in folded else GAP)
+        return docks
 
 
 def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
@@ -122,30 +122,30 @@ def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
     return left, right
 
 
-def _side(wish: Wish, columns: dict[str, list[Wish]], high: float) -> str:
+def _side(request: DockRequest, columns: dict[str, list[DockRequest]], high: float) -> str:
     """Its own side, or the other: where all fit as they like, else where they fit, else the emptier."""
-    own, other = wish.side, "right" if wish.side == "left" else "left"
-    for size in (_most, _least):
+    own, other = request.side, "right" if request.side == "left" else "left"
+    for size in (_liked_height, _least_height):
         for side in (own, other):
-            if size([*columns[side], wish], set()) <= high:
+            if size([*columns[side], request], set()) <= high:
                 return side
-    return min((own, other), key=lambda side: _least(columns[side], set()))
+    return min((own, other), key=lambda side: _least_height(columns[side], set()))
 
 
-def _most(column: list[Wish], folded: set[str]) -> float:
-    return sum(wish.height for wish in column) + _gaps(column, folded)
+def _liked_height(column: list[DockRequest], folded: set[str]) -> float:
+    return sum(request.height for request in column) + _gaps(column, folded)
 
 
-def _least(column: list[Wish], folded: set[str]) -> float:
-    heights = [TITLE if wish.name in folded else min(wish.least, wish.height) for wish in column]
+def _least_height(column: list[DockRequest], folded: set[str]) -> float:
+    heights = [TITLE if request.name in folded else min(request.least, request.height) for request in column]
     return sum(heights) + _gaps(column, folded)
 
 
-def _gaps(column: list[Wish], folded: set[str]) -> float:
-    return sum(CLOSE if wish.name in folded else GAP for wish in column[:-1])
+def _gaps(column: list[DockRequest], folded: set[str]) -> float:
+    return sum(CLOSE if request.name in folded else GAP for request in column[:-1])
 
 
-def _shared(least: list[float], most: list[float], room: float) -> list[float]:
+def _share_height(least: list[float], most: list[float], room: float) -> list[float]:
     """Heights between the least and what is liked, the room beyond the least shared by what is missing."""
     least = [min(low, high) for low, high in zip(least, most, strict=True)]
     missing = sum(most) - sum(least)

@@ -121,7 +121,7 @@ def muted(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> No
         to.add_line(low, high, colour, thickness=0.18 * r)
 
 
-def whole(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
+def full_screen(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
     """Full screen: four corners."""
     for side, way in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
         to.path_clear()

@@ -41,7 +41,7 @@ class ImguiRenderer:
             fragment_shader=(folder / "panels.frag").read_text(encoding="utf-8"),
         )
         self._textures: dict[int, Any] = {}
-        self._kept: dict[str, int] = {}
+        self._named_textures: dict[str, int] = {}
         self._vertices: Any = None
         self._indices: Any = None
         self._array: Any = None
@@ -81,15 +81,15 @@ class ImguiRenderer:
         gl.scissor = None
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA
 
-    def keep(self, name: str, pixels: UInt8) -> imgui.ImTextureRef:
+    def set_picture(self, name: str, pixels: UInt8) -> imgui.ImTextureRef:
         """A picture, uint8 (H, W, 4), for imgui to draw; it takes the place of the last of that name."""
         height, width = pixels.shape[:2]
         made = self._gl.texture((width, height), 4, np.ascontiguousarray(pixels).tobytes())
         made.filter = (self._gl.LINEAR, self._gl.LINEAR)
         made.repeat_x = made.repeat_y = False
-        if name in self._kept:
-            self._textures.pop(self._kept[name]).release()
-        self._kept[name] = made.glo
+        if name in self._named_textures:
+            self._textures.pop(self._named_textures[name]).release()
+        self._named_textures[name] = made.glo
         self._textures[made.glo] = made
         return imgui.ImTextureRef(made.glo)
 

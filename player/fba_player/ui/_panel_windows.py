@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from fba_player.session.session import Session
-from fba_player.ui._docks import EDGE, GAP, Dock, Docks, Wish, free_middle
+from fba_player.ui._docks import EDGE, GAP, Dock, DockRequest, Docks, free_middle
 from fba_player.ui.panels.panel import Panel
 
 TOP = 56.0
@@ -20,7 +20,7 @@ OVER = 0.985
 """How opaque a panel is that covers others."""
 
 
-class Places:
+class PanelWindows:
     """Where panels are: in columns, until the user drags one away by its title.
 
     A click on the title of a folded one unfolds it; a double click on the title of one that was moved brings
@@ -42,7 +42,7 @@ class Places:
         if room < 60 or wide < 120:
             return
         docked = [one for one in panels if one.side != "middle" and one.name not in self._moved]
-        docks = self._docks.arrange([self._wish(one) for one in docked], wide, TOP, room)
+        docks = self._docks.arrange([self._request(one) for one in docked], wide, TOP, room)
         self.sides = free_middle(docks.values(), wide)
         for panel in panels:
             if panel in docked:
@@ -55,11 +55,11 @@ class Places:
         """These have been closed, and open where they belong again."""
         self._moved -= names
 
-    def _wish(self, panel: Panel) -> Wish:
+    def _request(self, panel: Panel) -> DockRequest:
         height = panel.height
         if panel.fitted:
             height = self._needed.get(panel.name, height)
-        return Wish(panel.name, panel.side, panel.width, height, panel.least)
+        return DockRequest(panel.name, panel.side, panel.width, height, panel.least)
 
     def _draw_docked(self, panel: Panel, session: Session, dock: Dock) -> None:
         imgui.set_next_window_pos((dock.left, dock.top))
@@ -82,7 +82,7 @@ class Places:
     def _window(self, panel: Panel, session: Session, flags: int, *, folded: bool) -> bool:
         """Draw one; False where it is to be closed."""
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (32, 1))
-        expanded, kept = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
+        expanded, stays_open = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
         imgui.pop_style_var()
         if expanded and not folded:
             panel.draw(session)
@@ -91,18 +91,18 @@ class Places:
                 self._needed[panel.name] = (
                     imgui.get_cursor_pos_y() - style.item_spacing.y + style.window_padding.y
                 )
-        self._hold(panel, folded=folded)
+        self._handle_title(panel, folded=folded)
         imgui.end()
-        return bool(kept)
+        return bool(stays_open)
 
-    def _hold(self, panel: Panel, *, folded: bool) -> None:
+    def _handle_title(self, panel: Panel, *, folded: bool) -> None:
         """What the mouse does with the title, and which panel is in use."""
         name = panel.name
         focused = imgui.is_window_focused(imgui.FocusedFlags_.root_and_child_windows)
         if focused and self._focused != name:  # clicked, or opened
             self._focused = name
             self._docks.use(name)
-        if not self._on_title():
+        if not self._holds_title():
             return
         if name in self._moved:
             if imgui.is_mouse_double_clicked(0):
@@ -110,10 +110,10 @@ class Places:
         elif imgui.is_mouse_dragging(0):
             self._moved.add(name)
             if folded:
-                imgui.set_window_size((panel.width, self._wish(panel).height))
+                imgui.set_window_size((panel.width, self._request(panel).height))
 
     @staticmethod
-    def _on_title() -> bool:
+    def _holds_title() -> bool:
         """Whether the mouse has hold of the title of the window that is being drawn."""
         x, y = imgui.get_window_pos()
         start_x, start_y = imgui.get_mouse_pos() - imgui.get_mouse_drag_delta(0)

@@ -79,7 +79,7 @@ class Buttons:
         transport = session.transport
         size, gap = 30.0, 4.0
         signs = [
-            ("fullscreen", icons.whole, "full screen", False),
+            ("fullscreen", icons.full_screen, "full screen", False),
             ("record", icons.record, "record to an MP4 file", session.recording is not None),
             ("screenshot", icons.camera, "picture of the view", False),
             (
@@ -129,13 +129,13 @@ class Buttons:
             imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp,
         )
         if changed:
-            transport.set_speed(snapped(speed))
+            transport.set_speed(snap_speed(speed))
         if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
             transport.set_speed(1.0)
         tooltip("speed; double click for normal", f"{key_of('slower')} {key_of('faster')}")
 
 
-def snapped(speed: float) -> float:
+def snap_speed(speed: float) -> float:
     """A speed of the slider: one of the steps where it is near one, else with two digits."""
     speed = min(max(speed, SPEEDS[0]), SPEEDS[-1])
     near = min(SPEEDS, key=lambda step: abs(math.log(step / speed)))

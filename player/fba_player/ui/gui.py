@@ -12,7 +12,7 @@ from fba_player.ui import theme
 from fba_player.ui._bar import Bar
 from fba_player.ui._hud import draw_buttons, draw_name, draw_notices, draw_recording
 from fba_player.ui._imgui_renderer import ImguiRenderer
-from fba_player.ui._panel_windows import Places
+from fba_player.ui._panel_windows import PanelWindows
 from fba_player.ui.panels.registry import make_panels
 
 HIDES = 3.0
@@ -45,7 +45,7 @@ class Gui:
         self._renderer = ImguiRenderer(context)
         self.bar = Bar(self._renderer)
         self.panels = make_panels()
-        self._places = Places()
+        self._panel_windows = PanelWindows()
         self._open: set[str] = set()
         self._cover()
         session.viewpoint.camera = session.viewpoint.beginning
@@ -88,7 +88,7 @@ class Gui:
         if not session.bare:
             self._draw_all(display, io)
         if session.recording is None:  # a film does not move because a panel is opened
-            sides = (0.0, 0.0) if session.bare else self._places.sides
+            sides = (0.0, 0.0) if session.bare else self._panel_windows.sides
             session.viewpoint.uncover(*sides, smoothly=self.hides)
         draw_notices(session, display, self.bar.height(display) * self.shown if not session.bare else 0.0)
         self._popups()
@@ -134,7 +134,7 @@ class Gui:
             draw_name(session, display, taken, draw_buttons(session, there, display) - 20)
             imgui.pop_style_var()
         gone = self._open - session.open
-        self._places.forget(gone)
+        self._panel_windows.forget(gone)
         for panel in self.panels:
             if panel.name in gone:
                 panel.closed(session)
@@ -142,7 +142,7 @@ class Gui:
                 session.open.discard(panel.name)
                 session.say(f"{panel.title}: there is nothing to show here", "warning")
         there = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
-        self._places.draw(there, session, display, below)
+        self._panel_windows.draw(there, session, display, below)
         self._open = set(session.open)
 
     def _hide(self, io: imgui.IO) -> None:

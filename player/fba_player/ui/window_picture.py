@@ -105,7 +105,7 @@ class Studio:
 
 def picture(session: Session, panels: tuple[str, ...] = ()) -> UInt8:
     """The session's window with these panels open: uint8 (H, W, 4), top row first."""
-    session.source.look(wait=True)
+    session.source.probe(wait=True)
     session.open |= set(panels)
     with Studio(session) as studio:
         return studio.draw(SETTLES).copy()

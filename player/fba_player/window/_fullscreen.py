@@ -13,14 +13,14 @@ class FullScreen:
         self._before: tuple[int, int, int, int] | None = None
 
     @property
-    def whole(self) -> bool:
+    def active(self) -> bool:
         """Whether it covers a monitor."""
         return bool(self._glfw.get_window_monitor(self._window))
 
     def toggle(self) -> None:
         """Cover the monitor on which most of the window is, or go back to where it was."""
         glfw, window = self._glfw, self._window
-        if self.whole:
+        if self.active:
             x, y, wide, high = self._before or (60, 60, 1280, 720)
             glfw.set_window_monitor(window, None, x, y, wide, high, 0)
             return

@@ -9,7 +9,7 @@ from typing import Any
 from fba_player.session.controls import Controls
 from fba_player.session.session import Session
 
-SHAPES = {
+CURSORS = {
     "text_input": "IBEAM_CURSOR",
     "hand": "HAND_CURSOR",
     "resize_ew": "HRESIZE_CURSOR",
@@ -17,7 +17,7 @@ SHAPES = {
 }
 """glfw's name of imgui's cursors; an arrow for all others."""
 BUTTONS = ("left", "right", "middle")
-NAMED = {
+KEY_NAMES = {
     "SPACE": "space", "LEFT": "left", "RIGHT": "right", "UP": "up", "DOWN": "down", "HOME": "home",
     "END": "end", "ESCAPE": "esc", "ENTER": "enter", "TAB": "tab", "BACKSPACE": "backspace",
     "DELETE": "delete", "KP_ADD": "+", "KP_SUBTRACT": "-", "EQUAL": "+", "MINUS": "-",
@@ -25,7 +25,7 @@ NAMED = {
     **{f"KP_{number}": str(number) for number in range(10)},
 }  # fmt: skip
 """Keys that bear no letter, by glfw's name; and those that mean the same on every keyboard."""
-PLACES = {
+US_LAYOUT = {
     "LEFT_BRACKET": "[", "RIGHT_BRACKET": "]", "BACKSLASH": "\\",
     **{str(number): str(number) for number in range(10)},
     **{letter: letter.lower() for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"},
@@ -36,7 +36,7 @@ PLACES = {
 class GlfwInput:
     """Hears a glfw window's events and hands them to the panels and the controls.
 
-    gui: a `fba_player.ui.gui.Gui`, or None where there are no panels. heard: called after each event that may
+    gui: a `fba_player.ui.gui.Gui`, or None where there are no panels. on_input: called after each event that may
     change the picture.
     """
 
@@ -47,14 +47,14 @@ class GlfwInput:
         session: Session,
         controls: Controls,
         gui: Any,
-        heard: Callable[[], None],
+        on_input: Callable[[], None],
     ) -> None:
         self._glfw, self._window = glfw, window
         self._session, self._controls, self._gui = session, controls, gui
-        self._heard = heard
-        self._named = {getattr(glfw, f"KEY_{name}"): word for name, word in NAMED.items()}
-        self._places = {getattr(glfw, f"KEY_{name}"): word for name, word in PLACES.items()}
-        self._shape = "arrow"
+        self._on_input = on_input
+        self._key_names = {getattr(glfw, f"KEY_{name}"): word for name, word in KEY_NAMES.items()}
+        self._us_layout = {getattr(glfw, f"KEY_{name}"): word for name, word in US_LAYOUT.items()}
+        self._cursor = "arrow"
         self._cursors: dict[str, Any] = {}
         self._imgui_keys: dict[int, Any] = _imgui_keys(glfw) if gui is not None else {}
         glfw.set_key_callback(window, self.on_key)
@@ -65,14 +65,14 @@ class GlfwInput:
         glfw.set_scroll_callback(window, self.on_scroll)
         glfw.set_window_focus_callback(window, self.on_focus)
         glfw.set_drop_callback(window, self.on_drop)
-        glfw.set_framebuffer_size_callback(window, lambda *_: heard())
-        glfw.set_window_refresh_callback(window, lambda *_: heard())
+        glfw.set_framebuffer_size_callback(window, lambda *_: on_input())
+        glfw.set_window_refresh_callback(window, lambda *_: on_input())
 
     def on_key(self, window: Any, key: int, code: int, action: int, modifiers: int) -> None:
         """A key went down, is held, or went up."""
         glfw = self._glfw
         if self._gui is not None:
-            self._tell_imgui(key, action, modifiers)
+            self._send_key_to_imgui(key, action, modifiers)
             if action != glfw.RELEASE and self._gui.io.want_text_input:
                 return
         if action == glfw.RELEASE:
@@ -80,18 +80,18 @@ class GlfwInput:
         name = self.name(key, code, modifiers)
         if name is not None:
             self._controls.key(name, held=action == glfw.REPEAT)
-        self._heard()
+        self._on_input()
 
     def on_drop(self, window: Any, paths: list[str]) -> None:
         """Files were dropped onto the window: it closes, for them to be opened, if they can be."""
-        self._session.drop(tuple(Path(_text(path)) for path in paths))
-        self._heard()
+        self._session.drop(tuple(Path(_decode(path)) for path in paths))
+        self._on_input()
 
     def on_character(self, window: Any, character: int) -> None:
         """A character was typed."""
         if self._gui is not None:
             self._gui.io.add_input_character(character)
-            self._heard()
+            self._on_input()
 
     def on_button(self, window: Any, button: int, action: int, modifiers: int) -> None:
         """A mouse button went down or up."""
@@ -104,7 +104,7 @@ class GlfwInput:
             self._controls.press(BUTTONS[button], *self.pixels(*self._glfw.get_cursor_pos(window)))
         else:
             self._controls.release()
-        self._heard()
+        self._on_input()
 
     def on_move(self, window: Any, x: float, y: float) -> None:
         """The mouse moved; x, y in the window's own units."""
@@ -115,13 +115,13 @@ class GlfwInput:
             self._gui.io.add_mouse_pos_event(right / scale, down / scale)
         else:
             self._controls.move(right, down)
-        self._heard()
+        self._on_input()
 
     def on_enter(self, window: Any, entered: int) -> None:
         """The mouse came into the window or left it."""
         if self._gui is not None and not entered:
             self._gui.io.add_mouse_pos_event(-3.4e38, -3.4e38)
-        self._heard()
+        self._on_input()
 
     def on_scroll(self, window: Any, right: float, up: float) -> None:
         """The wheel was turned."""
@@ -130,25 +130,25 @@ class GlfwInput:
             self._gui.io.add_mouse_wheel_event(right, up)
         else:
             self._controls.scroll(up)
-        self._heard()
+        self._on_input()
 
     def on_focus(self, window: Any, focused: int) -> None:
         """The window got the keyboard or lost it."""
         if self._gui is not None:
             self._gui.io.add_focus_event(bool(focused))
 
-    def point(self, *, hidden: bool) -> None:
+    def set_cursor(self, *, hidden: bool) -> None:
         """Give the mouse the shape that fits what is under it, or hide it."""
         glfw = self._glfw
         shape = "hidden" if hidden else self._gui.cursor if self._gui is not None else "arrow"
-        if shape == self._shape:
+        if shape == self._cursor:
             return
-        self._shape = shape
+        self._cursor = shape
         mode = glfw.CURSOR_HIDDEN if hidden else glfw.CURSOR_NORMAL
         glfw.set_input_mode(self._window, glfw.CURSOR, mode)
         if hidden:
             return
-        kind = SHAPES.get(shape)
+        kind = CURSORS.get(shape)
         if kind is not None and shape not in self._cursors:
             self._cursors[shape] = glfw.create_standard_cursor(getattr(glfw, kind))
         glfw.set_cursor(self._window, self._cursors.get(shape))
@@ -156,12 +156,12 @@ class GlfwInput:
     def name(self, key: int, code: int, modifiers: int) -> str | None:
         """A key's name in the table of keys: "space", "l", "shift+left", "ctrl+s"; None for none."""
         glfw = self._glfw
-        word = self._named.get(key)
+        word = self._key_names.get(key)
         if word is None:
             text = glfw.get_key_name(key, code)  # what the user's own keyboard layout has there
-            word = _text(text).lower() if text else None
-            if word is None or (key in self._places and not self._known(word)):
-                word = self._places.get(key, word)
+            word = _decode(text).lower() if text else None
+            if word is None or (key in self._us_layout and not self._has_meaning(word)):
+                word = self._us_layout.get(key, word)
         if word is None:
             return None
         control = modifiers & (glfw.MOD_CONTROL | glfw.MOD_SUPER)
@@ -174,14 +174,14 @@ class GlfwInput:
         size = self._glfw.get_framebuffer_size(self._window)
         return x * size[0] / max(wide, 1), y * size[1] / max(high, 1)
 
-    def _known(self, word: str) -> bool:
+    def _has_meaning(self, word: str) -> bool:
         from fba_player.session.keys import by_name
 
         return word in by_name() or any(
             self._session.switch_key(one).lower() == word for one in self._session.switch_table().values()
         )
 
-    def _tell_imgui(self, key: int, action: int, modifiers: int) -> None:
+    def _send_key_to_imgui(self, key: int, action: int, modifiers: int) -> None:
         from imgui_bundle import imgui
 
         glfw, io = self._glfw, self._gui.io
@@ -211,5 +211,5 @@ def _imgui_keys(glfw: Any) -> dict[int, Any]:
     return {getattr(glfw, f"KEY_{name}"): getattr(imgui.Key, word) for name, word in words.items()}
 
 
-def _text(value: bytes | str) -> str:
+def _decode(value: bytes | str) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -15,7 +15,7 @@ from fba_player.gl.renderer import Renderer
 from fba_player.gl.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
 from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
-from fba_player.session.captures import Keeper, pixels_of, still
+from fba_player.session.captures import Captures, draw_screenshot, read_pixels
 from fba_player.session.controls import Controls
 from fba_player.session.session import Session
 from fba_player.session.source import Source
@@ -23,7 +23,7 @@ from fba_player.view.camera import Camera
 from fba_player.window._fullscreen import FullScreen
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._plain_overlay import Overlay
-from fba_player.window.display import HOW_WITHOUT, started_glfw
+from fba_player.window.display import HOW_WITHOUT, start_glfw
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
@@ -68,7 +68,7 @@ class Window:
             raise ValueError(f"a window must have at least 1x1 pixels, not {size[0]}x{size[1]}")
         timeline = scene.timeline
         self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=camera, size=size)
-        self.keeper = Keeper(self.session, folder)
+        self.captures = Captures(self.session, folder)
         self.pictures = 0
         self._title = title or scene.title or "fba"
         self._shown_title = ""
@@ -79,19 +79,19 @@ class Window:
         self._gl: Any = None
         self._window: Any = None
         self._problems: list[str] = []
-        self._due, self._restless = SETTLES, False
+        self._pictures_due, self._restless = SETTLES, False
         self._timeline = timeline
         self._arrived = timeline.arrived
         self._doubted = False
         self._last = wall.perf_counter()
-        self._glfw = started_glfw(self._problems)
+        self._glfw = start_glfw(self._problems)
         try:
             self._open(size)
-            self._furnish(panels)
+            self._make_panels(panels)
         except Exception:
             self.close()
             raise
-        self.session.source.look()
+        self.session.source.probe()
 
     @property
     def transport(self) -> Transport:
@@ -103,7 +103,7 @@ class Window:
         while self.update():
             pass
 
-    def _doubt(self) -> None:
+    def _warn_of_bap_steps(self) -> None:
         """Warn once where an arriving stream looks as if it was made with another table of BAP steps."""
         timeline = self._timeline
         if isinstance(timeline, LiveTimeline) and timeline.animation.doubt and not self._doubted:
@@ -114,30 +114,30 @@ class Window:
         """Handle the input and draw one picture, or wait where nothing moves. False once closed."""
         glfw, session = self._glfw, self.session
         begun = wall.perf_counter()
-        self._doubt()
+        self._warn_of_bap_steps()
         arrived = self._timeline.arrived  # more of a stream makes the line longer, while paused too
         restless = session.restless
-        if restless or self._restless or session.source.looking or arrived != self._arrived:
-            self._due, self._arrived = max(self._due, 1), arrived
+        if restless or self._restless or session.source.probing or arrived != self._arrived:
+            self._pictures_due, self._arrived = max(self._pictures_due, 1), arrived
         self._restless = restless  # one more picture when all has come to rest
-        if self._due:
+        if self._pictures_due:
             glfw.poll_events()
         else:
             glfw.wait_events_timeout(IDLE)
         if glfw.window_should_close(self._window) and not session.closing:
             session.leave()
             glfw.set_window_should_close(self._window, session.closing)
-            self._heard()
+            self._redraw()
         if session.closing:
             return False
-        if not self._due:
+        if not self._pictures_due:
             return True
         size = self._framebuffer()
         if size[0] < 1 or size[1] < 1:  # minimised
             glfw.wait_events_timeout(IDLE)
             return True
-        self._due -= 1
-        self._picture(size)
+        self._pictures_due -= 1
+        self._draw_checked(size)
         glfw.swap_buffers(self._window)
         self.pictures += 1
         left = FASTEST - (wall.perf_counter() - begun)
@@ -148,7 +148,7 @@ class Window:
     def close(self) -> None:
         """Finish a film that is being recorded, close the window, give all back; safe to call twice."""
         try:
-            self.keeper.close()
+            self.captures.close()
         finally:
             for part in (self._gui, self._overlay, self._renderer, self._target):
                 if part is not None:
@@ -202,7 +202,7 @@ class Window:
             ) from error
         self._renderer = Renderer(self._gl)
 
-    def _furnish(self, panels: bool) -> None:
+    def _make_panels(self, panels: bool) -> None:
         """The panels, or the plain timeline in their place; and who hears the input."""
         session = self.session
         session.size, session.scale = self._framebuffer(), self._scale()
@@ -223,11 +223,11 @@ class Window:
             self._overlay = Overlay(self._gl)
         else:
             self.controls = self._gui.controls
-        self._screen = FullScreen(self._glfw, self._window)
-        self.input = GlfwInput(self._glfw, self._window, session, self.controls, self._gui, self._heard)
+        self._full_screen = FullScreen(self._glfw, self._window)
+        self.input = GlfwInput(self._glfw, self._window, session, self.controls, self._gui, self._redraw)
 
-    def _heard(self) -> None:
-        self._due = SETTLES
+    def _redraw(self) -> None:
+        self._pictures_due = SETTLES
 
     def _reason(self, otherwise: str) -> str:
         return self._problems[-1] if self._problems else otherwise
@@ -240,7 +240,7 @@ class Window:
         """Pixels a point: 1 on plain displays, 2 on dense ones."""
         return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
 
-    def _picture(self, size: tuple[int, int]) -> None:
+    def _draw_checked(self, size: tuple[int, int]) -> None:
         """Draw. Raises DisplayError on an OpenGL error that cannot be recovered from."""
         try:
             self._draw(size)
@@ -252,7 +252,7 @@ class Window:
 
     def _draw(self, size: tuple[int, int]) -> None:
         session = self.session
-        session.size, session.scale, session.whole_screen = size, self._scale(), self._screen.whole
+        session.size, session.scale, session.full_screen = size, self._scale(), self._full_screen.active
         session.viewpoint.aspect = size[0] / size[1]
         if self._target is None or self._target.size != size:
             if self._target is not None:
@@ -260,12 +260,12 @@ class Window:
             self._target = Target(self._gl, size, samples=0)
         assert self._renderer is not None
         time = self.transport.time
-        self.keeper.moment()
+        self.captures.begin_picture()
         self._target.begin()
         within = self._renderer.draw(session.view(time), session.camera(time), size)
         self._target.finish(self._gl.screen, within)
-        self.keeper.picture(lambda: pixels_of(self._gl.screen, size))
-        self._fulfil()
+        self.captures.add_picture(lambda: read_pixels(self._gl.screen, size))
+        self._handle_requests()
         self._gl.screen.use()
         self._gl.viewport = (0, 0, *size)
         now = wall.perf_counter()
@@ -274,30 +274,32 @@ class Window:
         elif self._overlay is not None and not session.bare:
             self._overlay.draw(self.controls)
         self._last = now
-        self.input.point(hidden=self.transport.playing and self._screen.whole and session.idle > IDLE_MOUSE)
+        self.input.set_cursor(
+            hidden=self.transport.playing and self._full_screen.active and session.idle > IDLE_MOUSE
+        )
         self._show_title()
 
-    def _fulfil(self) -> None:
+    def _handle_requests(self) -> None:
         """What the user asked for, which needs the picture or the window."""
         session = self.session
-        while session.wishes:
-            wish = session.wishes.popleft()
-            if wish in ("screenshot", "transparent"):
-                self._screenshot(transparent=wish == "transparent")
-            elif wish == "record":
-                self.keeper.toggle_recording()
-            elif wish == "fullscreen":
-                self._screen.toggle()
-            self._heard()
+        while session.requests:
+            request = session.requests.popleft()
+            if request in ("screenshot", "transparent"):
+                self._screenshot(transparent=request == "transparent")
+            elif request == "record":
+                self.captures.toggle_recording()
+            elif request == "fullscreen":
+                self._full_screen.toggle()
+            self._redraw()
 
     def _screenshot(self, *, transparent: bool) -> None:
         assert self._renderer is not None
         try:
-            pixels = still(self._gl, self._renderer, self.session, transparent=transparent)
+            pixels = draw_screenshot(self._gl, self._renderer, self.session, transparent=transparent)
         except DisplayError as error:
             self.session.say(f"No picture could be drawn: {error}", "error", 8.0)
             return
-        self.keeper.screenshot(pixels, transparent=transparent)
+        self.captures.screenshot(pixels, transparent=transparent)
 
     def _show_title(self) -> None:
         text = f"{self._title} - frame {self.transport.frame + 1} / {self.session.scene.timeline.frames}"

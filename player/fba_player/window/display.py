@@ -15,10 +15,10 @@ HOW_WITHOUT = (
 
 def check_display() -> None:
     """Raises DisplayError, which says what to do, where no window can be opened. Takes no time."""
-    started_glfw([]).terminate()
+    start_glfw([]).terminate()
 
 
-def started_glfw(problems: list[str]) -> Any:
+def start_glfw(problems: list[str]) -> Any:
     """The module glfw, ready for a window. What it reports from now on is added to problems.
 
     Raises DisplayError where it is not installed or finds no display.
@@ -30,12 +30,12 @@ def started_glfw(problems: list[str]) -> Any:
             f"the window needs the Python package glfw, which cannot be used: {error}. "
             f"{cure(error, 'glfw')}. {HOW_WITHOUT}"
         ) from error
-    glfw.set_error_callback(lambda code, text: problems.append(_text(text)))
+    glfw.set_error_callback(lambda code, text: problems.append(_decode(text)))
     if not glfw.init():
         reason = problems[-1] if problems else "there is no display"
         raise DisplayError(f"no window can be opened: {reason}. {HOW_WITHOUT}")
     return glfw
 
 
-def _text(value: bytes | str) -> str:
+def _decode(value: bytes | str) -> str:
     return value.decode(errors="replace") if isinstance(value, bytes) else value

@@ -74,7 +74,7 @@ def play(
             window.session.say(text, "warning", WARNED)
         with contextlib.ExitStack() as stack:
             if audio is not None:
-                sound = _sounded(window.session, audio, audio_offset)
+                sound = _add_sound(window.session, audio, audio_offset)
                 if sound is not None:
                     stack.enter_context(sound)
             if start is not None:
@@ -85,7 +85,7 @@ def play(
         return window.session.dropped
 
 
-def _sounded(session: Session, path: PathLike, offset: float) -> Audio | None:
+def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
     """The session has a sound from now on; None where nobody hears it, which the user is told."""
     from fba_player.sound.player import open_audio
 

@@ -10,7 +10,7 @@ import pytest
 from fba.animation import Animation
 from fba.errors import RangeError
 from fba.player import Offscreen, Scene
-from fba_player.export.film_sheet import chosen, columns_of, film_sheet
+from fba_player.export.film_sheet import choose_columns, choose_frames, film_sheet
 from player_tracks import face_track
 
 
@@ -22,20 +22,20 @@ def uneven() -> Scene:
 
 
 def test_frames_at_even_distances_in_time(uneven: Scene) -> None:
-    assert chosen(uneven, 2, None, None) == [0, 4]
-    assert chosen(uneven, 3, None, None) == [0, 3, 4]  # the one nearest to 0.5 s
-    assert chosen(uneven, 1, None, None) == [0]
-    assert chosen(uneven, 50, None, None) == [0, 1, 2, 3, 4]
-    assert chosen(uneven, 2, 0.1, 0.3) == [1, 3]
+    assert choose_frames(uneven, 2, None, None) == [0, 4]
+    assert choose_frames(uneven, 3, None, None) == [0, 3, 4]  # the one nearest to 0.5 s
+    assert choose_frames(uneven, 1, None, None) == [0]
+    assert choose_frames(uneven, 50, None, None) == [0, 1, 2, 3, 4]
+    assert choose_frames(uneven, 2, 0.1, 0.3) == [1, 3]
     with pytest.raises(RangeError, match=r"0 s to 1 s"):
-        chosen(uneven, 2, 0.4, 0.9)
+        choose_frames(uneven, 2, 0.4, 0.9)
     with pytest.raises(ValueError, match="numbers"):
-        chosen(uneven, 2, float("nan"), None)
+        choose_frames(uneven, 2, float("nan"), None)
 
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (2, 2), (4, 2), (12, 4), (16, 4), (20, 5)])
 def test_sheets_have_no_gaps_where_they_can(count: int, columns: int) -> None:
-    assert columns_of(count, (324, 270)) == columns
+    assert choose_columns(count, (324, 270)) == columns
 
 
 @pytest.mark.usefixtures("opengl")

@@ -13,7 +13,7 @@ from PIL import Image
 
 from fba.errors import FormatError, UnsupportedError
 from fba_player.export.recorder import Recorder
-from fba_player.sound.soundtrack import Soundtrack, beside
+from fba_player.sound.soundtrack import Soundtrack, find_sound_beside
 from sound_clicks import click_time, sound, write_click
 
 av = pytest.importorskip("av")
@@ -212,8 +212,8 @@ def test_samples_are_those_of_the_file(tmp_path: Path) -> None:
 
 
 def test_sound_of_the_same_name_is_found(tmp_path: Path) -> None:
-    assert beside(tmp_path / "a.fba") is None
+    assert find_sound_beside(tmp_path / "a.fba") is None
     (tmp_path / "a.WAV").touch()
-    assert beside(tmp_path / "a.fba") == tmp_path / "a.WAV"
-    assert beside(tmp_path / "b.fba") is None
-    assert beside(tmp_path / "a.WAV") is None
+    assert find_sound_beside(tmp_path / "a.fba") == tmp_path / "a.WAV"
+    assert find_sound_beside(tmp_path / "b.fba") is None
+    assert find_sound_beside(tmp_path / "a.WAV") is None

@@ -17,7 +17,7 @@ from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.player import to_pyrender
 from fba_player.export import pyrender_bridge
-from fba_player.export.pyrender_bridge import _numpy_1, swayed
+from fba_player.export.pyrender_bridge import _numpy_1_names, sway_with_head
 
 BOTH = """
 import json, sys
@@ -99,10 +99,10 @@ def test_pyrender_missing_is_named(talking: Animation, monkeypatch: pytest.Monke
 
 
 def test_what_numpy_has_dropped_is_lent_and_taken_back() -> None:
-    with _numpy_1():
+    with _numpy_1_names():
         assert np.infty == np.inf  # type: ignore[attr-defined]  # noqa: NPY201
     assert not hasattr(np, "infty")
-    with pytest.raises(KeyError), _numpy_1():
+    with pytest.raises(KeyError), _numpy_1_names():
         raise KeyError
     assert not hasattr(np, "infty")
 
@@ -115,5 +115,9 @@ def test_the_neck_bends_between_shoulders_and_head() -> None:
         centre + Rotation.from_rotvec(turn * share).apply(place - centre)
         for place, share in zip(places, sway, strict=True)
     ]
-    np.testing.assert_allclose(swayed(places, sway.astype(np.float32), turn, centre), wanted, atol=1e-6)
-    np.testing.assert_array_equal(swayed(places, sway.astype(np.float32), np.zeros(3), centre), places)
+    np.testing.assert_allclose(
+        sway_with_head(places, sway.astype(np.float32), turn, centre), wanted, atol=1e-6
+    )
+    np.testing.assert_array_equal(
+        sway_with_head(places, sway.astype(np.float32), np.zeros(3), centre), places
+    )

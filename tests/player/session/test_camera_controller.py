@@ -67,13 +67,13 @@ def test_between_cameras_it_takes_the_shorter_way() -> None:
 
 def test_it_follows_and_stays_without_a_jump(clock: Clock) -> None:
     viewpoint = Viewpoint(Walking(), 1.0, Camera(), clock=clock)  # type: ignore[arg-type]
-    assert viewpoint.at(3.0).target == (6.0, 0.0, 0.0)
+    assert viewpoint.camera_at(3.0).target == (6.0, 0.0, 0.0)
     viewpoint.toggle_follow(3.0)
-    assert viewpoint.at(3.0).target == (6.0, 0.0, 0.0)
-    assert viewpoint.at(4.0).target == (6.0, 0.0, 0.0)
+    assert viewpoint.camera_at(3.0).target == (6.0, 0.0, 0.0)
+    assert viewpoint.camera_at(4.0).target == (6.0, 0.0, 0.0)
     viewpoint.toggle_follow(4.0)
-    assert viewpoint.at(4.0).target == (6.0, 0.0, 0.0)
-    assert viewpoint.at(5.0).target == (8.0, 0.0, 0.0)
+    assert viewpoint.camera_at(4.0).target == (6.0, 0.0, 0.0)
+    assert viewpoint.camera_at(5.0).target == (8.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("preset", [*PRESETS, None])
@@ -104,27 +104,27 @@ def test_between_columns_the_face_stands_in_what_is_free(talking: Animation, clo
         clip = camera.projection_matrix(aspect) @ camera.view_matrix() @ np.array([x + reach, y, z, 1.0])
         return float(clip[0] / clip[3] + 1) / 2
 
-    whole = viewpoint.at(0.0)
+    whole = viewpoint.camera_at(0.0)
     assert across(whole) == pytest.approx(0.5, abs=0.001)
     viewpoint.uncover(0.4, 0.1)
     assert viewpoint.gliding
-    assert across(viewpoint.at(0.0)) == pytest.approx(0.5, abs=0.001)  # it begins where it was
+    assert across(viewpoint.camera_at(0.0)) == pytest.approx(0.5, abs=0.001)  # it begins where it was
     clock.now += GLIDE
     assert not viewpoint.gliding
-    assert across(viewpoint.at(0.0)) == pytest.approx(0.65, abs=0.001)
-    assert viewpoint.whole(0.0) == whole  # as a picture without panels shows it
+    assert across(viewpoint.camera_at(0.0)) == pytest.approx(0.65, abs=0.001)
+    assert viewpoint.camera_without_panels(0.0) == whole  # as a picture without panels shows it
     viewpoint.uncover(0.4, 0.4, smoothly=False)
     half = scene.face_subject.half_width
-    assert across(viewpoint.at(0.0), -half) > 0.399
-    assert across(viewpoint.at(0.0), half) < 0.601
+    assert across(viewpoint.camera_at(0.0), -half) > 0.399
+    assert across(viewpoint.camera_at(0.0), half) < 0.601
     viewpoint.uncover(0.0, 0.0, smoothly=False)
-    assert viewpoint.at(0.0) == whole
+    assert viewpoint.camera_at(0.0) == whole
 
 
 def test_a_view_of_ones_own_keeps_its_distance_between_columns(clock: Clock) -> None:
     viewpoint = Viewpoint(Walking(), 2.0, Camera(distance=5.0), clock=clock)  # type: ignore[arg-type]
     viewpoint.uncover(0.3, 0.0, smoothly=False)
-    assert viewpoint.at(0.0).distance == 5.0
+    assert viewpoint.camera_at(0.0).distance == 5.0
 
 
 def test_a_named_view_fits_the_picture_again_when_its_shape_changes(talking: Animation, clock: Clock) -> None:

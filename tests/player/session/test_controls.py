@@ -79,7 +79,7 @@ def test_panels_closing_and_wishes(controls: Controls) -> None:
     controls.key("f12")
     controls.key("ctrl+shift+s")
     controls.key("ctrl+r")
-    assert list(session.wishes) == ["screenshot", "transparent", "record"]
+    assert list(session.requests) == ["screenshot", "transparent", "record"]
     assert not controls.key("x")
     assert not session.closing
     controls.key("q")

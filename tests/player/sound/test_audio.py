@@ -18,7 +18,7 @@ from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
 from fba_player.sound._read_ahead import SoundBlocks
 from fba_player.sound.audio_file import SoundFile
-from fba_player.sound.player import Audio, beside, open_audio
+from fba_player.sound.player import Audio, find_sound_beside, open_audio
 from player_tracks import face_track
 
 av = pytest.importorskip("av")
@@ -226,5 +226,5 @@ def test_a_broken_file_is_an_error_with_or_without_a_device(tmp_path: Path) -> N
 
 def test_beside_a_stream(tmp_path: Path) -> None:
     write_wav(tmp_path / "talk.wav", tone(10))
-    assert beside(tmp_path / "talk.fba") == tmp_path / "talk.wav"
-    assert beside(tmp_path / "walk.fba") is None
+    assert find_sound_beside(tmp_path / "talk.fba") == tmp_path / "talk.wav"
+    assert find_sound_beside(tmp_path / "walk.fba") is None

@@ -12,7 +12,7 @@ import pytest
 from fba.animation import Animation
 from fba_player.playback.transport import Transport
 from fba_player.scene.scene import Scene
-from fba_player.session.captures import Keeper
+from fba_player.session.captures import Captures
 from fba_player.session.session import Session
 from fba_player.sound.recorded_sound import FilmSound
 from player_tracks import face_track
@@ -39,9 +39,9 @@ class Filmed:
         transport = Transport(scene.timeline, loop=False, clock=self.clock)
         self.session = Session(scene, transport, size=(32, 32), clock=self.clock)
         self.session.sound = wav
-        self.keeper = Keeper(self.session, folder)
-        self.keeper.toggle_recording()
-        recorder = self.keeper._recorder
+        self.captures = Captures(self.session, folder)
+        self.captures.toggle_recording()
+        recorder = self.captures._recorder
         assert recorder is not None
         add = recorder.add  # these pictures come faster than any window's: none is to be left out
         recorder.add = lambda pixels, time=None, *, wait=True: add(pixels, time)  # type: ignore[method-assign]
@@ -50,11 +50,11 @@ class Filmed:
         pixels = np.zeros((32, 32, 4), np.uint8)
         for _ in range(round(seconds * RATE)):
             self.clock.now += 1 / RATE
-            self.keeper.moment()
-            self.keeper.picture(lambda: pixels)
+            self.captures.begin_picture()
+            self.captures.add_picture(lambda: pixels)
 
     def film(self) -> Path:
-        path = self.keeper.close()
+        path = self.captures.close()
         assert path is not None
         return path
 

@@ -30,7 +30,7 @@ class Device:
         for _ in range(round(seconds / PERIOD)):
             free = self.begun + max(self.calls - 2, 0) * PERIOD / self.pace
             self.now = max(free + self.random.random() * self.lateness, self.now)
-            self.firsts.append(self.clock.taken(COUNT))
+            self.firsts.append(self.clock.take(COUNT))
             self.calls += 1
 
     @property

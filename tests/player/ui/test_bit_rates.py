@@ -9,7 +9,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.codec import StreamInfo
-from fba_player.ui.panels._bit_rates import columns, encoded, rates
+from fba_player.ui.panels._bit_rates import bars_of_planes, measure_rates, probe_encoded
 
 
 def info(bits: list[int], intra: list[int], index: list[int] | None = None, size: int = 0) -> StreamInfo:
@@ -23,7 +23,7 @@ def info(bits: list[int], intra: list[int], index: list[int] | None = None, size
 
 
 def test_the_rate_is_that_of_the_last_second() -> None:
-    found = rates(info([1000, 100, 200, 300, 400, 2000, 10], [0, 5], size=510))
+    found = measure_rates(info([1000, 100, 200, 300, 400, 2000, 10], [0, 5], size=510))
     assert found is not None
     assert found.times.tolist() == [2.0, 2.25, 2.5, 2.75, 3.0, 3.25, 3.5]
     assert found.rate == pytest.approx([1.6, 1.0, 2.9, 2.71])  # four planes a second, in kbit/s
@@ -34,30 +34,30 @@ def test_the_rate_is_that_of_the_last_second() -> None:
 
 
 def test_frames_that_were_skipped_take_time_and_no_bits() -> None:
-    found = rates(info([1000, 100, 200], [0], index=[0, 8, 9]))
+    found = measure_rates(info([1000, 100, 200], [0], index=[0, 8, 9]))
     assert found is not None
     assert found.rate[-2:] == pytest.approx([0.1, 0.3])
 
 
 def test_a_single_plane_and_none() -> None:
-    found = rates(info([1000], [0]))
+    found = measure_rates(info([1000], [0]))
     assert found is not None
     assert found.rate.tolist() == [1.0]
-    assert rates(info([], [])) is None
+    assert measure_rates(info([], [])) is None
 
 
 def test_bars_show_the_largest_and_whether_there_is_an_intra_plane() -> None:
     times, bits = np.arange(10) / 10, np.array([9, 1, 2, 3, 8, 1, 1, 1, 1, 5.0])
-    tall, intra = columns(times, bits, np.isin(np.arange(10), [0, 5]), 0.0, 1.0, 5)
+    tall, intra = bars_of_planes(times, bits, np.isin(np.arange(10), [0, 5]), 0.0, 1.0, 5)
     assert tall.tolist() == [9, 3, 8, 1, 5]
     assert intra.tolist() == [True, False, True, False, False]
-    tall, _ = columns(times, bits, bits > 8, 0.4, 0.6, 4)
+    tall, _ = bars_of_planes(times, bits, bits > 8, 0.4, 0.6, 4)
     assert tall.max() == 8
-    assert columns(times, bits, bits > 8, 1.0, 1.0, 3)[0].tolist() == [0, 0, 0]
+    assert bars_of_planes(times, bits, bits > 8, 1.0, 1.0, 3)[0].tolist() == [0, 0, 0]
 
 
 def test_what_a_performance_would_be_as_a_stream(talking: Animation) -> None:
-    found = encoded(talking)
+    found = probe_encoded(talking)
     assert found is not None
     assert found.plane_intra is not None
     assert found.plane_intra.tolist() == [True] + [False] * 9
@@ -66,4 +66,4 @@ def test_what_a_performance_would_be_as_a_stream(talking: Animation) -> None:
 
 def test_long_ones_are_not_encoded_only_to_see(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fba_player.ui.panels._bit_rates.MOST_VALUES", 29)  # it has thirty
-    assert encoded(talking) is None
+    assert probe_encoded(talking) is None

@@ -1,4 +1,4 @@
-"""Curves: values over all frames, as many points as pixels, the stretch of time that is shown."""
+"""Curves: values over all frames, as many points as pixels, and the range of time that is shown."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from hypothesis import strategies as st
 from fba.animation import Animation, FaceTrack
 from fba.parameters import faps
 from fba_player.playback.timeline import Timeline
-from fba_player.ui.panels._curve_data import BLOCK, SHORTEST, Columns, Stretch, amount, envelope
-from fba_player.ui.panels._parameter_chooser import found
+from fba_player.ui.panels._curve_data import BLOCK, SHORTEST, Courses, TimeZoom, amount, envelope
+from fba_player.ui.panels._parameter_chooser import search_parameters
 from player_tracks import body_track, face_track
 
 
-def complete(columns: Columns) -> Columns:
-    while columns.advance():
+def complete(courses: Courses) -> Courses:
+    while courses.advance():
         pass
-    return columns
+    return courses
 
 
 def test_values_are_those_shown_and_sent_says_who_said_so() -> None:
     face = face_track([{3: 100, 31: 40}, {}, {3: 300}, {}])
     body = body_track([{}, {32: 5000}, {}, {32: 7000}])
-    columns = complete(Columns(Timeline(Animation(25, np.array([0, 1, 3, 4]), face, body))))  # type: ignore[arg-type]
-    jaw = columns.course("fap", 3)
+    courses = complete(Courses(Timeline(Animation(25, np.array([0, 1, 3, 4]), face, body))))  # type: ignore[arg-type]
+    jaw = courses.course("fap", 3)
     assert jaw.times.tolist() == [0.0, 0.04, 0.12, 0.16]
     assert jaw.values.tolist() == [100, 100, 300, 300]
     assert jaw.sent.tolist() == [True, False, True, False]
-    mate = columns.course("fap", 32)  # never sent: it copies the left one
+    mate = courses.course("fap", 32)  # never sent: it copies the left one
     assert mate.values.tolist() == [40, 40, 40, 40]
     assert not mate.sent.any()
-    arm = columns.course("bap", 32)
+    arm = courses.course("bap", 32)
     assert arm.values.tolist() == [0, 5000, 5000, 7000]
     assert arm.sent.tolist() == [False, True, False, True]
-    assert columns.course("fap", 3) is jaw
+    assert courses.course("fap", 3) is jaw
 
 
 def long_face(frames: int) -> Animation:
@@ -48,24 +48,24 @@ def long_face(frames: int) -> Animation:
 
 
 def test_an_hour_is_worked_out_piece_by_piece() -> None:
-    columns = Columns(Timeline(long_face(3 * BLOCK + 5)))
-    assert columns.advance()
-    assert 0.3 < columns.known < 0.34
-    assert len(columns.course("fap", 3).values) == BLOCK
-    complete(columns)
-    assert columns.known == 1.0
-    course = columns.course("fap", 3)
+    courses = Courses(Timeline(long_face(3 * BLOCK + 5)))
+    assert courses.advance()
+    assert 0.3 < courses.known < 0.34
+    assert len(courses.course("fap", 3).values) == BLOCK
+    complete(courses)
+    assert courses.known == 1.0
+    course = courses.course("fap", 3)
     np.testing.assert_array_equal(course.values, np.arange(3 * BLOCK + 5) % 1001)
 
 
 def test_frames_that_arrive_later_are_there_later() -> None:
     whole = long_face(100)
     timeline = Timeline(whole[:40])
-    columns = complete(Columns(timeline, later=2.0))
-    assert len(columns.course("fap", 3).values) == 40
+    courses = complete(Courses(timeline, later=2.0))
+    assert len(courses.course("fap", 3).values) == 40
     timeline.animation = whole
-    complete(columns)
-    course = columns.course("fap", 3)
+    complete(courses)
+    course = courses.course("fap", 3)
     assert course.values.tolist() == list(range(100))
     assert course.times[-1] == pytest.approx(99 / 25 + 2.0)
 
@@ -73,9 +73,9 @@ def test_frames_that_arrive_later_are_there_later() -> None:
 def test_those_that_move_most_come_first_and_only_one_of_mates() -> None:
     face = face_track([{3: 0, 31: 0, 32: 0, 49: 0}, {3: 400, 31: 240, 32: 240, 49: 4500}])
     body = body_track([{32: 0, 181: 0}, {32: 157080, 181: 30}])  # 90 degrees, and 3 cm
-    columns = complete(Columns(Timeline(Animation(25, np.arange(2), face, body))))  # type: ignore[arg-type]
-    assert columns.movers(9) == [("bap", 32), ("fap", 31), ("fap", 3), ("bap", 181), ("fap", 49)]
-    assert columns.movers(2) == [("bap", 32), ("fap", 31)]
+    courses = complete(Courses(Timeline(Animation(25, np.arange(2), face, body))))  # type: ignore[arg-type]
+    assert courses.movers(9) == [("bap", 32), ("fap", 31), ("fap", 3), ("bap", 181), ("fap", 49)]
+    assert courses.movers(2) == [("bap", 32), ("fap", 31)]
 
 
 def test_amounts_are_written_for_people() -> None:
@@ -94,18 +94,18 @@ def test_few_frames_are_all_there() -> None:
 
 
 @given(st.integers(300, 2000), st.integers(1, 60), st.data())
-def test_many_frames_keep_their_extremes(frames: int, columns: int, data: st.DataObject) -> None:
+def test_many_frames_keep_their_extremes(frames: int, courses: int, data: st.DataObject) -> None:
     values = np.random.default_rng(frames).normal(size=frames)
     spike = data.draw(st.integers(0, frames - 1))
     values[spike] = 99.0
     sent = np.arange(frames) == spike
-    drawn = envelope(np.arange(frames) / 25, values, sent, 0.0, (frames - 1) / 25, columns)
-    assert len(drawn.x) <= 2 * columns
+    drawn = envelope(np.arange(frames) / 25, values, sent, 0.0, (frames - 1) / 25, courses)
+    assert len(drawn.x) <= 2 * courses
     assert (drawn.values.min(), drawn.values.max()) == (values.min(), 99.0)  # nothing is lost
     assert (np.diff(drawn.x) >= 0).all()
     assert 0 <= drawn.x[0] <= drawn.x[-1] <= 1
     at = drawn.x[drawn.values.argmax()]
-    assert abs(at - spike / (frames - 1)) <= 1 / columns + 1e-9  # within its column
+    assert abs(at - spike / (frames - 1)) <= 1 / courses + 1e-9  # within its column
     assert drawn.sent[drawn.values.argmax()]
 
 
@@ -117,29 +117,29 @@ def test_nothing_to_draw() -> None:
 
 
 def test_zooming_keeps_the_time_under_the_mouse() -> None:
-    stretch = Stretch()
-    stretch.bound(10.0, 110.0)
-    assert stretch.whole
-    stretch.zoom(0.5, 35.0)
-    assert (stretch.low, stretch.high) == (22.5, 72.5)  # 35 is a quarter from the left, as before
-    stretch.pan(1000.0)
-    assert (stretch.low, stretch.high) == (60.0, 110.0)
-    stretch.follow(20.0)
-    assert (stretch.low, stretch.high) == (15.0, 65.0)
-    stretch.zoom(1e-9, 30.0)
-    assert stretch.high - stretch.low == pytest.approx(SHORTEST)
-    stretch.zoom(1e9, 30.0)
-    assert stretch.whole
+    time_zoom = TimeZoom()
+    time_zoom.bound(10.0, 110.0)
+    assert time_zoom.shows_all
+    time_zoom.zoom(0.5, 35.0)
+    assert (time_zoom.low, time_zoom.high) == (22.5, 72.5)  # 35 is a quarter from the left, as before
+    time_zoom.pan(1000.0)
+    assert (time_zoom.low, time_zoom.high) == (60.0, 110.0)
+    time_zoom.follow(20.0)
+    assert (time_zoom.low, time_zoom.high) == (15.0, 65.0)
+    time_zoom.zoom(1e-9, 30.0)
+    assert time_zoom.high - time_zoom.low == pytest.approx(SHORTEST)
+    time_zoom.zoom(1e9, 30.0)
+    assert time_zoom.shows_all
 
 
 def test_all_of_a_stream_stays_all_of_it_while_it_arrives() -> None:
-    stretch = Stretch()
-    stretch.bound(0.0, 10.0)
-    stretch.bound(0.0, 12.0)
-    assert (stretch.low, stretch.high) == (0.0, 12.0)
-    stretch.zoom(0.25, 0.0)
-    stretch.bound(0.0, 20.0)
-    assert (stretch.low, stretch.high) == (0.0, 3.0)
+    time_zoom = TimeZoom()
+    time_zoom.bound(0.0, 10.0)
+    time_zoom.bound(0.0, 12.0)
+    assert (time_zoom.low, time_zoom.high) == (0.0, 12.0)
+    time_zoom.zoom(0.25, 0.0)
+    time_zoom.bound(0.0, 20.0)
+    assert (time_zoom.low, time_zoom.high) == (0.0, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -155,9 +155,9 @@ def test_all_of_a_stream_stays_all_of_it_while_it_arrives() -> None:
     ],
 )
 def test_searching(query: str, check: Callable[[list[tuple[str, int]]], bool]) -> None:
-    assert check([(kind, number) for kind, number, _ in found(query, face=True, body=True)])
+    assert check([(kind, number) for kind, number, _ in search_parameters(query, face=True, body=True)])
 
 
 def test_only_what_there_is_can_be_found() -> None:
-    assert {kind for kind, _, _ in found("", face=True, body=False)} == {"fap"}
-    assert {kind for kind, _, _ in found("", face=False, body=True)} == {"bap"}
+    assert {kind for kind, _, _ in search_parameters("", face=True, body=False)} == {"fap"}
+    assert {kind for kind, _, _ in search_parameters("", face=False, body=True)} == {"bap"}

@@ -19,7 +19,7 @@ from studio_hand import panel_of
 
 graphics.imported("imgui_bundle")
 
-from fba_player.ui.panels._differences_panel import DifferencesPanel, thinned  # noqa: E402 - needs imgui
+from fba_player.ui.panels._differences_panel import DifferencesPanel, thin_curve  # noqa: E402 - needs imgui
 from fba_player.ui.window_picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
@@ -68,12 +68,12 @@ def test_it_is_there_only_where_something_is_compared(opengl: None) -> None:
 def test_a_long_curve_keeps_its_peaks() -> None:
     values = np.zeros(100_000)
     values[[7, 50_123, 99_999]] = (5.0, -8.0, 3.0)
-    times, shown = thinned(np.arange(100_000) / 25, values, 500)
+    times, shown = thin_curve(np.arange(100_000) / 25, values, 500)
     assert (len(times), shown.max(), shown.min()) == (500, 5.0, -8.0)
     assert times[int(shown.argmin())] == 50_123 / 25
     assert (np.diff(times) > 0).all()
     short = np.arange(3.0)
-    assert thinned(short, short, 3)[0] is short
+    assert thin_curve(short, short, 3)[0] is short
 
 
 def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
@@ -89,9 +89,9 @@ def test_the_second_ones_curves_are_shown_on_demand(studio: Studio) -> None:
 
 
 def test_each_file_is_told_of(studio: Studio) -> None:
-    from fba_player.ui.panels._file_panel import _all
+    from fba_player.ui.panels._file_panel import _sections
 
-    told = _all(studio.session, studio.session.source.info)
+    told = _sections(studio.session, studio.session.source.info)
     assert [title for title, _ in told] == ["1  a.fba", "2  b.fba"]
     assert [row for row in told[0][1] if row[0] != "duration"] == [
         ("frames", "4"),
@@ -101,7 +101,7 @@ def test_each_file_is_told_of(studio: Studio) -> None:
 
 
 def test_why_nothing_differs() -> None:
-    from fba_player.ui.panels._differences_panel import _nothing
+    from fba_player.ui.panels._differences_panel import _why_nothing_differs
 
     rest = body_track([{32: 0}] * 4)
     face, body = Scene(talk([0] * 4)), Scene(Animation(Fraction(10), np.arange(4), body=rest))
@@ -109,4 +109,4 @@ def test_why_nothing_differs() -> None:
         (CompareScene([face, face]), "nothing differs"),
         (CompareScene([face, body]), "one is a face, the other a body"),
     ):
-        assert _nothing(scene, 1, scene.differences()).startswith(said)
+        assert _why_nothing_differs(scene, 1, scene.differences()).startswith(said)

@@ -12,16 +12,18 @@ from fba_player.ui._docks import (
     NARROWEST,
     TITLE,
     Dock,
+    DockRequest,
     Docks,
-    Wish,
     free_middle,
 )
 
 TOP = 56.0
 
 
-def wish(name: str, side: str = "left", width: float = 400, height: float = 250, least: float = 150) -> Wish:
-    return Wish(name, side, width, height, least)
+def request(
+    name: str, side: str = "left", width: float = 400, height: float = 250, least: float = 150
+) -> DockRequest:
+    return DockRequest(name, side, width, height, least)
 
 
 def apart(docks: dict[str, Dock]) -> bool:
@@ -39,23 +41,27 @@ def apart(docks: dict[str, Dock]) -> bool:
 
 def test_one_has_what_it_likes_at_its_side() -> None:
     docks = Docks()
-    assert docks.arrange([wish("a")], 1280, TOP, 530) == {"a": Dock(EDGE, TOP, 400, 250)}
+    assert docks.arrange([request("a")], 1280, TOP, 530) == {"a": Dock(EDGE, TOP, 400, 250)}
     docks = Docks()
-    assert docks.arrange([wish("a", "right")], 1280, TOP, 530) == {
+    assert docks.arrange([request("a", "right")], 1280, TOP, 530) == {
         "a": Dock(1280 - EDGE - 400, TOP, 400, 250)
     }
 
 
 def test_what_does_not_fit_as_it_likes_goes_to_the_other_side() -> None:
-    found = Docks().arrange([wish("a"), wish("b"), wish("c")], 1280, TOP, 530)
+    found = Docks().arrange([request("a"), request("b"), request("c")], 1280, TOP, 530)
     assert (found["a"].left, found["b"].left) == (EDGE, EDGE)
     assert found["b"].top == TOP + 250 + GAP
     assert found["c"] == Dock(1280 - EDGE - 400, TOP, 400, 250)
 
 
 def test_where_both_sides_are_full_they_share_the_height() -> None:
-    wishes = [wish("a", height=500), wish("b", height=500, side="right"), wish("c", height=400, least=200)]
-    found = Docks().arrange(wishes, 1280, TOP, 530)
+    requests = [
+        request("a", height=500),
+        request("b", height=500, side="right"),
+        request("c", height=400, least=200),
+    ]
+    found = Docks().arrange(requests, 1280, TOP, 530)
     assert found["c"].left == EDGE
     assert found["a"].height + GAP + found["c"].height == pytest.approx(530)
     assert found["a"].height > 150
@@ -64,14 +70,14 @@ def test_where_both_sides_are_full_they_share_the_height() -> None:
 
 
 def test_the_one_used_longest_ago_is_folded() -> None:
-    wishes = [wish(name, height=400, least=200) for name in "abcdef"]
+    requests = [request(name, height=400, least=200) for name in "abcdef"]
     docks = Docks()
-    found = docks.arrange(wishes, 1280, TOP, 530)
+    found = docks.arrange(requests, 1280, TOP, 530)
     left = [name for name, dock in found.items() if dock.left == EDGE]
     assert [found[name].folded for name in left] == [True, False, False]
     assert found[left[0]].height == TITLE
     docks.use(left[0])
-    again = docks.arrange(wishes, 1280, TOP, 530)
+    again = docks.arrange(requests, 1280, TOP, 530)
     assert [again[name].folded for name in left] == [False, True, False]
     assert [again[name].left for name in again] == [found[name].left for name in again]  # nobody moves over
     assert apart(found)
@@ -80,25 +86,25 @@ def test_the_one_used_longest_ago_is_folded() -> None:
 
 def test_closing_one_gives_its_room_to_the_others() -> None:
     docks = Docks()
-    wishes = [wish(name, height=400, least=200) for name in "abcdef"]
-    found = docks.arrange(wishes, 1280, TOP, 530)
+    requests = [request(name, height=400, least=200) for name in "abcdef"]
+    found = docks.arrange(requests, 1280, TOP, 530)
     folded = next(name for name, dock in found.items() if dock.folded)
     side = found[folded].left
     closed = next(n for n, dock in found.items() if dock.left == side and not dock.folded)
-    again = docks.arrange([one for one in wishes if one.name != closed], 1280, TOP, 530)
+    again = docks.arrange([one for one in requests if one.name != closed], 1280, TOP, 530)
     assert not again[folded].folded
 
 
 @pytest.mark.parametrize("wide", [900.0, 1280.0, 1920.0, 3840.0])
 def test_the_middle_stays_free(wide: float) -> None:
-    found = Docks().arrange([wish("a", width=430), wish("b", "right", width=380)], wide, TOP, 410)
+    found = Docks().arrange([request("a", width=430), request("b", "right", width=380)], wide, TOP, 410)
     left, right = free_middle(found.values(), wide)
     assert (1 - left - right) * wide >= max(MIDDLE * wide, LEAST_MIDDLE) - 1e-6
     assert min(dock.width for dock in found.values()) >= NARROWEST
 
 
 def test_a_narrow_display_has_one_column() -> None:
-    found = Docks().arrange([wish("a"), wish("b", "right")], 640, TOP, 400)
+    found = Docks().arrange([request("a"), request("b", "right")], 640, TOP, 400)
     assert found["a"].left == found["b"].left
     left, right = free_middle(found.values(), 640)
     assert left == 0.0
@@ -107,7 +113,7 @@ def test_a_narrow_display_has_one_column() -> None:
 
 @pytest.mark.parametrize(("wide", "high"), [(200.0, 60.0), (320.0, 100.0), (640.0, 200.0), (900.0, 250.0)])
 def test_whatever_the_size_they_stay_inside(wide: float, high: float) -> None:
-    found = Docks().arrange([wish(name) for name in "abcdefgh"], wide, TOP, high)
+    found = Docks().arrange([request(name) for name in "abcdefgh"], wide, TOP, high)
     assert found
     assert apart(found)
     for dock in found.values():

@@ -38,7 +38,7 @@ def studio(opengl: None, talking: Animation, tmp_path: Path, clock: Clock) -> It
     session = Session(
         scene, Transport(scene.timeline, clock=clock), source=Source(scene, path), size=SIZE, clock=clock
     )
-    session.source.look(wait=True)
+    session.source.probe(wait=True)
     with Studio(session) as made:
         made.gui.hides = True
         made.draw(4)

@@ -88,6 +88,6 @@ def test_motion_is_added_up_over_parameters() -> None:
 )
 def test_the_slider_of_speed_holds_on_to_its_steps(slid: float, speed: float) -> None:
     graphics.imported("imgui_bundle")
-    from fba_player.ui._transport_buttons import snapped
+    from fba_player.ui._transport_buttons import snap_speed
 
-    assert snapped(slid) == speed
+    assert snap_speed(slid) == speed

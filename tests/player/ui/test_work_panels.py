@@ -46,7 +46,7 @@ def opened(opengl: None, tmp_path: Path, clock: Clock, monkeypatch: pytest.Monke
         scene = Scene(animation)
         transport = Transport(scene.timeline, clock=clock)
         session = Session(scene, transport, source=Source(scene, path), size=size, clock=clock)
-        session.source.look(wait=True)
+        session.source.probe(wait=True)
         session.open |= set(panels)
         studio = Studio(session)
         studios.append(studio)
@@ -89,14 +89,14 @@ def test_a_click_on_a_curve_seeks_and_the_wheel_zooms(opened: Opened, talking: A
     camera = studio.session.viewpoint.camera
     hand.move((left + right) / 2, (top + bottom) / 2)
     hand.wheel(3)
-    assert panel.stretch.high - panel.stretch.low == pytest.approx(0.36 * 0.8**3)
-    assert (panel.stretch.high + panel.stretch.low) / 2 == pytest.approx(0.18, abs=0.002)
+    assert panel.time_zoom.high - panel.time_zoom.low == pytest.approx(0.36 * 0.8**3)
+    assert (panel.time_zoom.high + panel.time_zoom.low) / 2 == pytest.approx(0.18, abs=0.002)
     assert studio.session.viewpoint.camera == camera
-    before = panel.stretch.low
+    before = panel.time_zoom.low
     hand.drag(((left + right) / 2, top + 5), ((left + right) / 2 + 100, top + 5), 1)
-    assert panel.stretch.low == pytest.approx(before - 100 / (right - left) * 0.36 * 0.8**3, abs=0.002)
+    assert panel.time_zoom.low == pytest.approx(before - 100 / (right - left) * 0.36 * 0.8**3, abs=0.002)
     hand.double_click((left + right) / 2, top + 5, 1)
-    assert panel.stretch.whole
+    assert panel.time_zoom.shows_all
 
 
 def test_choosing_from_the_list(opened: Opened, walking: Animation) -> None:
@@ -175,10 +175,10 @@ def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animatio
     studio.session.open.add("rate")
     panel = panel_of(studio, "rate")
     studio.draw(1)
-    assert studio.session.restless or panel._would[1]  # pictures go on until it is known
+    assert studio.session.restless or panel._encoded[1]  # pictures go on until it is known
     for _ in range(600):
         studio.draw(1)
-        if panel._would is not None and panel._would[1]:
+        if panel._encoded is not None and panel._encoded[1]:
             break
         import time
 
@@ -394,7 +394,9 @@ def test_a_panel_is_taken_out_of_its_column_and_brought_back(opened: Opened, tal
     hand.button(False)
     x, y = _window(studio, "camera").pos
     assert (x, y) == pytest.approx((docked[0] - 300, docked[1] + 100), abs=2)
-    assert studio.session.viewpoint.at(0.0) == studio.session.viewpoint.whole(0.0)  # no column is there
+    assert studio.session.viewpoint.camera_at(0.0) == studio.session.viewpoint.camera_without_panels(
+        0.0
+    )  # no column is there
     hand.double_click(x + 60, y + 12)
     studio.draw(2)
     assert tuple(_window(studio, "camera").pos) == docked
@@ -445,6 +447,6 @@ def test_a_take_that_is_not_saved_is_not_lost_by_one_key(
 
 def test_escape_leaves_the_full_screen_first(opened: Opened, talking: Animation) -> None:
     session = opened(talking).session
-    session.whole_screen = True
+    session.full_screen = True
     session.escape()
-    assert (list(session.wishes), session.closing) == (["fullscreen"], False)
+    assert (list(session.requests), session.closing) == (["fullscreen"], False)

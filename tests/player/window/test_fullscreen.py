@@ -49,11 +49,11 @@ def test_it_covers_the_monitor_that_has_most_of_the_window_and_goes_back() -> No
     for x, monitor, size in ((1000, "left", (1920, 1080)), (1700, "right", (2560, 1440))):
         glfw = Glfw(x)
         screen = FullScreen(glfw, object())
-        assert not screen.whole
+        assert not screen.active
         screen.toggle()
         assert glfw.on == monitor
         assert glfw.place[2:] == size
-        assert screen.whole
+        assert screen.active
         screen.toggle()
         assert glfw.on is None
         assert glfw.place == (x, 50, 800, 600)

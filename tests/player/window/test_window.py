@@ -43,7 +43,7 @@ def press(window: Window, key: int, modifiers: int = 0, action: int | None = Non
 
 
 def test_it_shows_the_face_and_the_timeline(window: Window) -> None:
-    window._heard()
+    window._redraw()
     settle(window)
     picture = shown(window)
     assert picture.shape == (480, 640, 3)
@@ -123,7 +123,7 @@ def test_any_size_is_drawn_with_all_panels_open(
     with opened(talking, tmp_path, panels=True, size=size) as window:
         window.session.open |= {"file", "view", "camera", "help"}
         window.session.say("a word")
-        window._heard()
+        window._redraw()
         settle(window)
         assert window.pictures >= 4
         assert window._gl.error == "GL_NO_ERROR"
@@ -151,7 +151,7 @@ def test_a_lost_context_ends_with_a_word(window: Window, monkeypatch: pytest.Mon
     held = window._gl
     with monkeypatch.context() as lost:
         lost.setattr(window, "_gl", Lost())
-        window._heard()
+        window._redraw()
         with pytest.raises(DisplayError, match="driver was reset"):
             window.update()
 

@@ -204,7 +204,7 @@ def test_pictures_and_films_are_kept(window: Window, hand: Hand, tmp_path: Path)
 
 def test_closing_while_recording_keeps_the_film(window: Window, hand: Hand, tmp_path: Path) -> None:
     av = pytest.importorskip("av")
-    hand.key("ctrl+r", lambda: window.keeper.recording)
+    hand.key("ctrl+r", lambda: window.captures.recording)
     window.transport.play()
     until(window, lambda: (window.session.recording or 0) > 0.3)
     hand.do("key", "q")

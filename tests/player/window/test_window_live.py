@@ -81,6 +81,6 @@ def test_two_performances_stand_side_by_side(on_display: str, tmp_path: Path) ->
         assert skin[:, :240].sum() > 1500
         assert skin[:, 240:].sum() > 1500
         window.session.open.add("differences")
-        window._heard()
+        window._redraw()
         settle(window)
         assert shown(window)[40:200, 240:].mean() < picture[:, 240:].mean() - 20  # the panel covers that side

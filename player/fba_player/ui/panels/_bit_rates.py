@@ -44,7 +44,7 @@ class Rates:
     mean: float
 
 
-def rates(info: StreamInfo) -> Rates | None:
+def measure_rates(info: StreamInfo) -> Rates | None:
     """Of a stream; None where there are no planes."""
     if info.plane_bits is None or info.plane_intra is None or info.frame_index is None or not info.frames:
         return None
@@ -65,7 +65,7 @@ def rates(info: StreamInfo) -> Rates | None:
     return Rates(times, bits, intra, rate[first:], tuple(rows), info.bits_per_second / 1000)
 
 
-def encoded(animation: Animation) -> StreamInfo | None:
+def probe_encoded(animation: Animation) -> StreamInfo | None:
     """What a performance would be as a stream; None where it is long, or where no stream holds its values."""
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MOST_VALUES:
@@ -79,7 +79,7 @@ def encoded(animation: Animation) -> StreamInfo | None:
         return None
 
 
-def columns(times: Float64, bits: Float64, intra: Bool, low: float, high: float,
+def bars_of_planes(times: Float64, bits: Float64, intra: Bool, low: float, high: float,
             count: int) -> tuple[Float64, Bool]:  # fmt: skip
     """(count,) the largest plane in each of so many equal parts of a time, 0 for none, and whether it has an
     I plane."""

@@ -13,7 +13,7 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, 
 
 BLOCK = 512
 """Frames of a face worked out at once: about two milliseconds."""
-UNTOLD = 0.5
+FILLED_IN_WEIGHT = 0.5
 """What a FAP that is only filled in counts beside those that are sent."""
 TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
 """What counts as moving as much as a FAP at full: degrees, millimetres."""
@@ -38,7 +38,7 @@ class Course:
     sent: Bool
 
 
-class Columns:
+class Courses:
     """Courses of a timeline's parameters; what is looked at is worked out when it is needed.
 
     timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds by which
@@ -53,7 +53,7 @@ class Columns:
         self._done = 0
         self._bodies = 0
         self._times: Float64 = np.zeros(0)
-        self._kept: dict[tuple[str, int], Course] = {}
+        self._courses: dict[tuple[str, int], Course] = {}
 
     @property
     def has_face(self) -> bool:
@@ -79,7 +79,7 @@ class Columns:
         if frames != len(self._times):
             index = np.asarray(animation.index[:frames])
             self._times = index / float(timeline.rate) + self._later
-            self._kept = {key: course for key, course in self._kept.items() if key[0] == "fap"}
+            self._courses = {key: course for key, course in self._courses.items() if key[0] == "fap"}
         if animation.face is None:
             return False
         if len(self._shown) < frames:
@@ -91,15 +91,15 @@ class Columns:
             if stop > self._done:
                 self._shown[self._done : stop] = self._resolver.push(animation.face[self._done : stop])
                 self._done = stop
-        self._kept = {key: course for key, course in self._kept.items() if key[0] == "bap"}
+        self._courses = {key: course for key, course in self._courses.items() if key[0] == "bap"}
         return bool(self._done < frames)
 
     def course(self, kind: str, number: int) -> Course:
         """A parameter's course, as far as it is known; the same object until more is."""
         key = (kind, number)
-        if key not in self._kept:
-            self._kept[key] = self._fap(number) if kind == "fap" else self._bap(number)
-        return self._kept[key]
+        if key not in self._courses:
+            self._courses[key] = self._fap(number) if kind == "fap" else self._bap(number)
+        return self._courses[key]
 
     def movers(self, count: int) -> list[tuple[str, int]]:
         """(kind, number) of those that move most, each measured by what is a lot for it; the most first.
@@ -111,9 +111,9 @@ class Columns:
         if animation.face is not None and self._done:
             shown = self._shown[: self._done]
             span = shown.max(axis=0) - shown.min(axis=0)
-            told = np.where(animation.face.mask[: self._done].any(axis=0), 1.0, UNTOLD)
+            weight = np.where(animation.face.mask[: self._done].any(axis=0), 1.0, FILLED_IN_WEIGHT)
             found += [
-                (float(span[number - 1] * told[number - 1]) / fap_reach(number), "fap", number)
+                (float(span[number - 1] * weight[number - 1]) / fap_reach(number), "fap", number)
                 for number in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1)
             ]
         if animation.body is not None and frames:
@@ -126,21 +126,21 @@ class Columns:
         found.sort(key=lambda one: (-one[0], one[1:]))
         chosen: list[tuple[str, int]] = []
         for most, kind, number in found:
-            if most > 0 and not _alike(kind, number, chosen):
+            if most > 0 and not _is_mate(kind, number, chosen):
                 chosen.append((kind, number))
         return chosen[:count]
 
     def _fap(self, number: int) -> Course:
         face, done = self._timeline.animation.face, self._done
         if face is None:
-            return _nothing("fap", number)
+            return _empty_course("fap", number)
         values = self._shown[:done, number - 1].astype(np.float64)
         return Course("fap", number, self._times[:done], values, np.asarray(face.mask[:done, number - 1]))
 
     def _bap(self, number: int) -> Course:
         body, frames = self._timeline.animation.body, len(self._times)
         if body is None:
-            return _nothing("bap", number)
+            return _empty_course("bap", number)
         sent = np.asarray(body.mask[:frames, number - 1])
         values = np.asarray(body.values[:frames, number - 1]).astype(np.float64)
         if not sent.all():  # each frame shows what was sent last
@@ -178,7 +178,7 @@ def bap_reach(number: int) -> float:
     return float(np.radians(TYPICAL_ANGLE * (2 if root else 1)) * 1e5)
 
 
-def _alike(kind: str, number: int, chosen: list[tuple[str, int]]) -> bool:
+def _is_mate(kind: str, number: int, chosen: list[tuple[str, int]]) -> bool:
     """Whether it is the mate of a FAP that has been chosen, on the other side or on the other lip contour."""
     if kind != "fap":
         return False
@@ -188,7 +188,7 @@ def _alike(kind: str, number: int, chosen: list[tuple[str, int]]) -> bool:
     return any(("fap", mate) in chosen for mate in mates)
 
 
-def _nothing(kind: str, number: int) -> Course:
+def _empty_course(kind: str, number: int) -> Course:
     return Course(kind, number, np.zeros(0), np.zeros(0), np.zeros(0, bool))
 
 
@@ -233,14 +233,14 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
     return Envelope(np.repeat((places + 0.5) / columns, 2), pairs.ravel(), np.repeat(any_sent, 2))
 
 
-class Stretch:
+class TimeZoom:
     """From `low` to `high`, seconds, within the first and the last time of what is shown."""
 
     def __init__(self) -> None:
         self.first = self.last = self.low = self.high = 0.0
 
     @property
-    def whole(self) -> bool:
+    def shows_all(self) -> bool:
         """Whether all of it is shown."""
         return self.low <= self.first + NEAR and self.high >= self.last - NEAR
 
@@ -248,7 +248,7 @@ class Stretch:
         """What there is; where all of it was shown, it still is."""
         if (first, last) == (self.first, self.last):
             return
-        everything = self.whole
+        everything = self.shows_all
         self.first, self.last = first, max(last, first)
         if everything:
             self.reset()

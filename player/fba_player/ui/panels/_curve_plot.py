@@ -12,8 +12,8 @@ from imgui_bundle import imgui
 from fba_player.playback.timeline import clock_text
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels._curve_data import Course, Envelope, Stretch, envelope
-from fba_player.ui.panels.panel import EITHER_BUTTON, shortened
+from fba_player.ui.panels._curve_data import Course, Envelope, TimeZoom, envelope
+from fba_player.ui.panels.panel import EITHER_BUTTON, shorten
 from fba_player.ui.ruler import Ruler, label
 
 COLOURS: tuple[theme.Colour, ...] = (
@@ -71,23 +71,23 @@ class Lanes:
         """Where the first lane's curve is: left, top, right, bottom in points; for tests."""
 
     def draw(
-        self, session: Session, lanes: list[Lane], stretch: Stretch, now: dict[tuple[str, int], float]
+        self, session: Session, lanes: list[Lane], time_zoom: TimeZoom, now: dict[tuple[str, int], float]
     ) -> None:
         """Draw them into the rest of the window. now: values at this moment, by the lanes' keys."""
         room = imgui.get_content_region_avail()
         if session.transport.playing and not imgui.is_mouse_down(1):
-            stretch.follow(session.transport.time)
+            time_zoom.follow(session.transport.time)
         imgui.push_style_var(imgui.StyleVar_.item_spacing, (0, 0))
         imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
         imgui.begin_child("lanes", (0, max(room.y - AXIS, 20.0)))
         wide = imgui.get_content_region_avail().x
         left, top = imgui.get_cursor_screen_pos()
-        ruler = Ruler(stretch.low, stretch.high, left, left + wide)
+        ruler = Ruler(time_zoom.low, time_zoom.high, left, left + wide)
         visible = imgui.get_window_pos().y, imgui.get_window_pos().y + imgui.get_window_height()
         y = top
         for number, lane in enumerate(lanes):
             if y + WORDS + CURVE >= visible[0] and y <= visible[1]:
-                self._lane(session, lane, ruler, stretch, y, now.get(lane.key))
+                self._lane(session, lane, ruler, time_zoom, y, now.get(lane.key))
             if number == 0:
                 self.place = (left, y + WORDS, left + wide, y + WORDS + CURVE)
             y += WORDS + CURVE + GAP
@@ -103,7 +103,7 @@ class Lanes:
             del self._lines[key]
 
     def _lane(
-        self, session: Session, lane: Lane, ruler: Ruler, stretch: Stretch, y: float, now: float | None
+        self, session: Session, lane: Lane, ruler: Ruler, time_zoom: TimeZoom, y: float, now: float | None
     ) -> None:
         to = imgui.get_window_draw_list()
         left, right, top = ruler.left, ruler.right, y + WORDS
@@ -112,15 +112,15 @@ class Lanes:
         name = f"lane{lane.course.kind}{lane.course.number}"
         imgui.invisible_button(name, (max(wide, 1), CURVE), EITHER_BUTTON)
         hovered = imgui.is_item_hovered()
-        _mouse(session, ruler, stretch, hovered=hovered, active=imgui.is_item_active())
+        _mouse(session, ruler, time_zoom, hovered=hovered, active=imgui.is_item_active())
         to.add_rect_filled((left, top), (right, top + CURVE), theme.packed((0, 0, 0, 0.22)), rounding=3.0)
-        lines = self._points(lane, ruler, stretch)
+        lines = self._points(lane, ruler, time_zoom)
         corner = imgui.ImVec2(left, top)
         if lines.zero is not None:
             zero = top + lines.zero
             to.add_line((left, zero), (right, zero), theme.packed(theme.TEXT, 0.13))
         to.push_clip_rect((left, top - 1), (right, top + CURVE + 1), True)
-        colour = _darker(lane.colour) if lines.dense else lane.colour
+        colour = _darken(lane.colour) if lines.dense else lane.colour
         if lines.all_sent:
             _line(to, lines.whole, corner, colour, 1.0, THICK)
         else:
@@ -129,15 +129,15 @@ class Lanes:
                 _line(to, run, corner, colour, 1.0, THICK)
         to.pop_clip_rect()
         at = ruler.x(session.transport.time)
-        if stretch.low <= session.transport.time <= stretch.high:
+        if time_zoom.low <= session.transport.time <= time_zoom.high:
             to.add_line((at, top), (at, top + CURVE), theme.packed(theme.TEXT, 0.8))
-        self._words(to, lane, lines, ruler, y, now)
+        self._draw_words(to, lane, lines, ruler, y, now)
         if hovered:
             _hover(to, lane, ruler, top)
 
-    def _points(self, lane: Lane, ruler: Ruler, stretch: Stretch) -> _Lines:
+    def _points(self, lane: Lane, ruler: Ruler, time_zoom: TimeZoom) -> _Lines:
         wide = ruler.right - ruler.left
-        key = (lane.course, stretch.low, stretch.high, wide)
+        key = (lane.course, time_zoom.low, time_zoom.high, wide)
         known = self._lines.get(lane.key)
         if known is not None and known.made_for == key:
             return known
@@ -146,13 +146,13 @@ class Lanes:
             (float(course.values.min()), float(course.values.max())) if len(course.values) else (0.0, 0.0)
         )
         found = envelope(
-            course.times, course.values, course.sent, stretch.low, stretch.high, max(int(wide), 1)
+            course.times, course.values, course.sent, time_zoom.low, time_zoom.high, max(int(wide), 1)
         )
-        made = _placed(found, key, low, high, wide)
+        made = _make_lines(found, key, low, high, wide)
         self._lines[lane.key] = made
         return made
 
-    def _words(
+    def _draw_words(
         self, to: imgui.ImDrawList, lane: Lane, lines: _Lines, ruler: Ruler, y: float, now: float | None
     ) -> None:
         font = imgui.get_font()
@@ -163,7 +163,7 @@ class Lanes:
         small = imgui.calc_text_size(span).x * theme.SMALL / imgui.get_font_size()
         fits = ruler.right - ruler.left - small - 74
         to.add_circle_filled((ruler.left + 4, y + 9.5), 3.5, theme.packed(lane.colour))
-        title = shortened(lane.title, max(fits - 14, 20))
+        title = shorten(lane.title, max(fits - 14, 20))
         to.add_text((ruler.left + 13, y), theme.packed(theme.TEXT), title)
         to.add_text(font, theme.SMALL, (ruler.right - 66 - small, y + 2), theme.packed(theme.FAINT), span)
         to.add_text((ruler.right - wide - 2, y), theme.packed(lane.colour), number)
@@ -180,19 +180,21 @@ class Lanes:
             to.add_text(font, 12.0, (at, y + 5), colour, text)
 
 
-def _mouse(session: Session, ruler: Ruler, stretch: Stretch, *, hovered: bool, active: bool) -> None:
+def _mouse(session: Session, ruler: Ruler, time_zoom: TimeZoom, *, hovered: bool, active: bool) -> None:
     io = imgui.get_io()
     if active and imgui.is_mouse_down(0):
         session.touched()
         session.transport.seek(ruler.time(io.mouse_pos.x))
     elif active and imgui.is_mouse_down(1) and io.mouse_delta.x:
-        stretch.pan(-io.mouse_delta.x * (stretch.high - stretch.low) / max(ruler.right - ruler.left, 1.0))
+        time_zoom.pan(
+            -io.mouse_delta.x * (time_zoom.high - time_zoom.low) / max(ruler.right - ruler.left, 1.0)
+        )
     if hovered:
         imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
         if io.mouse_wheel:
-            stretch.zoom(ZOOM ** max(min(io.mouse_wheel, 8.0), -8.0), ruler.time(io.mouse_pos.x))
+            time_zoom.zoom(ZOOM ** max(min(io.mouse_wheel, 8.0), -8.0), ruler.time(io.mouse_pos.x))
         if imgui.is_mouse_double_clicked(1):
-            stretch.reset()
+            time_zoom.reset()
 
 
 def _hover(to: imgui.ImDrawList, lane: Lane, ruler: Ruler, top: float) -> None:
@@ -206,7 +208,7 @@ def _hover(to: imgui.ImDrawList, lane: Lane, ruler: Ruler, top: float) -> None:
     imgui.set_tooltip(f"{clock_text(time)}   {value} {unit}")
 
 
-def _placed(found: Envelope, key: tuple[object, ...], low: float, high: float, wide: float) -> _Lines:
+def _make_lines(found: Envelope, key: tuple[object, ...], low: float, high: float, wide: float) -> _Lines:
     """Values to places: the course's whole range fills the lane."""
     room = high - low or 1.0
     middle = high == low
@@ -221,20 +223,20 @@ def _placed(found: Envelope, key: tuple[object, ...], low: float, high: float, w
     if len(points) == 1:
         points = [imgui.ImVec2(0.0, ys[0]), imgui.ImVec2(wide, ys[0])]
     all_sent = bool(found.sent.all())
-    runs = [] if all_sent else [_wide_enough(points[a:b]) for a, b in found.runs()]
+    runs = [] if all_sent else [_widen(points[a:b]) for a, b in found.runs()]
     zero = float(y(np.zeros(1))[0]) if low < 0 < high else None
     spread = wide * float(np.ptp(found.x)) if len(points) > 8 else np.inf
     dense = len(points) > 1.5 * spread and float(np.abs(np.diff(found.values)).mean()) > 0.2 * room
     return _Lines(key, points, runs, all_sent, dense, zero, low, high)
 
 
-def _darker(colour: theme.Colour) -> theme.Colour:
+def _darken(colour: theme.Colour) -> theme.Colour:
     """Of what fills its lane: it is not to outshine the others."""
     red, green, blue, alpha = colour
     return red * 0.6, green * 0.6, blue * 0.6, alpha
 
 
-def _wide_enough(points: list[imgui.ImVec2]) -> list[imgui.ImVec2]:
+def _widen(points: list[imgui.ImVec2]) -> list[imgui.ImVec2]:
     """A single point becomes a dash that can be seen."""
     if len(points) > 1:
         return points

@@ -11,10 +11,10 @@ from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels._curve_data import Columns, Stretch, amount, parameter
+from fba_player.ui.panels._curve_data import Courses, TimeZoom, amount, parameter
 from fba_player.ui.panels._curve_plot import COLOURS, Lane, Lanes
 from fba_player.ui.panels._parameter_chooser import Chooser
-from fba_player.ui.panels.panel import Panel, chosen_name, tooltip
+from fba_player.ui.panels.panel import Panel, choose_name, tooltip
 
 BEGINS_WITH = 3
 """Curves that are there at first: those that move most."""
@@ -29,13 +29,13 @@ class CurvesPanel(Panel):
     width, height, least = 430.0, 282.0, 176.0
 
     def __init__(self) -> None:
-        self._columns: Columns | None = None
-        self._of: Any = None
-        self._begun = False
+        self._courses: Courses | None = None
+        self._courses_of: Any = None
+        self._chosen_once = False
         self.which = 0
         """Of several performances, the one whose curves are shown."""
         self._lanes: list[Lane] = []
-        self.stretch = Stretch()
+        self.time_zoom = TimeZoom()
         self.lanes = Lanes()
         self.chooser = Chooser()
 
@@ -47,62 +47,62 @@ class CurvesPanel(Panel):
         """Draw it."""
         names = session.scene.names if isinstance(session.scene, CompareScene) else ()
         if len(names) > 1:
-            self.which = chosen_name("##which", names, min(self.which, len(names) - 1))
-        columns = self._known(session)
+            self.which = choose_name("##which", names, min(self.which, len(names) - 1))
+        known = self._update_courses(session)
         transport = session.transport
-        self.stretch.bound(
+        self.time_zoom.bound(
             transport.start, float(session.scene.timeline.time_of(session.scene.timeline.frames - 1))
         )
-        self._tools(session, columns)
+        self._tools(session, known)
         chosen = [("fap", n) for n in session.selection.faps] + [("bap", n) for n in session.selection.baps]
         if not chosen:
             imgui.dummy((0, 6))
             imgui.text_colored(theme.FAINT, "Choose FAPs or BAPs, or show those that move most.")
             return
-        courses = [columns.course(kind, number) for kind, number in chosen]
+        courses = [known.course(kind, number) for kind, number in chosen]
         if [lane.course for lane in self._lanes] != courses:
             self._lanes = [_lane(course, place) for place, course in enumerate(courses)]
-        self.lanes.draw(session, self._lanes, self.stretch, _now(session, chosen, self.which))
+        self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, chosen, self.which))
 
     def closed(self, session: Session) -> None:
         """What has been worked out is kept."""
         session.rolling.discard(self.name)
 
-    def _known(self, session: Session) -> Columns:
+    def _update_courses(self, session: Session) -> Courses:
         timeline = _timeline(session, self.which)
-        if self._columns is None or self._of is not timeline:
+        if self._courses is None or self._courses_of is not timeline:
             scene: Any = session.scene
             several = isinstance(scene, CompareScene)
             later = scene.timeline.later[self.which] if several else 0
             model = scene.scenes[self.which].model if several else scene.model
-            self._columns = Columns(timeline, model, float(later))
-            self._of, self._begun = timeline, False
-        if self._columns.advance():
+            self._courses = Courses(timeline, model, float(later))
+            self._courses_of, self._chosen_once = timeline, False
+        if self._courses.advance():
             session.rolling.add(self.name)
         else:
             session.rolling.discard(self.name)
-        if not self._begun and self._columns.known >= 1.0:
-            self._begun = True
+        if not self._chosen_once and self._courses.known >= 1.0:
+            self._chosen_once = True
             if not (session.selection.faps or session.selection.baps):
-                _choose(session, self._columns.movers(BEGINS_WITH))
-        return self._columns
+                _choose(session, self._courses.movers(BEGINS_WITH))
+        return self._courses
 
-    def _tools(self, session: Session, columns: Columns) -> None:
-        self.chooser.draw(session, face=columns.has_face, body=columns.has_body)
+    def _tools(self, session: Session, known: Courses) -> None:
+        self.chooser.draw(session, face=known.has_face, body=known.has_body)
         imgui.same_line()
         if imgui.button("Most moving"):
-            _choose(session, columns.movers(MOVERS))
+            _choose(session, known.movers(MOVERS))
         tooltip(f"the {MOVERS} that move most")
         imgui.same_line()
         if imgui.button("None"):
             _choose(session, [])
-        if columns.known < 1.0:
+        if known.known < 1.0:
             imgui.same_line()
-            imgui.text_colored(theme.FAINT, f"{columns.known:.0%}")
-        elif not self.stretch.whole:
+            imgui.text_colored(theme.FAINT, f"{known.known:.0%}")
+        elif not self.time_zoom.shows_all:
             imgui.same_line()
             if imgui.button("All of it"):
-                self.stretch.reset()
+                self.time_zoom.reset()
             tooltip("the whole time again; the wheel zooms, a right drag moves")
 
 

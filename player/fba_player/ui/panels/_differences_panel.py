@@ -13,7 +13,7 @@ from fba_player.scene.compare import ARRANGEMENTS, CompareScene
 from fba_player.scene.differences import Differences, Largest
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels.panel import Panel, chosen_name, heading, tooltip
+from fba_player.ui.panels.panel import Panel, choose_name, heading, tooltip
 
 ROWS = 9
 """Parameters listed, those that differ most."""
@@ -45,14 +45,14 @@ class DifferencesPanel(Panel):
         self._arrangement(session, scene)
         self._second = min(self._second, len(scene.scenes) - 1)
         if len(scene.scenes) > 2:
-            self._second = 1 + chosen_name("##second", scene.names[1:], self._second - 1)
+            self._second = 1 + choose_name("##second", scene.names[1:], self._second - 1)
         found = scene.differences(self._second)
         if self._known is None or self._known[0] is not found:
             self._known = (found, found.largest(ROWS))
         largest = self._known[1]
         heading(f"{_short(scene.names[self._second])} minus {_short(scene.names[0])}", exact=True)
         if not largest:
-            imgui.text_colored(theme.FAINT, _nothing(scene, self._second, found))
+            imgui.text_colored(theme.FAINT, _why_nothing_differs(scene, self._second, found))
             return
         if self._chosen not in [(one.kind, one.number) for one in largest]:
             self._chosen = (largest[0].kind, largest[0].number)
@@ -97,7 +97,7 @@ class DifferencesPanel(Panel):
             values = found.faps if chosen.kind == "fap" else found.baps
             self._curve = (
                 key,
-                *thinned(found.times, values[:, chosen.number - 1].astype(np.float64), POINTS),
+                *thin_curve(found.times, values[:, chosen.number - 1].astype(np.float64), POINTS),
             )
         _, times, values = self._curve
         imgui.dummy((0, 2))
@@ -124,7 +124,7 @@ class DifferencesPanel(Panel):
         imgui.text_colored(theme.FAINT, f"now {now:+.0f} {_unit(chosen.unit, now)}")
 
 
-def _nothing(scene: Any, second: int, found: Differences) -> str:
+def _why_nothing_differs(scene: Any, second: int, found: Differences) -> str:
     """Why nothing differs."""
     one, other = (scene.scenes[number].animation for number in (0, second))
     if not any(
@@ -134,7 +134,7 @@ def _nothing(scene: Any, second: int, found: Differences) -> str:
     return "nothing differs" if len(found.times) else "they have no time in common"
 
 
-def thinned(times: Float64, values: Float64, most: int) -> tuple[Float64, Float64]:
+def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Float64]:
     """A curve of at most so many points: of each stretch the value furthest from 0, where it is."""
     if len(times) <= most:
         return times, values

@@ -24,14 +24,14 @@ class FilePanel(Panel):
     width, height, fitted, least = 330.0, 430.0, True, 170.0
 
     def __init__(self) -> None:
-        self._told: tuple[StreamInfo, list[tuple[str, list[tuple[str, str]]]]] | None = None
+        self._shown: tuple[StreamInfo, list[tuple[str, list[tuple[str, str]]]]] | None = None
 
     def draw(self, session: Session) -> None:
         """Draw it."""
         source, info = session.source, session.source.info
-        if self._told is None or self._told[0] is not info:
-            self._told = (info, _all(session, info))
-        for title, rows in self._told[1]:
+        if self._shown is None or self._shown[0] is not info:
+            self._shown = (info, _sections(session, info))
+        for title, rows in self._shown[1]:
             if title:
                 heading(title, exact=title[0].isdigit())
             facts(title or "file", rows)
@@ -48,11 +48,11 @@ class FilePanel(Panel):
             imgui.pop_style_color()
 
 
-def _all(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
+def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
     """(heading, rows) of the panel."""
     if isinstance(session.scene, CompareScene):
-        return _several(session.scene)
-    parts = [("", _about(session, info))]
+        return _sections_of_several(session.scene)
+    parts = [("", _about_file(session, info))]
     if info.plane_bits is not None:
         parts.append(("Stream", _stream(info)))
     for title, name, part in (("Face", "FAPs", info.face), ("Body", "BAPs", info.body)):
@@ -61,7 +61,7 @@ def _all(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, 
     return parts
 
 
-def _several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
+def _sections_of_several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
     """A heading and rows for each performance of several."""
     parts = []
     for number, (name, one) in enumerate(zip(scene.names, scene.scenes, strict=True)):
@@ -78,7 +78,7 @@ def _several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
     return parts
 
 
-def _about(session: Session, info: StreamInfo) -> list[tuple[str, str]]:
+def _about_file(session: Session, info: StreamInfo) -> list[tuple[str, str]]:
     rows = [("name", session.source.name or "untitled")]
     if session.source.path is not None:
         folder = os.path.dirname(os.path.abspath(session.source.path))

@@ -15,7 +15,7 @@ MOST = 24
 
 
 @cache
-def listed() -> tuple[tuple[str, int, str, str], ...]:
+def all_parameters() -> tuple[tuple[str, int, str, str], ...]:
     """(kind, number, text shown, text searched) of all parameters, FAPs first."""
     rows = []
     for fap in faps()[FIRST_LOW_LEVEL_FAP - 1 :]:
@@ -28,19 +28,19 @@ def listed() -> tuple[tuple[str, int, str, str], ...]:
 
 
 @cache
-def found(query: str, *, face: bool, body: bool) -> tuple[tuple[str, int, str], ...]:
+def search_parameters(query: str, *, face: bool, body: bool) -> tuple[tuple[str, int, str], ...]:
     """(kind, number, text) of those that have all the words: a number alone, a name, a group."""
     words = query.lower().split()
     rows = []
-    for kind, number, text, searched in listed():
+    for kind, number, text, searched in all_parameters():
         if not (face if kind == "fap" else body):
             continue
-        if all(_has(word, number, searched) for word in words):
+        if all(_matches(word, number, searched) for word in words):
             rows.append((kind, number, text))
     return tuple(rows)
 
 
-def _has(word: str, number: int, searched: str) -> bool:
+def _matches(word: str, number: int, searched: str) -> bool:
     """A number and a single letter are meant as they are, other words may be parts of words."""
     if word.isdecimal():
         return word == str(number)
@@ -68,7 +68,7 @@ class Chooser:
             imgui.set_keyboard_focus_here()
         imgui.set_next_item_width(-1)
         _, self.query = imgui.input_text_with_hint("##query", "number, name or group", self.query)
-        rows = found(self.query.strip(), face=face, body=body)
+        rows = search_parameters(self.query.strip(), face=face, body=body)
         imgui.push_style_var(imgui.StyleVar_.frame_padding, (4, 2))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, (8, 3))
         imgui.begin_child("list", (0, 0))

@@ -123,7 +123,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
             if unit != "mm":
                 (low, high), unit = widest()[number - 1].tolist(), "deg"
         if unit == "deg":
-            low, high = max(low, _carried(numbers, 0)), min(high, _carried(numbers, 1))
+            low, high = max(low, _codable_degrees(numbers, 0)), min(high, _codable_degrees(numbers, 1))
         side = word[0] if word.startswith(("left ", "right ", "l_", "r_")) else ""
         other = _other_side(word)
         flipped = other in words and _flipped(numbers[0])
@@ -134,7 +134,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def _carried(numbers: tuple[int, ...], end: int) -> float:
+def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
     """Degrees that a stream can carry at most (end 1) or at least (end 0), in whole degrees."""
     found = 0.0
     for number in numbers:

@@ -11,7 +11,7 @@ from fba_player.ui import theme
 from fba_player.ui.panels.panel import heading
 
 
-def speech(performer: Performer) -> None:
+def draw_visemes(performer: Performer) -> None:
     """Two visemes and how they mix."""
     heading("Visemes")
     puppet, now = performer.puppet, performer.puppet.viseme
@@ -26,7 +26,7 @@ def speech(performer: Performer) -> None:
         puppet.viseme = Viseme()
 
 
-def mood(performer: Performer) -> None:
+def draw_expressions(performer: Performer) -> None:
     """Two expressions and how strong they are."""
     heading("Expressions")
     puppet, now = performer.puppet, performer.puppet.expression

@@ -15,8 +15,8 @@ from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui import theme
-from fba_player.ui.panels._bit_rates import Rates, columns, encoded, rates
-from fba_player.ui.panels._curve_data import Course, Stretch
+from fba_player.ui.panels._bit_rates import Rates, bars_of_planes, measure_rates, probe_encoded
+from fba_player.ui.panels._curve_data import Course, TimeZoom
 from fba_player.ui.panels._curve_plot import CURVE, WORDS, Lane, Lanes
 from fba_player.ui.panels.panel import Panel, tooltip
 from fba_player.ui.ruler import Ruler
@@ -41,8 +41,8 @@ class RatePanel(Panel):
     def __init__(self) -> None:
         self._rates: tuple[StreamInfo, Rates | None, list[Lane]] | None = None
         self._bars: tuple[tuple[object, ...], list[tuple[float, float, float, bool]]] = ((), [])
-        self._would: tuple[Any, list[StreamInfo | None]] | None = None
-        self.stretch = Stretch()
+        self._encoded: tuple[Any, list[StreamInfo | None]] | None = None
+        self.time_zoom = TimeZoom()
         self.lanes = Lanes()
         self.bars = (0.0, 0.0, 0.0, 0.0)
         """Where the bars of the planes are: left, top, right, bottom in points; for tests."""
@@ -58,19 +58,19 @@ class RatePanel(Panel):
             imgui.text_colored(theme.FAINT, own)
             return
         if self._rates is None or self._rates[0] is not info:
-            found = rates(info)
+            found = measure_rates(info)
             self._rates = (info, found, _lanes(found, own) if found is not None else [])
         _, found, lanes = self._rates
         if found is None:
             imgui.text_colored(theme.FAINT, "There are no planes.")
             return
         transport = session.transport
-        self.stretch.bound(transport.start, max(float(found.times[-1]), transport.start))
+        self.time_zoom.bound(transport.start, max(float(found.times[-1]), transport.start))
         high = BARS + 6 + imgui.get_text_line_height_with_spacing() * 2.5
         imgui.begin_child("rate", (0, max(imgui.get_content_region_avail().y - high, WORDS + CURVE + 24)))
         row = _row(found, transport.time) - (len(found.times) - len(found.rate))
         now = {("rate", 0): float(found.rate[row])} if row >= 0 else {}
-        self.lanes.draw(session, lanes, self.stretch, now)
+        self.lanes.draw(session, lanes, self.time_zoom, now)
         imgui.end_child()
         self._planes(session, found)
         _table(found)
@@ -84,22 +84,22 @@ class RatePanel(Panel):
         info = session.source.info
         if info.plane_bits is not None:
             return info, ""
-        if session.source.looking:
+        if session.source.probing:
             return None, "Reading..."
         animation = session.scene.animation if isinstance(session.scene, Scene) else None
         if not isinstance(animation, Animation):
             return None, "There are no planes."
-        if self._would is None or self._would[0] is not animation:
+        if self._encoded is None or self._encoded[0] is not animation:
             result: list[StreamInfo | None] = []
-            self._would = (animation, result)
+            self._encoded = (animation, result)
             threading.Thread(
-                target=lambda: result.append(encoded(animation)), name="fba rate", daemon=True
+                target=lambda: result.append(probe_encoded(animation)), name="fba rate", daemon=True
             ).start()
-        if not self._would[1]:
+        if not self._encoded[1]:
             session.rolling.add(self.name)
             return None, "Encoding, to see what it would take..."
         session.rolling.discard(self.name)
-        would = self._would[1][0]
+        would = self._encoded[1][0]
         return would, "if encoded" if would else "No stream."
 
     def _planes(self, session: Session, found: Rates) -> None:
@@ -107,7 +107,7 @@ class RatePanel(Panel):
         left, top = imgui.get_cursor_screen_pos()
         wide = max(imgui.get_content_region_avail().x, 8.0)
         imgui.invisible_button("planes", (wide, BARS))
-        ruler = Ruler(self.stretch.low, self.stretch.high, left, left + wide)
+        ruler = Ruler(self.time_zoom.low, self.time_zoom.high, left, left + wide)
         self.bars = (left, top, left + wide, top + BARS)
         mouse = imgui.get_io().mouse_pos.x
         if imgui.is_item_active():
@@ -122,23 +122,25 @@ class RatePanel(Panel):
             (left, top), (left + wide, top + BARS), theme.packed((0, 0, 0, 0.22)), rounding=3.0
         )
         plain, key = theme.packed(theme.ACCENT, 0.75), theme.packed(theme.WARM)
-        for x, right, tall, intra in self._made(found, wide):
+        for x, right, tall, intra in self._bar_boxes(found, wide):
             to.add_rect_filled(
                 (left + x, top + BARS - tall), (left + right, top + BARS), key if intra else plain
             )
         at = ruler.x(session.transport.time)
-        if self.stretch.low <= session.transport.time <= self.stretch.high:
+        if self.time_zoom.low <= session.transport.time <= self.time_zoom.high:
             to.add_line((at, top), (at, top + BARS), theme.packed(theme.TEXT, 0.8))
 
-    def _made(self, found: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
+    def _bar_boxes(self, found: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
         """(left, right, height, I plane) of the bars; kept until something changes."""
-        stretch = self.stretch
-        made_for = (found, stretch.low, stretch.high, wide)
+        time_zoom = self.time_zoom
+        made_for = (found, time_zoom.low, time_zoom.high, wide)
         if self._bars[0] == made_for:
             return self._bars[1]
-        inside = int(((found.times >= stretch.low) & (found.times <= stretch.high)).sum())
+        inside = int(((found.times >= time_zoom.low) & (found.times <= time_zoom.high)).sum())
         count = max(min(int(wide / STEP), inside), 1)
-        tall, intra = columns(found.times, found.bits, found.intra, stretch.low, stretch.high, count)
+        tall, intra = bars_of_planes(
+            found.times, found.bits, found.intra, time_zoom.low, time_zoom.high, count
+        )
         heights = np.where(tall > 0, 2 + (BARS - 6) * np.sqrt(tall / max(float(found.bits.max()), 1.0)), 0.0)
         each = wide / count
         bars = [

@@ -80,7 +80,7 @@ def heading(text: str, *, exact: bool = False) -> None:
     imgui.pop_font()
 
 
-def shortened(text: str, wide: float) -> str:
+def shorten(text: str, wide: float) -> str:
     """The text, or as much of it as fits into so many points."""
     if imgui.calc_text_size(text).x <= wide:
         return text
@@ -89,7 +89,7 @@ def shortened(text: str, wide: float) -> str:
     return text.rstrip(" ;,") + "..."
 
 
-def chosen_name(label: str, names: Sequence[str], now: int) -> int:
+def choose_name(label: str, names: Sequence[str], now: int) -> int:
     """A list of names of which one is chosen, by number."""
     imgui.set_next_item_width(-1)
     if imgui.begin_combo(label, names[now]):

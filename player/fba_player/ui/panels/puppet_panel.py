@@ -13,8 +13,8 @@ from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels._curve_data import parameter
 from fba_player.ui.panels._puppet_rows import Group, Row, groups
-from fba_player.ui.panels._puppet_speech import mood, speech
-from fba_player.ui.panels.panel import Panel, shortened, tooltip
+from fba_player.ui.panels._puppet_speech import draw_expressions, draw_visemes
+from fba_player.ui.panels.panel import Panel, shorten, tooltip
 
 TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
 """Points that a row's name takes, its value, and the button that gives it back."""
@@ -76,8 +76,8 @@ class PuppetPanel(Panel):
                     if kind:
                         self._groups(performer, kind)
                     else:
-                        speech(performer)
-                        mood(performer)
+                        draw_visemes(performer)
+                        draw_expressions(performer)
                     imgui.end_child()
                     imgui.pop_style_var(2)
                     imgui.end_tab_item()
@@ -148,7 +148,7 @@ class PuppetPanel(Panel):
                 if self.together and row.side == "r" and row.mirror is not None:
                     continue
                 self._row(performer, group, place, row)
-            _for_all(performer, group, touched=touched)
+            _group_buttons(performer, group, touched=touched)
 
     def _row(self, performer: Performer, group: Group, place: int, row: Row) -> None:
         """A name, a slider, and a button that gives it back where it was moved."""
@@ -170,9 +170,9 @@ class PuppetPanel(Panel):
         whole = imgui.get_content_region_avail().x
         name_wide = min(TITLE, max(whole - RELEASE - VALUE - SLIDER, SHORTEST))
         imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.TEXT if touched else theme.FAINT, shortened(title, name_wide - 6))
+        imgui.text_colored(theme.TEXT if touched else theme.FAINT, shorten(title, name_wide - 6))
         if imgui.is_item_hovered():
-            tooltip(_told(row))
+            tooltip(_parameter_names(row))
         imgui.same_line(name_wide)
         right = x + whole - RELEASE
         wide = max(whole - name_wide - RELEASE - VALUE, 16.0)
@@ -232,7 +232,7 @@ class PuppetPanel(Panel):
             _give_back(performer, one.kind, one.numbers)
 
 
-def _for_all(performer: Performer, group: Group, *, touched: bool) -> None:
+def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None:
     """Buttons for a whole group."""
     if imgui.small_button(f"All to zero##{group.name}"):
         for number in group.numbers:
@@ -247,7 +247,7 @@ def _for_all(performer: Performer, group: Group, *, touched: bool) -> None:
     imgui.dummy((1, 2))
 
 
-def _told(row: Row) -> str:
+def _parameter_names(row: Row) -> str:
     """Which parameters a row moves."""
     names = [parameter(row.kind, number).name for number in row.numbers]
     pairs = zip(row.numbers, names, strict=True)
