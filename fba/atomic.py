@@ -1,4 +1,4 @@
-"""Write a file completely or not at all: a temporary file beside it is renamed over it at the end."""
+"""Atomic writing: a temporary file in the same folder is renamed over the target when it is complete."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _OPEN_FILE = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,9})")
 _STANDARD = {"/dev/stdin": 0, "/dev/stdout": 1, "/dev/stderr": 2}
 
 _unfinished: set[str] = set()
-"""Temporary files that may exist now, noted before they are made: Ctrl-C may come between any two steps."""
+"""Temporary files that may exist now, added before they are made: Ctrl-C may come between any two steps."""
 
 
 @contextlib.contextmanager
 def atomic(path: PathLike) -> Iterator[BinaryIO]:
-    """A binary file to write to; the target appears, or changes, only when the block ends well.
+    """Open a binary file to write; the target appears, or changes, only if the block ends without an error.
 
-    Whatever leaves the block early (an exception, Ctrl-C) removes the temporary file and leaves an
-    old target as it was. An existing target keeps its permissions, a link is written through. A device, a
-    pipe with a reader and an open file by its number (`/dev/null`, `>(program)`, `/dev/stdout`) are written
-    to directly. Raises FormatError where the target cannot be written.
+    If an exception or Ctrl-C leaves the block, the temporary file is removed and an old target stays as it
+    was. An existing target keeps its permissions, and of a link, the file that it points to is written. A
+    device, a pipe with a reader and an open file by its number (`/dev/null`, `>(program)`, `/dev/stdout`) are
+    written to directly. Raises FormatError where the target cannot be written.
     """
     name = os.fspath(path)
     target, mode, direct = check_target(name)
@@ -47,16 +47,17 @@ def atomic(path: PathLike) -> Iterator[BinaryIO]:
                 os.chmod(temporary, stat.S_IMODE(mode))
             os.replace(temporary, target)
         except FbaError:
-            raise  # some are also OSErrors, and say more than "could not be written"
+            raise  # some are also OSErrors, with a better message
         except OSError as error:
             raise FormatError(f"could not be written: {_reason(error)}", path=name) from error
 
 
 @contextlib.contextmanager
 def atomic_path(path: PathLike) -> Iterator[Path]:
-    """Yields the name of a temporary file beside the target: for encoders that want a name, not an open file.
+    """Yield the path of a temporary file, for encoders that need a name instead of an open file.
 
-    It is renamed to the target where the block ends well, and removed where it does not. Raises FormatError
+    It lies in the folder of the target, is renamed to the target if the block ends without an error, and
+    removed otherwise. Raises FormatError
     where the target cannot be written, or is a device or a pipe.
     """
     name, mode, direct = check_target(path)
@@ -76,7 +77,7 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
 
 
 def write_error(path: PathLike, error: BaseException, what: str = "could not be written") -> FbaError:
-    """The error to raise where writing failed: `what`, the reason, and what to do where the disk is full."""
+    """The error to raise when writing failed: `what`, the reason, and what to do if the disk is full."""
     if isinstance(error, FbaError):
         return error
     reason = _reason(error) or type(error).__name__
@@ -86,10 +87,10 @@ def write_error(path: PathLike, error: BaseException, what: str = "could not be 
 
 
 class Target(NamedTuple):
-    """Where a file is written.
+    """A file to write.
 
-    path: its name with links followed. mode: st_mode, None where there is no file yet. direct: what must be
-    written to as it is, because no file can take its place: a device, a pipe, an open file.
+    path: its name with links followed. mode: st_mode; None if it does not exist yet. direct: whether it is
+    written in place because no other file can replace it: a device, a pipe, an open file.
     """
 
     path: str
@@ -98,10 +99,9 @@ class Target(NamedTuple):
 
 
 def check_target(path: PathLike) -> Target:
-    """Where a file of that name is written.
+    """Follow links, and check that a file of that name can be written.
 
-    Raises FormatError where it cannot be written: a folder, a file or a folder that is write-protected, no
-    such folder.
+    Raises FormatError for a folder, a write-protected file or folder, and a folder that does not exist.
     """
     name = os.fspath(path)
     number = _descriptor(name)
@@ -128,7 +128,7 @@ def check_target(path: PathLike) -> Target:
 
 
 def _check_folder(folder: str, name: str) -> None:
-    """FormatError where no file can be made in a folder. name: of the file, as the user wrote it."""
+    """Raise FormatError if no file can be made in a folder. name: of the file, as the user wrote it."""
     try:
         os.stat(os.path.join(folder, ""))
     except FileNotFoundError as error:
@@ -144,22 +144,22 @@ def _check_folder(folder: str, name: str) -> None:
 
 
 def _descriptor(name: str) -> int | None:
-    """The number of an open file that has this name, as `/dev/stdout` is 1; else None."""
-    found = _OPEN_FILE.fullmatch(name)
-    return int(found[1]) if found else _STANDARD.get(name)
+    """The descriptor of an open file by its name, 1 for `/dev/stdout`; None for other names."""
+    match = _OPEN_FILE.fullmatch(name)
+    return int(match[1]) if match else _STANDARD.get(name)
 
 
 @contextlib.contextmanager
 def temporary_beside(target: str, suffix: str, name: PathLike) -> Iterator[tuple[str, int]]:
-    """A new file in the target's folder, and its open handle: gone when the block ends, unless renamed.
+    """Make a new file in the target's folder; yields its name and open handle, and removes it at the end.
 
-    A block that never ends, because Ctrl-C came while it was being entered, leaves it to the end of the
-    program. Raises FormatError, which gives the name as the user wrote it, where it cannot be made.
+    If Ctrl-C comes while the block is being entered, it is removed when the program ends. Raises FormatError,
+    with the name as the user wrote it, if it cannot be made.
     """
     temporary = os.path.join(os.path.dirname(target), f".fba-{secrets.token_hex(6)}{suffix}")
     _unfinished.add(temporary)
     try:
-        # created with the permissions that a plain open() would give, as the umask wants them
+        # with the permissions that open() gives, which follow the umask
         handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     except (OSError, ValueError) as error:
         _unfinished.discard(temporary)
@@ -184,7 +184,7 @@ def _remove_unfinished() -> None:
 
 @contextlib.contextmanager
 def _open_directly(name: str) -> Iterator[BinaryIO]:
-    """What must not be replaced by a file: a device, a pipe, an open file."""
+    """Open what no file can replace: a device, a pipe, an open file."""
     number = _descriptor(name)
     try:
         if number is not None:

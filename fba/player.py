@@ -1,13 +1,14 @@
-"""The player: animations in a window, as pictures, and as films.
+"""The player: shows animations in a window, and renders them as pictures and films.
 
     from fba.player import Offscreen, play, render
     play(fba.read("talk.fba"))                       # opens a window
     render(fba.read("talk.fba"), "talk.mp4")         # needs no display
     with Offscreen(fba.read("talk.fba")) as view:
-        pixels = view.frame(1.5)                            # uint8 (720, 1280, 4)
+        pixels = view.frame(1.5)                     # uint8 (720, 1280, 4)
 
-These are the public names of the package `fba_player`. Importing them costs next to nothing; OpenGL is loaded
-where a picture is made. In a notebook, a cell that ends in an `Animation` shows a film once this is imported.
+These are the public names of the package `fba_player`. Each is imported when it is first used, and OpenGL
+when a picture is made. Once this module is imported in a notebook, a cell that ends in an `Animation` shows a
+film.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ def __dir__() -> list[str]:
 
 
 def _show_in_notebook() -> None:
-    """Show animations as films, where this runs in a notebook."""
+    """Make a notebook show animations as films; does nothing elsewhere."""
     ipython = sys.modules.get("IPython")
     shell = None if ipython is None else ipython.get_ipython()
     if shell is not None:

@@ -1,4 +1,4 @@
-"""Films as GIF: one palette, made from the whole film, and dithering that rests where the picture rests."""
+"""Films as GIF: one palette for the film, and dithering that does not flicker where nothing moves."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from fba.atomic import PathLike, atomic_path, write_error
 from fba_player.sound.pyav import import_av
 
 SMOOTH = Fraction(25)
-"""Frames a second that are enough where none are asked for; some browsers slow down above 50."""
+"""Most frames per second where none are asked for; some browsers slow down above 50."""
 IN_MEMORY = 64 << 20
-"""Bytes of pictures that are held in memory until the palette is known; beyond that, on disk."""
+"""Bytes of pictures held in memory until the palette is known; more go to disk."""
 TICKS = 100
 """A GIF's times are hundredths of a second."""
 DITHER = "paletteuse=dither=sierra2_4a:diff_mode=rectangle"
 
 
 def gif_rate(rate: Fraction) -> Fraction:
-    """The rate that a film would have, divided by a whole number where it is above 25 frames a second."""
+    """The frame rate of a GIF: that of the film, divided by an integer so that it is at most 25."""
     return rate / math.ceil(rate / SMOOTH)
 
 
 class Gif:
-    """A `Sink`: loops for ever. The pictures wait, packed, until the last one is there.
+    """A `Sink` that writes a GIF which loops for ever. Pictures are stored until the last one is known.
 
-    See `Recorder` for the arguments.
+    The arguments are those of `Recorder`.
     """
 
     def __init__(self, path: PathLike, size: tuple[int, int], rate: Fraction) -> None:
@@ -50,7 +50,7 @@ class Gif:
         self._colours, self._into, self._palette = self._graph("palettegen=stats_mode=full", 1)
 
     def write(self, pixels: UInt8, number: int) -> None:
-        """A picture, uint8 (H, W, 4), at number / rate seconds."""
+        """Add a picture, uint8 (H, W, 4), at number / rate seconds."""
         try:
             self._pictures.write(np.ascontiguousarray(pixels[..., :3]).data)
         except OSError as error:
@@ -59,7 +59,7 @@ class Gif:
         self._numbers.append(number)
 
     def finish(self, count: int) -> Path:
-        """The film, count / rate seconds long, stands under its name."""
+        """Finish the film, count / rate seconds long; returns its path."""
         self._into[0].push(None)
         palette = self._palette.pull()
         times = [round(number / self._rate * TICKS) for number in (*self._numbers, count)]
@@ -76,7 +76,7 @@ class Gif:
         return self._path
 
     def abort(self) -> None:
-        """Remove what there is of it."""
+        """Remove the unfinished file."""
         with contextlib.suppress(InterruptedError), self._cleanup:
             raise InterruptedError
 
@@ -95,7 +95,7 @@ class Gif:
             if self.stopped:
                 return
             if time <= at:
-                continue  # two within a hundredth of a second
+                continue  # a second picture within a hundredth of a second
             at = time
             pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)
             into[0].push(self._frame(pixels, "rgb24", number))
@@ -110,7 +110,7 @@ class Gif:
         return frame
 
     def _graph(self, description: str, inputs: int) -> tuple[Any, list[Any], Any]:
-        """A filter between pictures of the film's size and what comes out; a second input is a palette."""
+        """(graph, inputs, output) of a filter for pictures of the film's size; input 2 is a palette."""
         name, _, options = description.partition("=")
         graph = self._av.filter.Graph()
         width, height = self._size

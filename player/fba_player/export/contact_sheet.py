@@ -1,4 +1,4 @@
-"""Sheets of small pictures: every FAP, viseme and expression of a face, with its name below it."""
+"""Contact sheets: every FAP, viseme and expression of a face, each with its name."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fba_player.view.camera import Camera, Subject
 from fba_player.view.font import label_font, shortened
 
 SHEETS = ("faps", "visemes", "expressions", "all")
-"""What there are sheets of."""
+"""Names of the sheets."""
 COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3}
 TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360)}
 """Columns, and width and height of a picture in pixels."""
@@ -33,7 +33,10 @@ FULL = 63
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """One picture. label, note: the two lines below it. faps (68,): what the face shows."""
+    """One picture. label, note: the two lines below it. faps: float32 (68,). view: see `close_up`.
+
+    yaw, pitch: of the camera, degrees.
+    """
 
     label: str
     note: str
@@ -46,9 +49,9 @@ class Tile:
 def contact_sheet(
     what: str = "all", model: FaceModel | None = None, *, tile: tuple[int, int] | None = None
 ) -> UInt8:
-    """A sheet of labelled pictures: uint8 (H, W, 3), sRGB.
+    """Draw a sheet of labelled pictures: uint8 (H, W, 3), sRGB.
 
-    what: "faps", all 66 one by one at a telling value, from where it can be seen; "visemes", the 14;
+    what: "faps", each of the 66 at a value and from a side that show it well; "visemes", the 14;
     "expressions", the 6 at full intensity; "all", one sheet below the other. model: the face, by default
     the built-in head. tile: width and height of one picture in pixels.
 
@@ -103,7 +106,10 @@ def _fap_tiles() -> tuple[Tile, ...]:
 
 
 def close_up(view: str, scene: Scene) -> Subject:
-    """What is in view: "face", or a part of it by the model's feature points; "face" where it lacks them."""
+    """The subject of a close-up: "face", or a part of it such as "mouth", by the model's feature points.
+
+    Without those points it is the face.
+    """
     whole = scene.face_subject
     unit = scene.model.fapu
     eyes, mouth, nose = unit.ES * 1024, unit.MW * 1024, unit.ENS * 1024

@@ -1,4 +1,4 @@
-"""A performance on one sheet: pictures at even distances, each with its time."""
+"""A sheet of frames of an animation at even distances in time, each with its time code."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from fba_player.view.protocols import Showable
 Progress = Callable[[int, int], None]
 
 TILE = (320, 240)
-"""Width and height of one picture in pixels, where none are given."""
+"""Default width and height of one picture in pixels."""
 SHAPE = 16 / 10
-"""Width by height that the whole sheet comes near to."""
+"""Width / height that a sheet should have."""
 MOST_PIXELS = 200_000_000
 SMALLEST = 16
 SAMPLES = 4
@@ -41,14 +41,14 @@ def film_sheet(
     end: float | None = None,
     progress: Progress | None = None,
 ) -> UInt8:
-    """A sheet of frames of an animation, with their time codes: uint8 (H, W, 3), sRGB.
+    """Draw a sheet of frames of an animation with their time codes: uint8 (H, W, 3), sRGB.
 
-    count: how many, the first and the last among them; fewer where there are not so many. tile: width and
-    height of one picture in pixels, by default 320x240. camera: as `Offscreen` takes it. start, end:
-    seconds, which part of it. progress: called with (done, total) pictures.
+    count: number of frames, including the first and the last; at most all. tile: width and height of one
+    picture in pixels, by default 320x240. camera: as in `Offscreen`. start, end: the part to show, in
+    seconds. progress: called with (done, total) pictures.
 
-    Raises ValueError for a count below 1, pictures below 16x16 or a sheet too large to be one, RangeError
-    where nothing lies between start and end, DisplayError where there is no OpenGL.
+    Raises ValueError for a count below 1, pictures below 16x16 or a sheet that would be too large, RangeError
+    if no frame lies between start and end, DisplayError where there is no OpenGL.
     """
     scene = as_scene(subject)
     size = tile or TILE
@@ -72,7 +72,7 @@ def film_sheet(
 
 
 def choose_frames(scene: Showable, count: int, start: float | None, end: float | None) -> list[int]:
-    """Positions of frames in the animation, at even distances in time; each once, in order."""
+    """Choose frames at even distances in time: positions in the animation, ascending, without repeats."""
     timeline = scene.timeline
     times = np.array([float(timeline.time_of(frame)) for frame in range(timeline.frames)])
     for name, value in (("start", start), ("end", end)):
@@ -96,7 +96,7 @@ def choose_frames(scene: Showable, count: int, start: float | None, end: float |
 
 
 def choose_columns(count: int, step: tuple[int, int]) -> int:
-    """How many pictures stand side by side: the sheet a little wider than high, few places empty."""
+    """Number of columns for a sheet a little wider than high, with few empty cells. step: size of a cell."""
     ideal = math.sqrt(count * SHAPE * step[1] / step[0])
     near = range(max(math.floor(ideal * 0.8), 1), min(math.ceil(ideal * 1.3), count) + 1)
     return min(near or (count,), key=lambda columns: (-count % columns / count, abs(columns - ideal)))

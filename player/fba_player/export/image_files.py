@@ -1,4 +1,4 @@
-"""Single pictures as files: PNG, with transparency where there is some, and JPEG."""
+"""Single pictures as PNG, optionally transparent, and JPEG files."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ JPEG_QUALITY = 90
 
 
 def write_picture(path: PathLike, pixels: UInt8, *, transparent: bool = False) -> Path:
-    """Write pixels, uint8 (H, W, 3 or 4), sRGB, as .png or .jpg, whole or not at all; returns the path.
+    """Write pixels, uint8 (H, W, 3 or 4), sRGB, as .png or .jpg, atomically; returns the path.
 
-    transparent: keeps the fourth channel, how opaque each pixel is (not multiplied into the others); PNG
-    only. Raises UnsupportedError for another suffix, or a transparent JPEG,
-    FormatError where it cannot be written.
+    transparent: keeps the fourth channel, the opacity (not premultiplied); PNG only. Raises UnsupportedError
+    for another suffix or a transparent JPEG, FormatError if it cannot be written.
     """
     target = Path(path)
     check_picture(target, transparent=transparent)
@@ -31,21 +30,21 @@ def write_picture(path: PathLike, pixels: UInt8, *, transparent: bool = False) -
 
 
 def put_picture(file: BinaryIO, pixels: UInt8, suffix: str, *, transparent: bool = False) -> None:
-    """Like `write_picture`, into an open file."""
+    """Write pixels as `write_picture` does, into an open file."""
     from PIL import Image
 
     channels = slice(None) if transparent else slice(3)
     picture = Image.fromarray(np.ascontiguousarray(pixels[..., channels]))
     if suffix.lower() == ".png":
-        # The search for repeats longer than runs takes five times as long, and finds little where light
-        # falls on skin: files are as large without, or smaller than with a quick search.
+        # Searching for repeats other than runs takes five times as long and finds little in shaded skin:
+        # files are as large without it, and smaller than with a quick search.
         picture.save(file, format="PNG", compress_type=zlib.Z_RLE)
     else:
         picture.save(file, format="JPEG", quality=JPEG_QUALITY)
 
 
 def check_picture(target: Path, *, transparent: bool) -> None:
-    """Raise UnsupportedError where a picture of that name cannot be written."""
+    """Raise UnsupportedError if the suffix is none of a picture, or the picture cannot be transparent."""
     suffix = target.suffix.lower()
     if suffix not in PICTURES:
         raise UnsupportedError(

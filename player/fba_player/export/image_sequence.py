@@ -14,7 +14,7 @@ from fba_player.export.recorder import FILMS
 
 NUMBER = re.compile(r"%(0?\d{0,2})d")
 NAMES = "%05d.png"
-"""How the pictures of a folder are called where only the folder is given."""
+"""Names of the pictures where only a folder is given."""
 
 
 class Numbered:
@@ -45,11 +45,11 @@ class Numbered:
         self._before, self._after = NUMBER.split(self.name)[0], NUMBER.split(self.name)[-1]
 
     def path(self, number: int) -> Path:
-        """The picture of a frame, counted from 0."""
+        """Path of the picture of a frame, counted from 0."""
         return self.folder / f"{self._before}{number:0{self._width}d}{self._after}"
 
     def existing(self) -> list[int]:
-        """Numbers of the pictures that exist already, sorted."""
+        """Numbers of the pictures that exist, ascending. Raises FormatError for an unreadable folder."""
         try:
             names = os.listdir(self.folder)
         except FileNotFoundError:
@@ -62,24 +62,24 @@ class Numbered:
 
 
 def is_sequence(path: PathLike) -> bool:
-    """Whether a name means numbered pictures: it has a % in its last part, or ends with a slash."""
+    """Whether a path stands for numbered pictures: it has a % in its last part, or ends with a slash."""
     text = os.fspath(path)
     return text.endswith(("/", os.sep)) or "%" in os.path.basename(text)
 
 
 def is_film(path: PathLike) -> bool:
-    """Whether a name means many pictures: a film, or numbered ones."""
+    """Whether a path stands for many pictures: a film, or numbered pictures."""
     return os.path.splitext(os.fspath(path))[1].lower() in FILMS or is_sequence(path)
 
 
 class Sequence:
-    """A `Sink`: one picture a frame, each whole or not at all, the first one number 0.
+    """A `Sink` that writes one picture per frame, from number 0.
 
-    names: see `Numbered`. count: how many there will be. transparent: PNG with an alpha channel. replace:
-    False refuses where pictures of these names exist; True replaces them, but refuses where some would be
-    left of an older, longer sequence. The folder is made where it is missing.
+    names: see `Numbered`. count: number of pictures that will be written. transparent: PNG with an alpha
+    channel. replace: whether pictures of these names may be overwritten. The folder is made if it is missing.
 
-    Raises FormatError where it refuses, UnsupportedError for names that are not those of pictures.
+    Raises FormatError if such pictures exist and replace is False, or if pictures of an older, longer
+    sequence would be left; UnsupportedError for another suffix than those of pictures.
     """
 
     def __init__(
@@ -105,16 +105,16 @@ class Sequence:
             raise write_error(names.folder, error, "the folder cannot be made") from error
 
     def write(self, pixels: UInt8, number: int) -> None:
-        """A picture, uint8 (H, W, 4)."""
+        """Write a picture, uint8 (H, W, 4), as that of frame `number`."""
         path = self._names.path(number)
         write_picture(path, pixels, transparent=self._transparent)
 
     def finish(self, count: int) -> Path:
-        """The folder; all pictures are there."""
+        """The folder of the pictures."""
         return self._names.folder
 
     def abort(self) -> None:
-        """Pictures that are finished stay."""
+        """Do nothing: finished pictures stay."""
 
 
 def _range_text(names: Numbered, numbers: list[int]) -> str:

@@ -16,19 +16,19 @@ from fba_player.sound.soundtrack import FilmedSound, Soundtrack
 
 ENCODERS = ("libx264", "libopenh264", "h264")
 QUALITY, PRESET = "18", "veryfast"
-"""H.264 constant rate factor, and how long x264 may think."""
+"""Constant rate factor and speed preset of x264."""
 MOTION = "subme=1:me=dia"
-"""How hard it looks for motion: a third less work than the preset's own, for a twentieth more bytes."""
+"""Motion search: a third less work than that of the preset, for 5 % more bytes."""
 THREADS = 4
-"""The same everywhere: the number of threads decides about bits."""
+"""Encoder threads, the same on every machine: their number changes the bits."""
 BT709, SRGB_CURVE, STUDIO_RANGE = 1, 13, 1
-"""Numbers of ISO/IEC 23091-2: the colours of HD video, sRGB's curve; and 16..235 for black to white."""
+"""Code points of ISO/IEC 23091-2: colours of HD video, the curve of sRGB, and the range 16..235."""
 
 
 class Mp4:
-    """A `Sink`: yuv420p, exact frame times, the sound beside it from start to end.
+    """A `Sink` that writes MP4: H.264 in yuv420p with exact frame times, and AAC.
 
-    See `Recorder` for the arguments.
+    The arguments are those of `Recorder`.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Mp4:
             name = _choose_encoder(self._av)
             temporary = self._cleanup.enter_context(atomic_path(path))
             with self._convert_errors():
-                options = {"movflags": "+faststart"}  # plays while it is still loading
+                options = {"movflags": "+faststart"}  # so that it plays while it is still loading
                 self._container = self._av.open(str(temporary), "w", format="mp4", options=options)
                 self._stream = _video_stream(self._container, name, rate, self._size)
                 self._audio = None if soundtrack is None else _AudioTrack(self._container, soundtrack)
@@ -77,7 +77,7 @@ class Mp4:
             undo.pop_all()
 
     def write(self, pixels: UInt8, number: int) -> None:
-        """A picture, uint8 (H, W, 4), at number / rate seconds."""
+        """Add a picture, uint8 (H, W, 4), at number / rate seconds."""
         width, height = self._size
         with self._convert_errors():
             shown = self._framed(pixels[:height, :width], format="rgba")
@@ -88,7 +88,7 @@ class Mp4:
                 self._audio.encode_until(number / self._rate)
 
     def finish(self, count: int) -> Path:
-        """The film, count / rate seconds long, stands under its name."""
+        """Finish the film, count / rate seconds long; returns its path."""
         with self._convert_errors():
             self._container.mux(self._stream.encode(None))
             if self._audio is not None:
@@ -101,7 +101,7 @@ class Mp4:
         return self._path
 
     def abort(self) -> None:
-        """Remove what there is of it."""
+        """Remove the unfinished file."""
         with contextlib.suppress(Exception):
             if self._container is not None:
                 self._container.close()
@@ -122,11 +122,11 @@ class Mp4:
 
 
 class _Abandoned(Exception):  # noqa: N818 - never seen outside
-    """Leaves the `with` blocks as an error does, so that they remove their files."""
+    """Leaves the `with` blocks like an error, so that they remove their files."""
 
 
 class _AudioTrack:
-    """The sound as AAC: encoded as far as the pictures are."""
+    """The AAC track of a film, encoded as far as its pictures."""
 
     def __init__(self, container: Any, soundtrack: FilmedSound) -> None:
         self._container, self._soundtrack = container, soundtrack

@@ -1,7 +1,6 @@
-"""Animations in notebooks: a small film in the page.
+"""Animations in notebooks, shown as small films.
 
-`fba.player` calls `show_animations` where it is imported in a notebook; the library below the player knows
-nothing of it.
+`fba.player` calls `show_animations` when it is imported in a notebook; `fba` itself knows nothing of it.
 """
 
 from __future__ import annotations
@@ -23,24 +22,24 @@ from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
 WIDTH, SHAPE = 480, 4 / 3
-"""Of the film: pixels, and width by height."""
+"""Width of the film in pixels, and width / height."""
 SECONDS = Fraction(15)
-"""A longer performance is cut: a page is not to grow by it, nor its reader to wait."""
+"""Longest film: longer ones would make the page large, and the reader wait."""
 RATE = Fraction(30)
-"""More frames a second are thinned out."""
+"""Most frames per second."""
 MOST_BYTES = 4 << 20
-"""A film that is larger is not put into the page."""
+"""Size of a film above which the page gets a still picture instead."""
 NARROWEST = 16
 
 
 class Preview:
-    """A film of an animation that a notebook shows where this is the value of a cell.
+    """A film of an animation, shown by a notebook where this is the value of a cell.
 
     subject: an animation or a scene. width: pixels, at least 16; the height is three quarters of it. camera:
-    as `Offscreen` takes it. start, end: seconds, which part of it; at most 15 s are shown. audio: a file
-    whose sound is heard with it, audio_offset seconds later than the first frame.
+    as in `Offscreen`. start, end: the part to show, in seconds; at most 15 s are shown. audio: a sound file
+    that begins audio_offset seconds after the first frame.
 
-    Without a video encoder it is a still picture, without OpenGL a line of text; it says so.
+    Without a video encoder it is a still picture, without OpenGL a line of text, with the reason.
     """
 
     def __init__(
@@ -71,7 +70,7 @@ class Preview:
         return f"<preview of {describe(self._animation)}>"
 
     def _repr_html_(self) -> str:
-        """The film as HTML that needs nothing else; made once."""
+        """The film as self-contained HTML; made once."""
         if self._html is None:
             self._html = self._make_html()
         return self._html
@@ -96,7 +95,7 @@ class Preview:
         from fba_player.export.render import film_rate, record
 
         rate = film_rate(scene.timeline.rate)
-        rate /= -(-rate // RATE)  # whole frames are left out
+        rate /= -(-rate // RATE)  # an integer fraction: frames are left out evenly
         begin, end = scene.timeline.start, scene.timeline.end
         begin = begin if self._start is None else max(Fraction(self._start), begin)
         end = end if self._end is None else min(Fraction(self._end), end)
@@ -141,13 +140,13 @@ class Preview:
 
 
 def show_animations(shell: Any) -> None:
-    """Make cells that end in an `Animation` show a film. shell: IPython's InteractiveShell."""
+    """Make cells that end in an `Animation` show a film. shell: the InteractiveShell of IPython."""
     formatter = shell.display_formatter.formatters["text/html"]
     formatter.for_type_by_name("fba.animation", "Animation", lambda one: Preview(one)._repr_html_())
 
 
 def describe(animation: Animation) -> str:
-    """One line about an animation: its name, length, rate, and what it moves."""
+    """One line about an animation: its name, frames, duration, rate, and whether it has a face and a body."""
     parts = [
         name for name, track in (("face", animation.face), ("body", animation.body)) if track is not None
     ]

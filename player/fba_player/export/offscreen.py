@@ -1,4 +1,4 @@
-"""Pictures without a window: an animation at any time as an array of pixels."""
+"""Rendering without a window: pictures of an animation as arrays."""
 
 from __future__ import annotations
 
@@ -21,21 +21,20 @@ from fba_player.view.protocols import Showable
 from fba_player.view.view import View
 
 SAMPLES = 0
-"""Samples a pixel; 0: one, and edges smoothed afterwards."""
+"""Samples per pixel; 0 is one, with edges smoothed afterwards."""
 SAMPLES_OF_CLEAR = 4
-"""At least so many where the background is transparent."""
+"""Least samples per pixel if the background is transparent."""
 
 
 class Offscreen:
     """Renders a scene into memory; needs no display.
 
-    subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a
-    `Camera`, the name of a preset, or None for the one that suits the content. samples: samples a pixel
-    against jagged edges, 0 for one and a pass that smooths edges. Use it as a context manager, or `close` it.
-    One thread only.
+    subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a `Camera`,
+    the name of a preset, or None for the one that suits the content. samples: samples per pixel; 0 is one,
+    followed by a pass that smooths edges. Use it as a context manager, or `close` it; in one thread.
 
-    Raises DisplayError where OpenGL is missing or cannot draw this size; the text says what to install.
-    ValueError for a size below 1 or an unknown preset.
+    Raises DisplayError if OpenGL is missing or cannot draw this size, saying what to install; ValueError for
+    a size below 1 or an unknown preset.
     """
 
     def __init__(
@@ -59,7 +58,9 @@ class Offscreen:
         self._exact: Target | None = None
         self._samples = samples
         try:
-            with self._gl:  # current only while it is used: other contexts of this thread go on working
+            with (
+                self._gl
+            ):  # current only while it is used, so that other contexts of this thread keep working
                 self._target = Target(self._gl, self.size, samples)
                 self._renderer = Renderer(self._gl)
         except Exception:
@@ -68,24 +69,24 @@ class Offscreen:
         self._buffer = bytearray(width * height * 4)
 
     def frame(self, time: float) -> UInt8:
-        """The picture at a time in seconds: uint8 (H, W, 4), sRGB, top row first; opaque, unless the scene's
-        background is switched to transparent.
+        """The picture at a time in seconds: uint8 (H, W, 4), sRGB, top row first.
 
-        The same time gives the same picture. Raises ValueError for a time that is not finite, or after
-        `close`.
+        It is opaque, unless the scene's background is transparent. The same time gives the same picture.
+        Raises ValueError for a time that is not finite, or after `close`.
         """
         return self.draw(time).copy()
 
     def draw(self, time: float) -> UInt8:
-        """Like `frame`, into memory that the next call overwrites."""
+        """The picture at a time, as `frame` returns it, in memory that the next call overwrites."""
         if self._target is None:
             raise ValueError("this Offscreen is closed")
         return self._draw_view(self.scene.at(time), follow_camera(self.camera, self.scene, time))
 
     def still(self, faps: npt.ArrayLike) -> UInt8:
-        """A picture of the face for FAPs (68,) as `fba.face.resolve` gives them: uint8 (H, W, 4).
+        """A picture of the face for FAPs (68,) as `fba.face.resolve` returns them: uint8 (H, W, 4).
 
-        `camera` may be set in between. Raises ValueError for another shape, or after `close`.
+        It uses `camera`, which may be set before each call. Raises ValueError for another shape, or after
+        `close`.
         """
         values = np.asarray(faps, dtype=np.float32)
         if values.shape != (FAP_COUNT,):
@@ -100,7 +101,7 @@ class Offscreen:
         return self._read(view, camera, self._target)
 
     def _draw_over_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
-        """Both by several samples a pixel: a pass that smooths edges overlooks dark ones before black."""
+        """Both pictures, multisampled: the pass that smooths edges would miss dark ones before black."""
         with self._gl:
             if self._exact is None:
                 self._exact = Target(self._gl, self.size, max(self._samples, SAMPLES_OF_CLEAR))
@@ -116,11 +117,11 @@ class Offscreen:
         width, height = self.size
         pixels = np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)
         if view.extras is not None:
-            pixels[..., 3] = 255  # extras leave a mark there for the target
+            pixels[..., 3] = 255  # extras mark their pixels there for the target
         return pixels[::-1]
 
     def close(self) -> None:
-        """Give everything back; safe to call twice."""
+        """Release its resources; safe to call twice."""
         if self._gl is None:
             return
         with self._gl:
@@ -141,7 +142,7 @@ class Offscreen:
 
 
 def cut_out(black: UInt8, white: UInt8) -> UInt8:
-    """(H, W, 4) what is in front, with alpha, of the same picture before black and before white."""
+    """The foreground with alpha, uint8 (H, W, 4), from the same picture before black and before white."""
     dark, light = (picture[..., :3].astype(np.float32) for picture in (black, white))
     opaque = np.clip(1 - (light - dark).mean(axis=2) / 255, 0.0, 1.0)
     found = np.empty_like(black)
@@ -151,7 +152,7 @@ def cut_out(black: UInt8, white: UInt8) -> UInt8:
 
 
 def follow_camera(camera: Camera, scene: Scene, time: float) -> Camera:
-    """The camera, moved along with a performance that walks away."""
+    """The camera, moved along with a figure that walks away."""
     moved = scene.travel(time)
     if not any(moved):
         return camera

@@ -1,8 +1,8 @@
-"""A pose as a scene of pyrender, for programs that are built on it, and as a second opinion on our pictures.
+"""A pose as a pyrender scene: for programs built on pyrender, and to compare our pictures with.
 
 pyrender is an extra: `pip install ".[pyrender]"` in the checkout, or `pip install pyrender`. Its last release
-was made for NumPy 1: what it misses of that is lent to it while a scene is built, and taken back, so that
-nothing else sees it.
+was made for NumPy 1: while a scene is built, the names that NumPy 2 dropped are added, and removed
+afterwards.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ if TYPE_CHECKING:
 
 
 NUMPY_1 = {"infty": np.inf, "Inf": np.inf, "NaN": np.nan, "float_": np.float64}
-"""Names that NumPy 2 has dropped and pyrender, or trimesh below it, may ask for."""
+"""Names that NumPy 2 has dropped and that pyrender, or trimesh, may use."""
 WHITE, PUPIL = (0.62, 0.58, 0.55), (0.004, 0.004, 0.004)
-"""Of an eye, linear light."""
+"""Colours of an eye, linear."""
 IRIS_LIGHT = 2.2
-"""The iris' own colour is that below the cornea, which gathers light on it."""
+"""Factor on the colour of the iris, which is that under the cornea: the cornea gathers light on it."""
 WET = 0.15
-"""Roughness of an eye."""
+"""Roughness of a wet eye."""
 EXPOSURE = 0.72
-"""Our own pictures hold back what is bright; pyrender's do not, and get less light."""
+"""Factor on all lights: unlike ours, pyrender's pictures have no tone mapping."""
 EYE_ROWS, EYE_AROUND = 64, 48
 
 
@@ -57,14 +57,14 @@ def to_pyrender(
 ) -> Any:
     """A `pyrender.Scene` of an animation at t seconds: its meshes, our camera and the studio's lights.
 
-    model: the face, None for the built-in head. camera: a `Camera`, the name of a preset, or None for the one
-    that suits the content; aspect: width / height of the picture that is to be made. body, axes: as `Scene`
-    takes them. Everything stands in metres, y up, the person looking along +z.
+    model: the face; None for the built-in head. camera: a `Camera`, the name of a preset, or None for the one
+    that suits the content; aspect: width / height of the picture. body, axes: as in `Scene`. Units are
+    metres, y up, the person looking along +z.
 
     Without a display, set PYOPENGL_PLATFORM=egl before pyrender is imported, and draw the scene with
     `pyrender.OffscreenRenderer(width, height).render(scene)`.
 
-    Raises DisplayError where pyrender cannot be imported, and what `Scene` raises.
+    Raises DisplayError if pyrender cannot be imported, and the errors of `Scene`.
     """
     with _numpy_1_names():
         pyrender = _import_pyrender()
@@ -112,7 +112,7 @@ def _numpy_1_names() -> Iterator[None]:
 def _add(pyrender: Any, scene: Any, name: str, attributes: dict[str, Any], material: Any) -> None:
     primitive = pyrender.Primitive(material=material, mode=4, **attributes)
     mesh = pyrender.Mesh([primitive], name=name)
-    mesh.bounds  # noqa: B018 - works it out, and keeps it, while NumPy is as pyrender knows it
+    mesh.bounds  # noqa: B018 - computed and cached now, while the names of NumPy 1 are there
     scene.add(mesh, name=name)
 
 
@@ -162,7 +162,7 @@ def _world_attributes(
     triangles: Int32,
     colours: Float32,
 ) -> dict[str, Any]:
-    """Attributes of a primitive, in the world."""
+    """Attributes of a pyrender primitive in world coordinates."""
     turned = normals @ matrix[:3, :3].T
     turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
     opaque = np.ones((len(colours), 1))
@@ -175,7 +175,7 @@ def _world_attributes(
 
 
 def sway_with_head(places: npt.ArrayLike, sway: Float32, turn: Float64, centre: Float64) -> Float64:
-    """(V, 3) turned about a centre as far as each goes with the head: by sway (V,) times `turn`."""
+    """Positions (V, 3) turned about a centre by sway (V,) times `turn`, a rotation vector in radians."""
     at = np.asarray(places, dtype=np.float64)
     angle = float(np.linalg.norm(turn))
     if angle < 1e-6:
@@ -188,13 +188,13 @@ def sway_with_head(places: npt.ArrayLike, sway: Float32, turn: Float64, centre: 
 
 
 def _roughness(colours: Float32) -> float:
-    """One for the whole part: the colours' fourth channel says how glossy each vertex is."""
+    """One roughness for a mesh; the fourth channel of its colours is the gloss of each vertex."""
     return float(np.clip(1 - np.median(colours[:, 3]), 0.12, 1.0)) if len(colours) else 1.0
 
 
 def _add_camera(pyrender: Any, scene: Any, camera: Camera, aspect: float) -> None:
     matrix = camera.projection_matrix(aspect)
-    near = matrix[2, 3] / (matrix[2, 2] - 1)  # of the standard matrix of OpenGL
+    near = matrix[2, 3] / (matrix[2, 2] - 1)  # from the projection matrix of OpenGL
     far = matrix[2, 3] / (matrix[2, 2] + 1)
     lens = pyrender.PerspectiveCamera(
         yfov=math.radians(camera.field_of_view), znear=near, zfar=far, aspectRatio=aspect
@@ -208,7 +208,7 @@ def _add_lights(pyrender: Any, scene: Any) -> None:
     for name in ("KEY", "FILL", "RIM"):
         colour = np.array(lights[name])
         bright = float(colour.max())
-        # A surface of ours sends back colour x light, one of pyrender's that divided by pi.
+        # Our surfaces reflect colour x light, those of pyrender the same divided by pi.
         light = pyrender.DirectionalLight(color=colour / bright, intensity=bright * math.pi * EXPOSURE)
         scene.add(
             light, name=f"{name.lower()} light", pose=_shining_from(np.array(lights[f"{name}_DIRECTION"]))
@@ -222,14 +222,14 @@ def _ambient() -> Float64:
 
 
 def _studio() -> dict[str, tuple[float, float, float]]:
-    """The studio's lights, from the shaders that draw with them: linear light, and where they stand."""
+    """The studio's lights as the shaders define them: linear colours and directions by name."""
     text = (files("fba_player.gl") / "shaders" / "lighting.glsl").read_text(encoding="utf-8")
     found = re.findall(r"const vec3 ([A-Z_]+) = (?:normalize\()?vec3\(([^)]*)\)", text)
     return {name: tuple(float(v) for v in values.split(",")) for name, values in found}  # type: ignore[misc]
 
 
 def _shining_from(direction: Float64) -> Float64:
-    """(4, 4) pose of a light that shines along its -z, from there onto the origin."""
+    """Pose (4, 4) of a light that shines along its -z, from a direction onto the origin."""
     back = direction / np.linalg.norm(direction)
     right = np.cross([0.0, 1.0, 0.0], back)
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""Pictures become a film while they are made: they go in one by one, a thread of its own encodes them."""
+"""Records films: pictures are added one by one, and a thread encodes them."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from fba.errors import UnsupportedError
 from fba_player.sound.soundtrack import FilmedSound
 
 WAITING = 6
-"""Pictures that may wait for the encoder,"""
+"""Most pictures that wait for the encoder."""
 WAITING_BYTES = 96 << 20
-"""and bytes of them: of large pictures fewer wait, but two."""
+"""Most bytes of them; at least two pictures, however large."""
 FASTEST = 1000
-"""Frames a second that no film exceeds."""
+"""Most frames per second of a film."""
 FILMS = (".mp4", ".gif")
 TURN = 0.0005
-"""Seconds after which a thread that works hands over to one that waits: a tenth of Python's own choice."""
+"""Seconds after which a running thread yields to a waiting one: a tenth of Python's default."""
 
 
 class PromptThreads:
-    """While it is entered, once or several times, from any thread, Python's threads take turns more often.
+    """A context manager in which Python's threads take turns more often; several threads may enter it.
 
-    A thread that encodes asks for its turn four times a picture: at 5 ms each it would be slower than the
-    drawing, with a processor idle. read, change: the seconds of a turn, which are the whole process's.
+    The encoding thread waits for its turn four times per picture: at 5 ms each it would be slower than the
+    drawing, with a processor idle. read, change: get and set the switch interval of the process, in seconds.
     """
 
     def __init__(
@@ -65,38 +65,38 @@ class PromptThreads:
 
 
 PROMPT_THREADS = PromptThreads()
-"""The process's own."""
+"""The one instance: the switch interval belongs to the process."""
 
 
 class Sink(Protocol):
-    """Where the thread puts pictures: MP4, GIF, numbered files."""
+    """An encoder that takes pictures: MP4, GIF, numbered files."""
 
     stopped: bool
-    """Set from outside: `finish` is to come to an end without a result."""
+    """Set from outside to make `finish` stop early, without a result."""
 
     def write(self, pixels: UInt8, number: int) -> None:
-        """A picture, uint8 (H, W, 4) of the size it was opened with, at number / rate seconds."""
+        """Add a picture, uint8 (H, W, 4) of the film's size, at number / rate seconds."""
 
     def finish(self, count: int) -> Path:
-        """All is written, and lasts count / rate seconds; returns where it is."""
+        """Finish the film, count / rate seconds long; returns its path."""
 
     def abort(self) -> None:
-        """Leave nothing half-written; safe to call at any time, more than once."""
+        """Remove unfinished files; safe to call at any time, more than once."""
 
 
 class Recorder:
-    """Writes a film from pictures, as they come.
+    """Writes a film from pictures that are added one by one.
 
-    path: .mp4 (H.264, with sound) or .gif. size: width and height in pixels; MP4 loses the last column or
-    row of odd ones. rate: frames a second. audio: a file whose sound goes along (MP4 only), from
-    audio_start seconds in it (it may be negative: silence first), for as long as the film lasts; or a
-    `fba_player.sound.soundtrack.FilmedSound`, which the film closes.
+    path: .mp4 (H.264, with sound) or .gif. size: width and height in pixels; MP4 needs even ones, and cuts
+    the last column or row of odd ones. rate: frames per second. audio: a sound file (MP4 only), used from
+    audio_start seconds in it (if negative, silence comes first) for the length of the film; or a
+    `fba_player.sound.soundtrack.FilmedSound`, which is closed with the film.
 
-    Use it as a context manager: it closes at the end, and aborts where an exception leaves the block. The
-    film appears under its name, whole, when it is closed.
+    Use it as a context manager: it closes at the end, and aborts if an exception leaves the block. The file
+    appears under its name when it is complete.
 
-    Raises UnsupportedError for another suffix, ValueError for a size or rate that cannot be, DisplayError
-    without an encoder, FormatError where it cannot be written or the sound cannot be read.
+    Raises UnsupportedError for another suffix, ValueError for an impossible size or rate, DisplayError
+    without an encoder, FormatError if it cannot be written or the sound cannot be read.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class Recorder:
 
     @classmethod
     def into(cls, sink: Sink, path: PathLike, size: tuple[int, int], rate: Fraction) -> Recorder:
-        """A recorder of something else than a film: a sink that is open already."""
+        """A recorder that writes to a sink which is open already. path: for messages."""
         self = cls.__new__(cls)
         self.path, self.rate = Path(path), rate
         self._start(sink, size)
@@ -124,7 +124,7 @@ class Recorder:
     def _start(self, sink: Sink, size: tuple[int, int]) -> None:
         self.size = size
         self.dropped = 0
-        """Pictures that were left out as the encoder was busy."""
+        """Number of pictures that were left out because the encoder was busy."""
         self._last = -1
         self._sink = sink
         self._error: BaseException | None = None
@@ -136,36 +136,35 @@ class Recorder:
             self._free.put(np.zeros((size[1], size[0], 4), dtype=np.uint8))
         self._thread = threading.Thread(target=self._encode, name="fba recorder", daemon=True)
         self._thread.start()
-        atexit.register(self.abort)  # whoever forgets to close leaves no temporary file
+        atexit.register(self.abort)  # no temporary file stays if `close` is forgotten
 
     @property
     def frames(self) -> int:
-        """Frames that the film has so far, those that a late picture makes last longer among them."""
+        """Frames of the film so far, including those that repeat a picture."""
         return self._last + 1
 
     @property
     def seconds(self) -> Fraction:
-        """How long the film is so far."""
+        """Length of the film so far, exact."""
         return self.frames / self.rate
 
     def wants(self, time: float | Fraction) -> bool:
         """Whether a picture at a time (seconds from the film's start) would become a new frame.
 
-        Ask before a picture is read back from the graphics card: a window is faster than its film.
+        Ask before reading a picture back from the graphics card: a window draws more often than its film.
         """
         return self._number(time) > self._last
 
     def add(self, pixels: UInt8, time: float | Fraction | None = None, *, wait: bool = True) -> bool:
         """Add a picture; it is copied at once.
 
-        pixels: uint8 (H, W, 4 or 3), sRGB, top row first; of another size than the film's it is fitted
-        into it, with bars. time: seconds from the film's start, rounded to the film's frames; by default
-        one frame after the last. A picture stays until the next: times may skip frames. wait: True waits
-        for the encoder where it lags behind, False leaves the picture out instead.
+        pixels: uint8 (H, W, 4 or 3), sRGB, top row first; another size than that of the film is fitted into
+        it, with bars. time: seconds from the start of the film, rounded to its frames; by default one frame
+        after the last. Times may skip frames: a picture is shown until the next. wait: whether to wait for
+        the encoder if it lags behind; False leaves the picture out instead.
 
-        Returns whether it became a frame: not so where that moment has a picture already, or where it was
-        left out. Raises what the encoder met (FormatError for a full disk, DisplayError), ValueError
-        after `close`.
+        Returns False if the picture was left out, or if its frame has one already. Raises the errors of the
+        encoder (FormatError for a full disk, DisplayError), ValueError after `close`.
         """
         if self._closed:
             raise ValueError(f"{self.path}: this recording is closed")
@@ -189,10 +188,9 @@ class Recorder:
         return True
 
     def close(self) -> Path | None:
-        """Finish the film with what there is, and put it under its name.
+        """Finish the film; returns its path, or None if no picture was added.
 
-        Returns the path; None where there was no picture, and so no film. Raises what the encoder met;
-        nothing is left then. Safe to call twice.
+        Raises the errors of the encoder; no file is left then. Safe to call twice.
         """
         if self._closed:
             return self._result
@@ -211,7 +209,7 @@ class Recorder:
         return self._result
 
     def abort(self) -> None:
-        """Give up; nothing is left, and an older file of that name stays. Safe at any time."""
+        """Discard the film; an older file of that name stays. Safe to call at any time."""
         if not self._closed:
             self._closed = True
             atexit.unregister(self.abort)
@@ -247,7 +245,7 @@ class Recorder:
             raise self._error
 
     def _encode(self) -> None:
-        """The thread. After an error it goes on taking pictures, so that nobody waits for it."""
+        """The encoding thread. After an error it releases a buffer, so that `add` does not wait for ever."""
         try:
             with PROMPT_THREADS:
                 while (item := self._full.get()) is not None:
@@ -264,7 +262,7 @@ class Recorder:
 
 
 def exact_rate(rate: Fraction | int | str) -> Fraction:
-    """A film's frame rate as MP4 can carry it. Raises ValueError beyond 0..1000."""
+    """The frame rate as MP4 can store it. Raises ValueError unless it is above 0 and at most 1000."""
     exact = Fraction(rate)
     if not 0 < exact <= FASTEST:
         raise ValueError(f"a film's frame rate must lie above 0 and at most at {FASTEST}, not {exact}")
@@ -296,7 +294,7 @@ def _open_sink(
 
 
 def _fit(pixels: UInt8, size: tuple[int, int]) -> UInt8:
-    """As large as fits, in the middle, with black around it."""
+    """The picture scaled to fit, centred, with black bars."""
     from PIL import Image, ImageOps
 
     picture = Image.fromarray(np.ascontiguousarray(pixels)).convert("RGBA")

@@ -1,4 +1,4 @@
-"""Animations drawn into files, without a window: pictures, films, numbered pictures."""
+"""Rendering of animations to files: pictures, films, numbered pictures."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ Progress = Callable[[int, int], None]
 __all__ = ["film_rate", "record", "render", "write_picture"]
 
 SMOOTH_RATES = (Fraction(10), Fraction(120))
-"""A film's own rate lies between these where none is asked for."""
+"""Frames per second, least and most, of a film for which no rate is given."""
 MOST_FRAMES = 1_000_000
-"""A longer film is refused: its times are damaged, or a part of it was meant."""
+"""Most frames of a film: a longer one comes from damaged times, or a part of it was meant."""
 SLACK = 0.001
-"""Seconds that a time may lie outside the animation: people round them."""
+"""Seconds that a given time may lie outside the animation: people round times."""
 PICTURE_SAMPLES = 4
-"""Samples a pixel of a single picture, which may take its time."""
+"""Samples per pixel of a single picture, which need not be fast."""
 SIZE, GIF_SIZE = (1280, 720), (480, 270)
-"""Where none is given; a GIF of full size would be huge."""
+"""Default sizes; a GIF of full size would be huge."""
 
 
 def render(
@@ -54,7 +54,7 @@ def render(
     replace: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Draw an animation into a file without a window; the name decides what becomes of it.
+    """Render an animation to a file, without a window; the name decides the format. Returns the path.
 
     .png or .jpg: one picture. .mp4 or .gif: a film. frames/%05d.png, or a folder with a slash at its end:
     numbered pictures, from 0.
@@ -62,16 +62,15 @@ def render(
     size: width and height in pixels; by default 1280x720, of a GIF 480x270. camera: a `Camera`, "front",
     "three-quarter", "profile", "body", or None for the one that suits the content. For a picture: frame,
     its position in the animation (negative from the end), or time in seconds; by default the first frame.
-    For a film: fps (by default the animation's own rate), and start and end in seconds; audio: a file whose
-    sound goes with an MP4; it begins with the animation's first frame, or audio_offset seconds later
-    (earlier where negative). transparent: PNG without a
-    background, opaque only where something is. replace: numbered pictures that exist may be overwritten.
-    progress: called with (done, total) frames.
+    For a film: fps (by default the rate of the animation), and start and end in seconds. audio: a sound file
+    for an MP4; it begins with the first frame of the animation, or audio_offset seconds later (earlier if
+    negative). transparent: PNG without a background. replace: numbered pictures that exist may be
+    overwritten. progress: called with (done, total) frames.
 
-    Returns the path, of numbered pictures their folder. A file appears whole or not at all. Raises
+    Of numbered pictures, the path is their folder. A file appears only when it is complete. Raises
     UnsupportedError for another suffix, DisplayError without OpenGL or video encoder, RangeError for a frame
-    or a stretch that is not in the animation, ValueError for a size or preset that does not exist,
-    FormatError where a file cannot be written or read.
+    or a time outside of the animation, ValueError for an impossible size or an unknown preset, FormatError if
+    a file cannot be written or read.
     """
     _check_name(path)
     target = Path(path)
@@ -119,9 +118,9 @@ def record(
     replace: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Write a film, or numbered pictures, at an exact frame rate. See `render`.
+    """Write a film, or numbered pictures, at an exact frame rate; returns the path. See `render`.
 
-    MP4: H.264, yuv420p, and AAC; it needs even sizes: odd ones lose their last column or row.
+    MP4: H.264, yuv420p, and AAC. It needs even sizes: the last column or row of odd ones is cut.
     """
     shown = as_scene(scene)
     if not math.isfinite(audio_offset):
@@ -150,7 +149,7 @@ def record(
     if size is not None and min(width, height) < 1:
         raise ValueError(f"a film must have at least 2x2 pixels, not {size[0]}x{size[1]}")
     with ExitStack() as stack:
-        # Whether the encoder is there, and where it writes, shows sooner than the first picture.
+        # Opened before the first picture is drawn, so that a missing encoder or folder is reported at once.
         if numbered:
             sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
             recorder = Recorder.into(sink, path, (width, height), rate)
@@ -171,19 +170,19 @@ def record(
 
 
 def picture_size(size: tuple[int, int] | None, path: PathLike) -> tuple[int, int]:
-    """Width and height that a picture or a film of that name gets where a size, or None, was asked for."""
+    """Width and height of a picture or film of that name. size: as given by the user, or None."""
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     width, height = size or (GIF_SIZE if suffix == ".gif" else SIZE)
     return (width // 2 * 2, height // 2 * 2) if suffix == ".mp4" else (width, height)
 
 
 def as_scene(subject: Animation | Showable) -> Showable:
-    """A scene of an animation; what is a scene already stays."""
+    """A scene of an animation; a scene is returned as it is."""
     return Scene(subject) if isinstance(subject, Animation) else subject
 
 
 def film_rate(rate: Fraction) -> Fraction:
-    """The rate itself where people see it as motion, else the nearest multiple or fraction that is."""
+    """The frame rate of a film: that of the animation, or a multiple or fraction of it from 10 to 120."""
     low, high = SMOOTH_RATES
     if rate < low:
         return rate * math.ceil(low / rate)
@@ -201,13 +200,13 @@ def _check_name(path: PathLike) -> None:
 
 
 def _is_transparent(scene: Showable) -> bool:
-    """Whether the scene is switched to no background."""
+    """Whether the scene's background is switched to transparent."""
     return scene.switches["background"] == "transparent"
 
 
 @contextmanager
 def _background(scene: Any, *, clear: bool) -> Iterator[None]:
-    """The scene's own, or none."""
+    """Switch the scene's background to transparent for the block, if `clear` is True."""
     before = scene.switches["background"] if clear else None
     if clear:
         scene.show("background", "transparent")
@@ -237,8 +236,10 @@ def _picture_time(scene: Showable, frame: int | None, time: float | None) -> flo
 
 
 def check_inside(scene: Showable, name: str, time: float) -> None:
-    """Raises RangeError for a time before the animation begins or after it ends, ValueError for one that is
-    not finite. name: what the error calls it."""
+    """Raise RangeError for a time outside of the animation, ValueError for one that is not finite.
+
+    name: of the time, for the message.
+    """
     if not math.isfinite(time):
         raise ValueError(f"{name} must be a finite number of seconds, not {time}")
     begin, stop = float(scene.timeline.start), float(scene.timeline.end)
@@ -251,7 +252,7 @@ def check_inside(scene: Showable, name: str, time: float) -> None:
 def _frame_range(
     scene: Showable, rate: Fraction, start: float | None, end: float | None
 ) -> tuple[Fraction, int]:
-    """Time of the first picture and how many there are."""
+    """Time of the first picture in seconds, exact, and the number of pictures."""
     for name, value in (("start", start), ("end", end)):
         if value is not None:
             check_inside(scene, name, value)

@@ -1,4 +1,4 @@
-"""Time: timelines, the transport that plays them, streams that still arrive.
+"""Timelines, the transport that plays them, and streams that are still arriving.
 
-May use: `fba` and `fba.codec`. Knows no picture.
+May use: `fba` and `fba.codec`. Draws nothing.
 """

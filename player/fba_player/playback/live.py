@@ -1,7 +1,7 @@
-"""A stream that is still arriving, as an animation that grows.
+"""An animation that grows while its stream is still arriving.
 
-A thread reads and decodes what comes; the player sees whole frames as soon as they are there. Nothing is
-thrown away, so that all of it can be seen again: an hour at 25 frames/s needs 40 MB for a face, and 135 MB
+A thread reads and decodes the stream; the player sees each frame as soon as it is complete. All frames stay
+in memory, so that all of them can be played again: an hour at 25 frames/s needs 40 MB for a face, and 135 MB
 more for a body.
 """
 
@@ -22,30 +22,32 @@ from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import BUFFER
 
 CHUNK = 1 << 16
+"""Bytes read at once, at most."""
 PATIENCE = 0.5
-"""Seconds after the first frame in which a slow stream may still show what it brings."""
-JUDGED = 4
-"""Seconds of a body after which it is judged, once, whether its BAP steps are the right ones."""
+"""Seconds that `wait` gives a slow stream after its first frame to fill the buffer and to show whether it has
+a face and a body."""
+CHECK_BAP_STEPS_AFTER = 4
+"""Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 
 
 class Readable(Protocol):
-    """What bytes come from: standard input's buffer, a FIFO, a socket's file."""
+    """A source of bytes: standard input's buffer, a FIFO, a socket's file."""
 
     def read1(self, size: int = -1, /) -> bytes:
-        """What has arrived, at most so many bytes; waits for one at least, b"" at the end."""
+        """At most `size` bytes that have arrived; waits for at least one. b"" at the end."""
 
 
 class LiveAnimation:
-    """What has arrived of an FBA stream; has the fields of `Animation`, which grow.
+    """The part of an FBA stream that has arrived; it has the fields of `Animation`, which grow.
 
-    source: is read by a thread of its own until its end, whatever the player does meanwhile. head: bytes
-    that were already read from it. name: of the stream. bap_steps: see `fba.Decoder`. at_end: called when
-    nothing more is read, to close the source.
+    source: read by a thread until its end, whatever the player does meanwhile. head: bytes that were already
+    read from it. name: of the stream. bap_steps: see `fba.Decoder`. at_end: called when nothing more is read,
+    to close the source.
 
-    Damage is stepped over to the next I plane behind a start code. `message` says in few words what is wrong,
-    `details` exactly; "" where nothing is. `doubt` says, once `JUDGED` seconds of a body have arrived, where
-    it looks wrong with these BAP steps and right with others. Whether there is a face, or a body, is settled
-    as `wait` returns.
+    After damage, decoding goes on at the next I plane behind a start code. `message` says in a few words what
+    is wrong, `details` gives the full error; both are "" where nothing is. `doubt` is set once
+    `CHECK_BAP_STEPS_AFTER` seconds of a body have arrived, if it looks wrong with these BAP steps and right
+    with others. Whether there is a face or a body is fixed when `wait` returns.
     """
 
     def __init__(
@@ -86,17 +88,17 @@ class LiveAnimation:
 
     @property
     def index(self) -> Int64:
-        """int64 (T,) of what has arrived."""
+        """Frame numbers that have arrived, int64 (T,)."""
         return self._now.index
 
     @property
     def face(self) -> FaceTrack | None:
-        """FAPs of what has arrived."""
+        """FAPs that have arrived; None for a stream without a face."""
         return self._now.face
 
     @property
     def body(self) -> BodyTrack | None:
-        """BAPs of what has arrived."""
+        """BAPs that have arrived; None for a stream without a body."""
         return self._now.body
 
     @property
@@ -109,13 +111,13 @@ class LiveAnimation:
         return len(self._now.index)
 
     def snapshot(self) -> Animation:
-        """What has arrived until now, to keep. ValueError before the first frame."""
+        """A copy of what has arrived so far. Raises ValueError before the first frame."""
         return self._now.animation(self.name)
 
     # ---- a stream
 
     def info(self) -> StreamInfo:
-        """What has arrived: planes, their bits, the bit rate. Of no parameters."""
+        """Planes that have arrived, their bits and the bit rate; without the list of parameters."""
         now, size = self._now, self.received
         first, last = (int(now.index[0]), int(now.index[-1])) if len(now.index) else (0, -1)
         return StreamInfo(
@@ -136,14 +138,14 @@ class LiveAnimation:
 
     @property
     def arrived(self) -> int:
-        """Changes with every frame, and at the end."""
+        """A counter that changes with every frame, and at the end."""
         return 2 * len(self) + (not self.growing)
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until it can be played: `BUFFER` seconds are there, or all. False where time ran out before.
+        """Wait until it can be played: `BUFFER` seconds, or the whole stream, have arrived. timeout: seconds.
 
-        Raises BitstreamError or UnsupportedError where the stream ends, or is ended, without a frame that
-        can be decoded, OSError where it cannot be read.
+        Returns False after the timeout. Raises BitstreamError or UnsupportedError where the stream ends, or
+        is closed, without a frame that can be decoded, OSError where it cannot be read.
         """
         with self._changed:
             if not self._changed.wait_for(lambda: len(self) or not self.growing, timeout):
@@ -155,12 +157,12 @@ class LiveAnimation:
         return True
 
     def wait_end(self, timeout: float | None = None) -> bool:
-        """Wait until all has arrived. False where time, seconds, ran out before."""
+        """Wait until the stream has ended. timeout: seconds; returns False after it."""
         with self._changed:
             return self._changed.wait_for(lambda: not self.growing, timeout)
 
     def close(self) -> None:
-        """Take in nothing more; the thread ends with the next bytes."""
+        """Stop reading; the thread ends with the next bytes."""
         self._closing = True
         self._end()
 
@@ -210,7 +212,11 @@ class LiveAnimation:
 
     def _check_bap_steps(self, *, at_end: bool = False) -> None:
         now = self._now
-        if self._checked_bap_steps or now.body is None or (self.duration < JUDGED and not at_end):
+        if (
+            self._checked_bap_steps
+            or now.body is None
+            or (self.duration < CHECK_BAP_STEPS_AFTER and not at_end)
+        ):
             return
         from fba.body.plausibility import find_doubt
 
@@ -224,7 +230,7 @@ class LiveAnimation:
 
 
 class LiveTimeline(Timeline):
-    """What a stream shows at any time of what has arrived; hand it to `player.Scene`.
+    """The timeline of a `LiveAnimation`; hand it to `fba.player.Scene`.
 
     After the last frame that has arrived, it shows that frame.
     """
@@ -242,14 +248,15 @@ class LiveTimeline(Timeline):
 
     @property
     def arrived(self) -> int:  # type: ignore[override]
-        """Changes with every frame, and at the end."""
+        """A counter that changes with every frame, and at the end."""
         return int(self.animation.arrived)
 
 
 def wait_for(live: LiveAnimation, say: Callable[[str], None], after: float = 1.0) -> None:
-    """`LiveAnimation.wait`, however long it takes; says so where it takes longer than that, seconds.
+    """Wait for a live animation, however long it takes; Ctrl-C works meanwhile.
 
-    Goes on listening to Ctrl-C meanwhile.
+    say: called once with a message where it takes longer than `after` seconds. Raises as
+    `LiveAnimation.wait`.
     """
     begun, said = wall.monotonic(), False
     while not live.wait(0.2):

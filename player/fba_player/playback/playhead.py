@@ -1,4 +1,4 @@
-"""Where a performance is at any reading of a clock: what the picture and the sound both follow."""
+"""The time of an animation at any reading of a clock, for the picture and the sound alike."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Motion:
-    """A stretch of playing, or a standstill; immutable, so that the sound's thread may read it at any time.
+    """How time goes on since the last change of the transport: playing at a speed, or standing still.
 
-    since: reading of the clock, seconds, at which the time is `here`, and before which it stands. speed:
-    seconds of the animation a second of the clock; playing: False holds `here`. stop: the time at which it
-    turns back or ends; low and high: what it then repeats, where loop is set; rest: where it else stands at
-    the end. All times in seconds of the animation.
+    Immutable, so that the sound's thread may read it at any time. since: reading of the clock, in seconds, at
+    which the time is `here`; before, it stands still there. speed: seconds of the animation per second of the
+    clock. playing: False stays at `here`. stop: the time at which it jumps back or ends; low, high: the range
+    that it then repeats, if loop is set; rest: where it stands at the end without. All times are in seconds
+    of the animation.
     """
 
     since: float
@@ -38,12 +39,12 @@ class Motion:
         return self.rest
 
     def moving(self, clock: float) -> bool:
-        """Whether the time moves on at that reading."""
+        """Whether the time goes on at a reading of the clock."""
         repeats = self.loop and self.high > self.low
         return self.playing and clock >= self.since and (repeats or not self.over(clock))
 
     def until_turn(self, clock: float) -> float:
-        """Seconds of the clock until it starts, jumps or stops, at least; infinite where it stands still."""
+        """Least seconds of the clock until it starts, jumps or stops; infinite where it stands still."""
         if not self.playing:
             return math.inf
         if clock < self.since:
@@ -55,5 +56,5 @@ class Motion:
         return math.inf
 
     def over(self, clock: float) -> bool:
-        """Whether the end has been passed by then, once at least."""
+        """Whether it has reached the end at least once by that reading."""
         return self.playing and self.here + (clock - self.since) * self.speed >= self.stop

@@ -1,8 +1,7 @@
-"""An animation by time: which FAPs and BAPs are shown at t seconds, with unsent values kept.
+"""FAPs and BAPs of an animation at any time, each held until it is sent again; time codes.
 
-What is shown at a frame depends on everything sent before it, so frames are worked out in blocks, and
-the state at the start of each block is remembered: memory does not grow with the length of what has
-been shown, and times may be asked for in any order.
+The values of a frame depend on everything sent before it, so frames are resolved in blocks, and the state at
+the start of each block is stored: times may be asked for in any order, and only a few blocks are in memory.
 """
 
 from __future__ import annotations
@@ -21,29 +20,30 @@ from fba.face.resolve import Resolver, hold
 from fba.parameters import BAP_COUNT, FAP_COUNT
 
 TURN = 2 * math.pi / 1e-5
-"""A whole turn in units of a BAP."""
+"""A full turn in units of a BAP."""
 SHIFTS = slice(180, 183)
 """Columns of the BAPs that are millimetres, not angles."""
 BLOCK = 2048
 KEPT_BLOCKS = 4
+"""Blocks of frames in memory."""
 FRAME_ROUNDING = 1e-6
-"""A time this close (in frame periods) to a frame's own is that frame's."""
+"""Frame periods: a time this close to that of a frame is taken as that frame's."""
 
 
 class Timeline:
-    """What an animation shows at any time.
+    """FAPs and BAPs of an animation at any time.
 
-    animation: may grow where `growing` says so. model: gives the definitions of visemes and expressions, and
-    the interpolation table; by default the built-in ones. A time before or after shows the first or last
-    frame; between two frames, values are interpolated, over skipped frames too, unless `interpolate` is
-    False: then the frame last passed is shown. growing: whether frames still arrive
-    (`fba_player.playback.live`); arrived: changes whenever some did.
+    animation: may grow while `growing` is True. model: gives the definitions of visemes and expressions, and
+    the interpolation table; by default the built-in ones. A time before the first or after the last frame
+    gives that frame; between two frames, values are interpolated, also over skipped frames, unless
+    `interpolate` is False: then the earlier frame is shown. growing: whether frames still arrive
+    (`fba_player.playback.live`); arrived: a counter that changes whenever some did.
     """
 
     growing = False
     arrived = 0
     block = BLOCK
-    """Frames worked out at once."""
+    """Frames resolved at once."""
 
     def __init__(self, animation: Animation, model: object = None) -> None:
         self.animation = animation
@@ -70,16 +70,16 @@ class Timeline:
 
     @property
     def duration(self) -> Fraction:
-        """Seconds from there to one frame period after the last, exact."""
+        """Seconds from the first frame to one frame period after the last, exact."""
         return self.animation.duration
 
     @property
     def end(self) -> Fraction:
-        """One frame period after the last frame."""
+        """Time one frame period after the last frame, seconds, exact."""
         return self.start + self.duration
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """(frame, next frame, share of the next), positions in the animation, at a time in seconds.
+        """(frame, next frame, weight of the next) at a time in seconds, frames as positions in the animation.
 
         Raises ValueError for a time that is not finite, or an animation without frames.
         """
@@ -99,11 +99,11 @@ class Timeline:
         return before, after, share
 
     def time_of(self, frame: int) -> Fraction:
-        """Exact time of a frame, by its position in the animation."""
+        """Time of a frame, by its position in the animation: seconds, exact."""
         return Fraction(int(self.animation.index[frame])) / self.rate
 
     def faps(self, time: float) -> Float32:
-        """(68,) FAPs shown; zeros where the animation has no face."""
+        """FAPs shown at a time in seconds, float32 (68,); zeros where the animation has no face."""
         if self.animation.face is None:
             return np.zeros(68, dtype=np.float32)
         before, after, share = self.position(time)
@@ -114,12 +114,12 @@ class Timeline:
         return shown
 
     def baps(self, time: float) -> Float64:
-        """(296,) BAPs shown; zeros where the animation has no body.
+        """BAPs shown at a time in seconds, float64 (296,); zeros where the animation has no body.
 
-        Between two frames each angle goes the shorter way round: one that jumps by a whole turn, as where a
-        walk turns about, stays where it is. Otherwise angles go straight, which is nearly what turning a
-        joint about one axis (slerp) would do: half way between two frames of twenty captured performances,
-        at their own rates, 99.9 % of joints differ from that by less than half a degree.
+        Between two frames each angle goes the shorter way round: one that jumps by a full turn, as it may
+        where somebody turns around, does not spin. Angles are interpolated linearly, which is nearly what
+        slerp would do: half way between two frames of twenty captured performances, at their own rates, 99.9
+        % of joints differ from that by less than half a degree.
         """
         if self.animation.body is None:
             return np.zeros(BAP_COUNT)
@@ -131,7 +131,11 @@ class Timeline:
         return shown
 
     def many(self, times: npt.ArrayLike) -> tuple[Float32, Float64]:
-        """`faps` (T, 68) and `baps` (T, 296) at many times (T,), seconds, much faster than one by one."""
+        """FAPs, float32 (T, 68), and BAPs, float64 (T, 296), at times (T,) in seconds.
+
+        Much faster than `faps` and `baps` one by one. Raises ValueError for times that are not finite, and
+        for an animation without frames.
+        """
         at = np.asarray(times, dtype=np.float64) * self.rate.numerator / self.rate.denominator
         if not self.frames or not np.isfinite(at).all():
             raise ValueError("the times must be finite, and the animation must have frames")
@@ -158,7 +162,7 @@ class Timeline:
         look: Callable[[int], Array],
         shown: OrderedDict[int, Array],
     ) -> Array:
-        """Rows of many frames; look: works out one frame, with its block, which is then in shown."""
+        """Rows of many frames. look: resolves one frame together with its block, which is then in `shown`."""
         blocks = frames // self.block
         parts = {}
         for block in np.unique(blocks).tolist():
@@ -211,7 +215,7 @@ class Timeline:
 
 
 def _shorter(way: Float64) -> Float64:
-    """Changes of BAPs (..., 296), with angles going the shorter way round."""
+    """Changes of BAPs (..., 296), each angle the shorter way round."""
     if not way.size or max(way.max(), -way.min()) <= TURN / 2:
         return way
     shorter: Float64 = way - TURN * np.rint(way / TURN)
@@ -226,7 +230,7 @@ def _keep(shown: OrderedDict[int, Array], block: int, values: Array) -> None:
 
 
 def timecode(time: float, rate: Fraction) -> str:
-    """ "h:mm:ss:ff" of seconds at a frame rate; see `Transport.timecode`."""
+    """The time code "h:mm:ss:ff" of a time in seconds at a frame rate; see `Transport.timecode`."""
     at = time * rate.numerator / rate.denominator
     nearest = round(at)
     index = nearest if abs(at - nearest) < FRAME_ROUNDING else math.floor(at)

@@ -1,7 +1,7 @@
-"""Playing, pausing, seeking: where in the performance the player is, without a window or OpenGL.
+"""Play, pause, seek, loop: the current time of what is played.
 
-The clock is the wall clock, or that of the sound, times the speed. How often a picture is drawn plays no
-part: a slow machine shows fewer pictures, never slower motion.
+Time follows the wall clock, or that of the sound, times the speed, however often a picture is drawn: a slow
+machine shows fewer pictures, never slower motion.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from fba_player.view.protocols import Times
 SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 """The steps of `faster` and `slower`."""
 BUFFER = 0.25
-"""Seconds of a stream that still arrives which must be there before it plays, and plays on after a gap."""
+"""Seconds of a live stream that must have arrived before it plays, and again after a gap."""
 AT_ONCE = 0.1
-"""A mark set so shortly (s) before where the player is was meant to be there."""
+"""Seconds: a mark out set this shortly before the current time is meant to be there."""
 
 
 class Transport:
-    """The position in a performance.
+    """The current time of a timeline that is played. Times are seconds of the animation.
 
-    timeline: gives the start, the end and the frames' own times; it may grow (`fba_player.playback.live`).
-    clock: seconds from any origin, never going back; the process's monotonic clock by default, see
-    `use_clock`. Times are seconds of the animation.
+    timeline: gives the start, the end and the times of frames; it may grow (`fba_player.playback.live`).
+    clock: seconds from any origin, never going back; by default the monotonic clock of the process, see
+    `use_clock`.
 
-    Starts paused at the first frame. At the end it goes back to the start where `loop` is set, else it
-    stops on the last frame. Marks narrow both down: `mark_out` is where it turns back or stops, `mark_in`
-    where it then begins again; whoever seeks beyond `mark_out` plays to the end from there.
+    It starts paused at the first frame. At the end it goes back to the start if `loop` is set, else it stops
+    on the last frame. Marks limit what is played: at `mark_out` it jumps back to `mark_in`, or stops. After a
+    seek beyond `mark_out` it plays to the end.
 
-    At the end of what has arrived of a stream, it holds the last frame until `BUFFER` seconds more are
-    there, and goes on with the next: nothing that arrives late is left out.
+    At the end of what has arrived of a live stream it shows the last frame until `BUFFER` more seconds have
+    arrived, and goes on with the next frame: nothing that arrives late is skipped.
     """
 
     def __init__(
@@ -71,32 +71,32 @@ class Transport:
 
     @property
     def time(self) -> float:
-        """Where the player is now; while playing, it moves with the clock."""
+        """The current time; while playing, it goes on with the clock."""
         return self._settle().time(self._clock())
 
     @property
     def clock(self) -> float:
-        """What the clock that it follows says, seconds from any origin."""
+        """Reading of the clock that it follows, seconds from any origin."""
         return self._clock()
 
     @property
     def frame(self) -> int:
-        """Position, in the animation, of the frame shown now or the last one before."""
+        """The current frame, or the last one before the current time: its position in the animation."""
         return self._timeline.position(self.time)[0]
 
     @property
     def share(self) -> float:
-        """Where the player is, 0 the start, 1 the last frame or after."""
+        """The current time as a share: 0 at the start, 1 at the last frame or after."""
         return self.share_of(self.time)
 
     def share_of(self, time: float) -> float:
-        """Where a time is, 0 the start, 1 the last frame or after."""
+        """A time as a share: 0 at the start, 1 at the last frame or after."""
         whole = self._last_time() - self.start
         return min(max((time - self.start) / whole, 0.0), 1.0) if whole > 0 else 0.0
 
     @property
     def motion(self) -> Motion:
-        """How the time follows the clock since the last look; another thread may ask for it."""
+        """How the time follows the clock since the last change; any thread may read it."""
         return self._motion
 
     # ---- playing
@@ -109,16 +109,16 @@ class Transport:
 
     @property
     def waiting(self) -> bool:
-        """Whether it holds the last frame until more of a stream has arrived."""
+        """Whether it shows the last frame until more of a live stream has arrived."""
         return self.playing and self._waiting
 
     @property
     def behind(self) -> float:
-        """Seconds from here to the last frame that has arrived."""
+        """Seconds from the current time to the last frame that has arrived."""
         return max(self._last_time() - self.time, 0.0)
 
     def play(self) -> None:
-        """Go on from here; from the start, or the mark, where the end, or its mark, has been reached."""
+        """Play from here; from the end, or `mark_out`, go back to the start, or `mark_in`, first."""
         if self.playing:
             return
         here = self._motion.here
@@ -128,17 +128,17 @@ class Transport:
         self._move(here, later=True)
 
     def pause(self) -> None:
-        """Stop here, without jumping anywhere."""
+        """Stop at the current time."""
         here = self.time
         self._playing = False
         self._move(here)
 
     def stop(self) -> None:
-        """Stop here and stay: no jump to the start."""
+        """Stop at the current time, as `pause` does: no jump to the start."""
         self.pause()
 
     def toggle(self) -> None:
-        """Play where paused, pause where playing."""
+        """Play if paused, pause if playing."""
         if self.playing:
             self.pause()
         else:
@@ -147,18 +147,18 @@ class Transport:
     # ---- going elsewhere
 
     def seek(self, time: float) -> None:
-        """Go to a time, kept within start and end; goes on playing where it was."""
+        """Go to a time, limited to start..end, and go on from there. ValueError if it is not finite."""
         if not math.isfinite(time):
             raise ValueError(f"cannot seek to {time} seconds")
         self._settle()
         self._move(min(max(time, self.start), self.end), later=True)
 
     def seek_share(self, share: float) -> None:
-        """Go to a share of the whole, 0 the start, 1 the last frame."""
+        """Go to a share of the duration: 0 is the start, 1 the last frame."""
         self.seek(self.start + min(max(share, 0.0), 1.0) * (self._last_time() - self.start))
 
     def step(self, frames: int) -> None:
-        """Pause, and go this many frames on (or back): to the frame's own time."""
+        """Pause, and go forward by so many frames, or back if negative: to the exact time of a frame."""
         self.pause()
         before, _, share = self._timeline.position(self._motion.here)
         if frames < 0 and share > 0:
@@ -171,26 +171,26 @@ class Transport:
         self.seek(self.start)
 
     def last(self) -> None:
-        """Go to the last frame; in a stream that still arrives, `BUFFER` before it."""
+        """Go to the last frame; while a live stream is playing, `BUFFER` seconds before it."""
         self.seek(self._last_time() - (BUFFER if self._timeline.growing and self._playing else 0.0))
 
     # ---- speed, loop, marks, interpolation
 
     @property
     def speed(self) -> float:
-        """Seconds of the animation a second of the clock."""
+        """Seconds of the animation per second of the clock."""
         return self._speed
 
     def faster(self) -> None:
-        """The next higher speed, up to 4."""
+        """Set the next higher speed, up to 4."""
         self.set_speed(next((s for s in SPEEDS if s > self.speed + 1e-9), SPEEDS[-1]))
 
     def slower(self) -> None:
-        """The next lower speed, down to 0.1."""
+        """Set the next lower speed, down to 0.1."""
         self.set_speed(next((s for s in reversed(SPEEDS) if s < self.speed - 1e-9), SPEEDS[0]))
 
     def set_speed(self, speed: float) -> None:
-        """Wall seconds become this many seconds of the animation; 0.1 to 4, else ValueError."""
+        """Set the speed: seconds of the animation per second of the clock, 0.1 to 4, else ValueError."""
         if not SPEEDS[0] <= speed <= SPEEDS[-1]:
             raise ValueError(f"the speed must lie between {SPEEDS[0]} and {SPEEDS[-1]}, not {speed}")
         here = self.time
@@ -199,7 +199,7 @@ class Transport:
 
     @property
     def loop(self) -> bool:
-        """Whether it begins again at the end, or at `mark_out`."""
+        """Whether it jumps back at the end, or at `mark_out`."""
         return self._loop
 
     @loop.setter
@@ -209,12 +209,12 @@ class Transport:
         self._move(here)
 
     def toggle_loop(self) -> None:
-        """Loop or not."""
+        """Turn the loop on or off."""
         self.loop = not self.loop
 
     @property
     def mark_in(self) -> float | None:
-        """Where a loop begins, seconds; None for the start. One set at or after `mark_out` clears that."""
+        """Where a loop begins, seconds; None for the start. Setting it at or after `mark_out` clears that."""
         return self._mark_in
 
     @mark_in.setter
@@ -227,9 +227,9 @@ class Transport:
 
     @property
     def mark_out(self) -> float | None:
-        """Where a loop ends, seconds; None for the end. One set at or before `mark_in` clears that.
+        """Where a loop ends, seconds; None for the end. Setting it at or before `mark_in` clears that.
 
-        Set where the player is while it plays, it turns back or stops at once.
+        Set to the current time while playing, it jumps back or stops at once.
         """
         return self._mark_out
 
@@ -244,14 +244,14 @@ class Transport:
         self._move(here)
 
     def clear_marks(self) -> None:
-        """The whole performance again."""
+        """Remove both marks."""
         here = self.time
         self._mark_in = self._mark_out = None
         self._move(here)
 
     @property
     def interpolate(self) -> bool:
-        """Whether what is shown between two frames lies between them; False: the frame last passed."""
+        """Whether values between two frames are interpolated; False shows the earlier frame."""
         return self._timeline.interpolate
 
     @interpolate.setter
@@ -261,18 +261,18 @@ class Transport:
     def use_clock(self, clock: Callable[[], float] = wall.monotonic, latency: float = 0.0) -> None:
         """Follow another clock from now on, without a jump.
 
-        latency: seconds that playing waits before it starts, here or elsewhere, so that sound which a
-        device still has to be given begins with the picture and whole.
+        latency: seconds that playing and seeking wait before time goes on, so that the sound, which a device
+        still has to be given, begins with the picture and is not cut.
         """
         here = self.time
         self._clock = clock
         self._latency = latency
         self._motion = self._motion_from(clock(), here)
 
-    # ---- for people
+    # ---- text
 
     def text(self) -> str:
-        """Time, frame and speed, for people: "0:01.240 / 0:04.000   frame 31 / 100   1x"."""
+        """Time, frame and speed as text: "0:01.240 / 0:04.000   frame 31 / 100   1x"."""
         time = self.time
         parts = [
             f"{clock_text(time - self.start)} / {clock_text(self.duration)}",
@@ -284,21 +284,21 @@ class Transport:
         return "   ".join(parts)
 
     def timecode(self, time: float | None = None) -> str:
-        """Time code "h:mm:ss:ff" of a time, by default of now, in the stream's own times.
+        """The time code "h:mm:ss:ff" of a time, by default the current one.
 
-        Where the stream carries time codes, its frames' times follow them, so this is what it says. Hours,
-        minutes and seconds are those of the time itself, at any rate; ff counts the frame periods that have
-        begun in that second, from 00.
+        It is that of the stream, if the stream carries time codes: the times of its frames follow them.
+        Hours, minutes and seconds are those of the time itself at any rate; ff counts the frame periods that
+        have begun in that second, from 00.
         """
         return timecode(self.time if time is None else time, self._timeline.rate)
 
-    # ---- inside
+    # ---- private
 
     def _last_time(self) -> float:
         return float(self._timeline.time_of(self._timeline.frames - 1))
 
     def _stop(self) -> float:
-        """Where the last frame has had its time; in a stream that still arrives, its last frame."""
+        """Time at which the last frame has been shown; in a live stream, the time of its last frame."""
         return self._last_time() if self._timeline.growing else self.end
 
     def _low(self) -> float:
@@ -332,7 +332,7 @@ class Transport:
         self._motion = self._motion_from(now + self._latency if later else max(now, self._motion.since), here)
 
     def _settle(self) -> Motion:
-        """Deal with an end that has been passed, and with frames that have arrived."""
+        """Update the motion after the end was passed, or frames have arrived."""
         arrived = self._timeline.arrived
         if arrived != self._arrived:
             self._arrived = arrived

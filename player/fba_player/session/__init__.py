@@ -1,4 +1,4 @@
-"""What is open, chosen and asked for in a window: files, keys, actions, the camera, takes by hand.
+"""The state of a window: the open file, keys and actions, the camera, screenshots, films, recorded takes.
 
 May use: scene, playback, sound, export. Knows no window and no imgui.
 """

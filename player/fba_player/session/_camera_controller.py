@@ -1,4 +1,4 @@
-"""Where the camera is now: moved by hand at once, brought to a preset smoothly, following who walks away."""
+"""The camera of a window: moved by hand, gliding to presets, following a figure that walks away."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
 GLIDE = 0.35
-"""Seconds that a change of view takes."""
+"""Seconds that a glide to another view takes."""
 NOT_SHIFTED = (0.0, 1.0)
+"""Shift of the middle as a share of the width, and factor on the distance, where no panels are open."""
 MIN_FREE_WIDTH = 0.2
-"""Share of the width between two columns for which a view is still made."""
+"""Least share of the width between the panels for which a view is fitted."""
 
 
 class Viewpoint:
     """The camera of a scene over time.
 
-    scene: gives presets and how far a performance has travelled. aspect: width / height of the picture,
-    which presets fit. camera: the first view, or the name of one; by default the one that suits the
-    content. clock: seconds, for tests.
+    scene: gives presets, and the distance that a figure has walked. aspect: width / height of the picture,
+    which presets fit. camera: the first view, or the name of a preset; by default the one that suits the
+    content. clock: returns seconds, for tests.
 
-    covered: share of the picture's height that is hidden at the bottom; named views fit above it. What is
-    hidden at the sides, `uncover` says: the picture then moves between that, whatever the view.
+    covered: share of the picture's height that is hidden at the bottom; presets fit above it. For what is
+    hidden at the sides see `uncover`: the picture is shifted between the panels, whatever the view.
     """
 
     def __init__(
@@ -64,16 +65,16 @@ class Viewpoint:
 
     @property
     def gliding(self) -> bool:
-        """Whether it is on its way to another view."""
+        """Whether it is gliding to another view."""
         return self._clock() < max(self._until, self._shift_until)
 
     @property
     def beginning(self) -> Camera:
-        """The first view, for the picture as it is now."""
+        """The first view, fitted to the current shape of the picture."""
         return self._chosen if isinstance(self._chosen, Camera) else self.fit(self._chosen)
 
     def fit(self, preset: str | None) -> Camera:
-        """A named view, or None for the one that suits the content, above what is covered."""
+        """The camera of a preset, fitted above what is covered; None: the view that suits the content."""
         free = 1.0 - min(max(self.covered, 0.0), 0.5)
         camera = self.scene.camera(preset, self.aspect / free)
         camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
@@ -81,7 +82,7 @@ class Viewpoint:
         return camera
 
     def refit(self) -> None:
-        """The picture may have another shape now: a named view that nobody has moved fits it again."""
+        """Fit the view to a picture of another shape, if it is a preset that nobody has moved since."""
         aspect, camera = self._fitted_to
         if self.aspect == aspect:
             return
@@ -91,16 +92,16 @@ class Viewpoint:
         self._fitted_to = (self.aspect, self._fitted_to[1])
 
     def glide(self, camera: Camera) -> None:
-        """Go to another view smoothly."""
+        """Glide to another view."""
         self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE
 
     def preset(self, name: str) -> None:
-        """Go to a named view; ValueError for a name that does not exist."""
+        """Glide to a preset. Raises ValueError for an unknown name."""
         self.glide(self.fit(name))
         self._preset = name
 
     def uncover(self, left: float, right: float, *, smoothly: bool = True) -> None:
-        """These shares of the picture's width are hidden: who is seen stands between them, whole."""
+        """Shift the figure to between panels that hide these shares of the picture's width."""
         if (left, right) == self._sides:
             return
         self._shift_before = self._shift_now()
@@ -109,30 +110,32 @@ class Viewpoint:
         self._shift_until = self._clock() + GLIDE if smoothly else -math.inf
 
     def reset(self) -> None:
-        """Go back to the view of the beginning."""
+        """Glide back to the first view."""
         self.follow = True
         self.glide(self.beginning)
         self._preset = self._chosen if not isinstance(self._chosen, Camera) else ""
 
     def camera_without_panels(self, time: float) -> Camera:
-        """The camera that shows the scene at a time in seconds, where nothing is hidden at the sides."""
+        """The camera at a time in seconds, for a picture without panels at the sides."""
         return self._follow_travel(self.camera, time, 1.0) if self.follow else self.camera
 
     def camera_at(self, time: float) -> Camera:
-        """The camera that shows the scene at a time in seconds, between what is hidden at the sides."""
+        """The camera at a time in seconds, with the figure between the panels at the sides."""
         shift, further = self._shift_now()
         if (shift, further) == NOT_SHIFTED:
             return self.camera_without_panels(time)
-        up = -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)  # the middle of what is free stays
+        up = (
+            -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)
+        )  # the middle above the bar stays where it is
         return self.camera_without_panels(time).zoom(further).pan(-shift * self.aspect, up)
 
     def toggle_follow(self, time: float) -> None:
-        """Follow a performance that walks away, or stay; the picture at `time` does not jump."""
+        """Turn following a figure that walks away on or off; the picture at `time` does not jump."""
         self.camera = self._follow_travel(self.camera, time, 1.0 if self.follow else -1.0)
         self.follow = not self.follow
 
     def _progress(self, until: float) -> float:
-        """How far a change is that ends then: from 0 to 1, beginning and ending slowly."""
+        """Progress, 0 to 1, of a glide that ends at a reading of the clock; it starts and ends slowly."""
         return float(smoothstep(1.0 - (until - self._clock()) / GLIDE))
 
     def _shift_now(self) -> tuple[float, float]:
@@ -144,7 +147,7 @@ class Viewpoint:
         return (a, b) if share < 1.0 else self._shift
 
     def _shift_between(self, left: float, right: float) -> tuple[float, float]:
-        """By which share of the width the middle moves, and how much further away the camera goes."""
+        """Shift of the middle as a share of the width, and factor on the camera's distance."""
         free = max(1.0 - left - right, MIN_FREE_WIDTH)
         if self._preset == "" or free >= 1.0:
             return (left - right) / 2, 1.0
@@ -152,7 +155,7 @@ class Viewpoint:
         narrow = self.scene.camera(self._preset, aspect * free).distance
         whole = self.scene.camera(
             self._preset, aspect
-        ).distance  # last: scenes stand as this camera sees them
+        ).distance  # last: a scene arranges its figures for the camera asked for last
         return (left - right) / 2, max(narrow / whole, 1.0)
 
     def _follow_travel(self, camera: Camera, time: float, way: float) -> Camera:

@@ -1,4 +1,4 @@
-"""What can be done in a window, by name: keys, buttons and menus all come here."""
+"""Actions of a window by name, for keys, buttons and menus."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Callable
 from fba_player.session.session import Session
 
 SHIFT = 0.02
-"""Seconds by which a key moves the sound."""
+"""Seconds by which one key press shifts the sound."""
 
 
 def act(session: Session, name: str) -> bool:
-    """Do what a name of the table of keys says ("toggle", "camera front", "panel file").
+    """Do an action of the table of keys, such as "toggle", "camera front" or "panel file".
 
-    Returns whether there is such a thing.
+    Returns whether it exists.
     """
     word, _, rest = name.partition(" ")
     if rest and word in _ACTIONS_WITH_NAME:

@@ -1,4 +1,4 @@
-"""Screenshots and films of what a window shows, saved in the current folder."""
+"""Screenshots and films of a window."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from fba_player.session.session import Session
 from fba_player.sound.recorded_sound import FilmSound
 
 RATE = 30
-"""Frames a second of a film of the window."""
+"""Frames per second of a film of the window."""
 SAMPLES = 4
-"""Samples a pixel of a screenshot, which may take its time."""
+"""Samples per pixel of a screenshot, which need not be fast."""
 
 
 class Captures:
-    """Takes the screenshots and records the films that a session asks for.
+    """Saves the screenshots and records the films that a session requests.
 
-    folder: where they are saved, by default the current one. They are named after the file shown, and
-    screenshots after the frame too; no file is ever overwritten.
+    folder: where they are saved; by default the current one. They are named after the file shown, screenshots
+    also after the frame; no file is overwritten.
     """
 
     def __init__(self, session: Session, folder: str | os.PathLike[str] | None = None) -> None:
@@ -43,11 +43,11 @@ class Captures:
 
     @property
     def recording(self) -> bool:
-        """Whether a film is being made."""
+        """Whether a film is being recorded."""
         return self._recorder is not None
 
     def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
-        """Save a picture, uint8 (H, W, 4), as a PNG file; returns its path, or None where it fails."""
+        """Save a picture, uint8 (H, W, 4), as PNG; returns its path, or None, with a notice, if it fails."""
         path = self._unused_path(f"-{self.session.transport.frame + 1:04d}", ".png")
         try:
             write_picture(path, pixels, transparent=transparent)
@@ -76,7 +76,7 @@ class Captures:
         self.session.recording = 0.0
 
     def begin_picture(self) -> None:
-        """Note the film's time, and mix its sound up to here: call before each picture is drawn."""
+        """Update the length of the film and mix its sound up to now; call before each picture is drawn."""
         if self._recorder is None:
             return
         self.session.recording = self.session.clock() - self._begun
@@ -84,7 +84,7 @@ class Captures:
             self._sound.advance(self.session.recording)
 
     def add_picture(self, read: Callable[[], UInt8]) -> None:
-        """Add the picture drawn after the last `begin_picture`. read: returns it, uint8 (H, W, 4)."""
+        """Add the picture drawn since `begin_picture` to the film. read: returns it, uint8 (H, W, 4)."""
         seconds = self.session.recording
         if self._recorder is None or seconds is None or not self._recorder.wants(seconds):
             return
@@ -95,7 +95,7 @@ class Captures:
             self.session.say(f"Recording stopped: {error}", "error", 8.0)
 
     def close(self) -> Path | None:
-        """Finish the film that is being recorded; returns its path. Raises FbaError, OSError."""
+        """Finish the film; returns its path, None if none is being recorded. Raises FbaError, OSError."""
         if self._recorder is None:
             return None
         recorder, sound = self._recorder, self._sound
@@ -106,7 +106,7 @@ class Captures:
         return recorder.close()
 
     def _open_sound(self) -> FilmSound | None:
-        """The sound for a new film; None, with a notice where that is unexpected, where there is none."""
+        """The sound for a new film; None without sound, with a notice if the file cannot be used."""
         session = self.session
         if session.sound is None:
             return None
@@ -133,7 +133,7 @@ class Captures:
             self.session.say(f"Saved as {path}")
 
     def _unused_path(self, what: str, suffix: str) -> Path:
-        """A path that does not exist yet."""
+        """The path of a new file, named after the source."""
         stem = Path(self.session.source.name or "fba").stem
         stem = re.sub(r"[^\w. -]", "_", stem)[:60].strip(" .") or "fba"
         path, number = self.folder / f"{stem}{what}{suffix}", 2
@@ -145,9 +145,9 @@ class Captures:
 def draw_screenshot(
     context: Any, renderer: Renderer, session: Session, *, transparent: bool = False
 ) -> UInt8:
-    """What the session shows now, without panels: uint8 (H, W, 4), top row first.
+    """Draw the current view without panels: uint8 (H, W, 4), top row first.
 
-    transparent: opaque only where something is. Raises DisplayError where there is no room for it.
+    transparent: without a background. Raises DisplayError if the graphics card lacks the memory.
     """
     time, scene = session.transport.time, session.scene
     target = Target(context, session.size, SAMPLES)
@@ -169,7 +169,7 @@ def draw_screenshot(
 
 
 def read_pixels(framebuffer: Any, size: tuple[int, int]) -> UInt8:
-    """What a framebuffer holds: uint8 (H, W, 4), top row first."""
+    """The pixels of a framebuffer: uint8 (H, W, 4), top row first."""
     width, height = size
     data = framebuffer.read((0, 0, width, height), components=4, alignment=1)
     return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]

@@ -1,6 +1,6 @@
-"""Keys, and the mouse over the picture -> the session; knows no window, no OpenGL and no imgui.
+"""Keys, and the mouse over the picture, applied to the session.
 
-Places are in pixels from the upper left corner of the picture.
+Positions are in pixels from the upper left corner of the picture.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ from fba_player.session.keys import by_name
 from fba_player.session.session import Session
 
 BAR_HEIGHT = 52
-"""Pixels at the bottom that belong to the plain timeline, at a display scale of 1."""
+"""Height of the plain timeline at the bottom, in pixels at a display scale of 1."""
 BAR_MARGIN = 16
 ORBIT_SPEED = 0.35
-"""Degrees a pixel."""
+"""Degrees per pixel."""
 ZOOM_STEP = 0.9
 
 
 class Controls:
-    """What the user can do with keys and with the mouse over the picture.
+    """Handles keys, and the mouse over the picture.
 
-    plain: there are no panels but the plain timeline at the bottom, which the mouse moves too.
+    plain: whether the plain timeline at the bottom takes the place of the panels; the mouse seeks in it.
     """
 
     def __init__(self, session: Session, *, plain: bool = False) -> None:
@@ -30,9 +30,9 @@ class Controls:
         self._last = (0.0, 0.0)
 
     def key(self, name: str, *, held: bool = False) -> bool:
-        """A key was pressed, or is still held; names as in the table of keys, in lower case.
+        """Handle a key that was pressed, or is still held. name: as in the table of keys, in lower case.
 
-        Returns whether it means something.
+        Returns whether the key has a meaning.
         """
         session = self.session
         row = by_name().get(name)
@@ -42,7 +42,7 @@ class Controls:
         return not held and session.press_switch(name)
 
     def press(self, button: str, x: float, y: float) -> None:
-        """A mouse button ("left", "right", "middle") goes down."""
+        """Handle a mouse button, "left", "right" or "middle", that goes down."""
         self._last = (x, y)
         bottom = self.session.size[1] - BAR_HEIGHT * self.session.scale
         if self.plain and button == "left" and y >= bottom:
@@ -52,7 +52,7 @@ class Controls:
             self._held = "orbit" if button == "left" else "pan"
 
     def move(self, x: float, y: float) -> None:
-        """The mouse moves."""
+        """Handle a move of the mouse."""
         right, down = x - self._last[0], y - self._last[1]
         self._last = (x, y)
         viewpoint = self.session.viewpoint
@@ -66,7 +66,7 @@ class Controls:
             viewpoint.camera = viewpoint.camera.pan(-right / height, down / height)
 
     def release(self) -> None:
-        """The mouse button goes up."""
+        """Handle the mouse button going up."""
         self._held = None
 
     @property
@@ -75,12 +75,12 @@ class Controls:
         return self._held is not None
 
     def scroll(self, steps: float) -> None:
-        """The wheel turns; away from the user is positive and comes nearer."""
+        """Zoom by a turn of the wheel; positive steps, away from the user, zoom in."""
         viewpoint = self.session.viewpoint
         viewpoint.camera = viewpoint.camera.zoom(ZOOM_STEP ** max(min(steps, 10.0), -10.0))
 
     def bar(self) -> tuple[float, float]:
-        """Where the plain timeline begins and ends, x in pixels."""
+        """Left and right end of the plain timeline, in pixels."""
         margin = BAR_MARGIN * self.session.scale
         return margin, max(self.session.size[0] - margin, margin + 1)
 

@@ -1,4 +1,7 @@
-"""The keys and what they do: one table, for the window, the help and the documentation."""
+"""The table of keys, for the window, the help and docs/play.md.
+
+`python -m fba_player.session.keys` prints the tables of docs/play.md.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +19,8 @@ from fba_player.view.switches import SWITCHES
 class Key:
     """A row of the table.
 
-    keys: as shown to people ("F12", "Ctrl+S"); any of them does. action: see `fba_player.session.actions`.
-    held:
-    whether it goes on while the key is held. group, does: for the help. shown: the keys for people, "Esc, Q".
+    keys: one or more, such as "F12" or "Ctrl+S". action: see `fba_player.session.actions`. held: whether it
+    repeats while the key is held. group, does: for the help. shown: the keys as text, "Esc, Q".
     """
 
     keys: tuple[str, ...]
@@ -47,19 +49,19 @@ def keys() -> tuple[Key, ...]:
 
 @cache
 def mouse() -> tuple[tuple[str, str], ...]:
-    """(what the mouse does, what comes of it), for the help."""
+    """(mouse gesture, what it does), for the help."""
     return tuple((row["mouse"], row["does"]) for row in _rows("mouse.csv"))
 
 
 @cache
 def by_name() -> dict[str, Key]:
-    """Rows by the name of a key as the window gives it: "space", "shift+f12", "ctrl+s"."""
+    """Rows by the name of a key in lower case: "space", "shift+f12", "ctrl+s"."""
     return {name.lower(): row for row in keys() for name in row.keys}
 
 
 @cache
 def key_of(action: str) -> str:
-    """The first key of an action, as shown to people; "" where none is set."""
+    """The first key of an action, as shown to users; "" if it has none."""
     return next((_shown(row.keys[0]) for row in keys() if row.action == action), "")
 
 
@@ -91,7 +93,7 @@ def _head(title: str) -> list[str]:
 
 
 def _marked(key: str) -> str:
-    """Signs as code, so that they are not taken for marks of the page."""
+    """A key as Markdown: punctuation as code, so that it is not read as Markdown."""
     return key if re.fullmatch(r"\w+([+]\w+)*", key) else f"`{key}`"
 
 

@@ -1,4 +1,4 @@
-"""Performing by hand over what is played: the puppet, the take that is recorded, and takes shown again."""
+"""Puppeteering: the puppet of a session, and recording, showing and saving its takes."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ if TYPE_CHECKING:
 
 NEUTRAL_SECONDS = 10
 WHAT = "the last take"
+"""Name of a take that is not saved, in the question before the window closes."""
 
 
 class Performer:
-    """The puppet of a session and its takes. folder: where takes are saved, by default the current one.
+    """The puppet of a session and its takes; it changes what the session shows once it is attached.
 
-    It changes what the session shows from `attach` on.
+    folder: where takes are saved; by default the current one.
     """
 
     def __init__(self, session: Session, folder: str | os.PathLike[str] | None = None) -> None:
@@ -41,7 +42,7 @@ class Performer:
         self._begun = 0.0
 
     def attach(self) -> None:
-        """From now on it has a say in what is shown."""
+        """Let the puppet change what the session shows."""
         if self._hook not in self.session.before_frame:
             self.session.before_frame.append(self._hook)
 
@@ -56,7 +57,7 @@ class Performer:
         return self._shown is not None
 
     def record(self) -> None:
-        """Begin a take: what is shown is sampled, as time goes by, whether something plays or not."""
+        """Begin a take: record what is shown, also while playing is paused."""
         self.stop()
         scene: Any = self.session.scene
         face = scene.animation.face is not None or not scene.has_body or self._face_moved()
@@ -64,14 +65,14 @@ class Performer:
         self._begin()
 
     def show(self) -> None:
-        """Show the last take instead of everything else, once."""
+        """Show the last take once, in place of what is played."""
         self.stop()
         if self.takes.last is not None:
             self._shown = Timeline(self.takes.last)
             self._begin()
 
     def stop(self) -> None:
-        """End the take that is being recorded, or the one that is shown."""
+        """Stop recording or showing a take."""
         recorder, self._recorder, self._shown = self._recorder, None, None
         self.session.rolling.discard("take")
         if recorder is not None and len(recorder):
@@ -79,13 +80,13 @@ class Performer:
             self.session.unsaved.add(WHAT)
 
     def undo(self) -> None:
-        """Forget the last take."""
+        """Delete the last take."""
         self.stop()
         self.takes.undo()
         self.session.unsaved.discard(WHAT)
 
     def save(self, name: str) -> tuple[Path, str]:
-        """Write the last take, with the BAP steps of what is played; returns and raises as `Takes.save`."""
+        """Write the last take with the BAP steps of the source; returns and raises as `Takes.save`."""
         saved = self.takes.save(name, bap_steps=self.session.source.bap_steps)
         self.session.unsaved.discard(WHAT)
         return saved
@@ -118,7 +119,7 @@ class Performer:
 
 
 def neutral(*, body: bool = False, name: str = "puppet") -> Animation:
-    """A face that does nothing, with a body that stands or without: something to puppeteer."""
+    """A neutral face, with a standing body if `body` is True, for puppeteering: 10 s at 25 frames/s."""
     count = 25 * NEUTRAL_SECONDS
     face = FaceTrack(np.zeros((count, 68), np.int32), np.zeros((count, 68), bool))
     stands = BodyTrack(np.zeros((count, 296), np.int32), np.zeros((count, 296), bool)) if body else None

@@ -1,4 +1,4 @@
-"""A figure moved by hand: FAPs, BAPs, visemes and expressions in the place of what is played."""
+"""FAPs, BAPs, visemes and expressions set by hand, in place of what is played."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Baps = Float64
 
 @dataclass(frozen=True, slots=True)
 class Viseme:
-    """Two visemes, 0 none to 14, and the share of the first, 0 to 63; ValueError for others."""
+    """Two visemes, 0 (none) to 14, and the share of the first, 0 to 63. Raises ValueError for others."""
 
     select1: int = 0
     select2: int = 0
@@ -36,7 +36,7 @@ class Viseme:
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """Two expressions, 0 none to 6, each with an intensity, 0 to 63; ValueError for others."""
+    """Two expressions, 0 (none) to 6, each with an intensity, 0 to 63. Raises ValueError for others."""
 
     select1: int = 0
     intensity1: int = INTENSITY_MAX
@@ -49,14 +49,14 @@ class Expression:
 
 
 class Puppet:
-    """What the user makes of a performance; a hook for `Session.before_frame`.
+    """Values set by the user over those that are played; a hook for `Session.before_frame`.
 
-    A FAP or BAP that was moved has that value until it is released; all others keep what is played. A
-    viseme takes the place of all FAPs that visemes move; an expression is added to what is played, as the
-    standard's init_face does. FAPs moved by hand win over both.
+    A FAP or BAP that was moved has that value until it is released; all others have the value that is played.
+    A viseme replaces all FAPs that visemes move; an expression is added to what is played, as with init_face
+    of the standard. FAPs moved by hand replace both.
 
     definitions: of visemes and expressions, by default the built-in ones. motion: FAPs (68,) and BAPs (296,)
-    that were played last, before this changed them; shown: the same afterwards.
+    of the last picture before they were changed; shown: the same afterwards.
     """
 
     def __init__(self, definitions: Definitions | None = None) -> None:
@@ -85,7 +85,7 @@ class Puppet:
 
     @property
     def idle(self) -> bool:
-        """Whether it leaves everything as it is."""
+        """Whether it changes nothing."""
         return not (self.speaks or self.feels or self.fap_moved.any() or self.bap_moved.any())
 
     @property
@@ -100,7 +100,7 @@ class Puppet:
 
     @property
     def viseme(self) -> Viseme:
-        """What it says; `Viseme()` for nothing."""
+        """The visemes that are set; `Viseme()` for none."""
         return self._viseme
 
     @viseme.setter
@@ -111,7 +111,7 @@ class Puppet:
 
     @property
     def expression(self) -> Expression:
-        """What it feels; `Expression()` for nothing."""
+        """The expressions that are set; `Expression()` for none."""
         return self._expression
 
     @expression.setter
@@ -119,32 +119,32 @@ class Puppet:
         self._expression = expression
         first, second = expression.intensity1 / INTENSITY_MAX, expression.intensity2 / INTENSITY_MAX
         if expression.select1 == expression.select2:
-            second = min(second, 1 - first)  # the same twice is never more than all of it
+            second = min(second, 1 - first)  # the same expression twice has at most full intensity
         table = self._definitions.expressions
         self._felt = table[expression.select1] * np.float32(first) + table[expression.select2] * np.float32(
             second
         )
 
     def move_fap(self, number: int, value: float) -> None:
-        """Set a FAP, 3 to 68, in its unit; ValueError for another or a value that is not finite."""
+        """Set a FAP, 3 to 68, in its unit. ValueError for another number or a value that is not finite."""
         if not FIRST_LOW_LEVEL_FAP <= number <= FAP_COUNT or not np.isfinite(value):
             raise ValueError(f"there is no FAP {number} with the value {value}")
         self._fap_values[number - 1], self.fap_moved[number - 1] = value, True
 
     def move_bap(self, number: int, value: float) -> None:
-        """Set a BAP, 1 to 296, in 1e-5 rad or mm; ValueError for another or a value that is not finite."""
+        """Set a BAP, 1 to 296, in 1e-5 rad or mm. ValueError as for `move_fap`."""
         if not 1 <= number <= BAP_COUNT or not np.isfinite(value):
             raise ValueError(f"there is no BAP {number} with the value {value}")
         self._bap_values[number - 1], self.bap_moved[number - 1] = value, True
 
     def release(self, faps: tuple[int, ...] = (), baps: tuple[int, ...] = ()) -> None:
-        """Give FAPs and BAPs, by number, back to what is played."""
+        """Let FAPs and BAPs, by number, follow what is played again."""
         for moved, numbers in ((self.fap_moved, faps), (self.bap_moved, baps)):
             for number in numbers:
                 moved[number - 1] = False
 
     def release_all(self) -> None:
-        """Give everything back, visemes and expressions too."""
+        """Release everything, including visemes and expressions."""
         self.fap_moved[:] = False
         self.bap_moved[:] = False
         self.viseme, self.expression = Viseme(), Expression()

@@ -1,6 +1,6 @@
-"""The state of a window: the scene, the transport, the camera, what the user has selected and asked for.
+"""The state of a window: scene, transport, camera, selection, notices and requests.
 
-Panels read and change this; it knows no imgui and no OpenGL.
+Panels read and change it; it knows no imgui and no OpenGL.
 """
 
 from __future__ import annotations
@@ -37,16 +37,17 @@ Hook = Callable[[Faps, Baps], None]
 
 NOTICE_SECONDS = 4.0
 LEAVING = 6.0
-"""Seconds in which closing once more closes."""
-NOTICE_GOES = 0.5
-"""Seconds before its end from which on a notice fades."""
+"""Seconds in which closing again discards unsaved work."""
+NOTICE_FADES = 0.5
+"""Last seconds of a notice, in which it fades."""
 
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A message to the user: text; kind "done", "warning" or "error"; until, on the session's clock.
+    """A message to the user.
 
-    about: its subject; a newer notice about the same subject replaces it.
+    kind: "done", "warning" or "error". until: end of its time on the session's clock. about: its subject; a
+    newer notice about the same subject replaces it.
     """
 
     text: str
@@ -57,13 +58,13 @@ class Notice:
 
 @dataclass
 class Selection:
-    """The FAPs and BAPs that the user has chosen, by number, in the order of choosing."""
+    """The FAPs and BAPs that the user has chosen, by number, in the order of their choice."""
 
     faps: list[int] = field(default_factory=list)
     baps: list[int] = field(default_factory=list)
 
     def toggle(self, kind: str, number: int) -> None:
-        """Choose a "fap" or "bap", or no longer."""
+        """Add a parameter to the selection, or remove it. kind: "fap" or "bap"."""
         chosen = self.faps if kind == "fap" else self.baps
         if number in chosen:
             chosen.remove(number)
@@ -72,22 +73,21 @@ class Selection:
 
 
 class Session:
-    """Everything the panels share.
+    """The state that the window and its panels share.
 
-    scene, transport, viewpoint: what is shown, when, and from where. source: where it comes from.
-    selection: chosen FAPs and BAPs. open: names of the panels that are open. bare: everything but the
-    picture is hidden. size: of the picture in pixels; scale: pixels a point of the display.
+    scene, transport, viewpoint: what is shown, its current time, and the camera. source: the file behind it.
+    selection: chosen FAPs and BAPs. open: names of the open panels. bare: whether everything but the picture
+    is hidden. size: of the picture in pixels. scale: pixels per point of the display.
 
-    before_frame: functions called as hook(faps, baps) before each picture with what is shown next, FAPs
-    (68,) float32 and BAPs (296,) float64 (zeros where there is no body), to change in place.
+    before_frame: functions called as hook(faps, baps) before each picture; they may change the values that
+    will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
 
-    requests: what the window is to do after this picture; see `request`. recording: seconds recorded so far,
-    None where nothing is being recorded. values: faps and baps of the last picture, after the hooks.
-    sound: the file that belongs to what is played, whether a device makes it heard (audio) or not; it begins
-    sound_offset seconds after the first frame, see `shift_sound`.
-    rolling: names of what changes the picture by itself, or counts on being drawn. unsaved: what would be
-    lost with the window, see `leave`. dropped: files to be opened after it, see `drop`. popup: whether a list
-    is open over the picture; False closes it.
+    requests: what the window shall do after this picture, see `request`. recording: seconds of the film so
+    far, None if none is being recorded. values: FAPs and BAPs of the last picture, after the hooks. sound:
+    path of the sound file; audio: its player, None without a sound device; the sound begins sound_offset
+    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures all the time.
+    unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next, see `drop`.
+    popup: whether a list is open over the picture; set to False to close it.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class Session:
         self._leave_again_until = -math.inf
 
     def toggle_panel(self, name: str) -> None:
-        """Open a panel, or close it. Where all is hidden, show it."""
+        """Open or close a panel; if everything is hidden, show it."""
         if self.bare:
             self.bare = False
             self.open.add(name)
@@ -137,26 +137,26 @@ class Session:
             self.open ^= {name}
 
     def say(self, text: str, kind: str = "done", seconds: float = NOTICE_SECONDS, *, about: str = "") -> None:
-        """Show a short text for some seconds; kind "done", "warning" or "error".
+        """Show a notice for some seconds. kind: "done", "warning" or "error".
 
-        It takes the place of an older one about the same, by default of the same text.
+        It replaces an older one about the same subject; by default the subject is the text.
         """
         about = about or text
         self._notices = [one for one in self.notices() if one.about != about][-2:]
         self._notices.append(Notice(text, kind, self.clock() + seconds, about))
 
     def notices(self) -> list[Notice]:
-        """What is to be shown now, oldest first."""
+        """The current notices, oldest first."""
         now = self.clock()
         self._notices = [one for one in self._notices if one.until > now]
         return list(self._notices)
 
     def request(self, what: str) -> None:
-        """Ask the window for "screenshot", "transparent", "record" or "fullscreen"."""
+        """Request "screenshot", "transparent", "record" or "fullscreen" from the window."""
         self.requests.append(what)
 
     def escape(self) -> None:
-        """Close the list that is open, else leave the full screen, else the window."""
+        """Close an open list, else leave full screen, else close the window."""
         if self.popup:
             self.popup = False
         elif self.full_screen:
@@ -165,7 +165,7 @@ class Session:
             self.leave()
 
     def leave(self) -> None:
-        """Close the window; where something is not saved, only when asked a second time."""
+        """Close the window; with unsaved work, warn first and close at the second call."""
         if self.unsaved and self.clock() > self._leave_again_until:
             self._leave_again_until = self.clock() + LEAVING
             what = " and ".join(sorted(self.unsaved))
@@ -174,13 +174,13 @@ class Session:
         self.closing = True
 
     def drop(self, paths: tuple[Path, ...]) -> None:
-        """Files were dropped onto the window: close it for them, unless one cannot be read."""
+        """Close the window to open dropped files; if one cannot be read, say so and stay open."""
         from fba.errors import FbaError
         from fba.formats import read
 
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # whoever opens them says it
+                warnings.simplefilter("ignore")  # given again when they are opened
                 for path in paths:
                     read(path)
         except (FbaError, OSError) as error:
@@ -191,31 +191,31 @@ class Session:
             self.dropped = paths
 
     def touched(self) -> None:
-        """The user moved the mouse or pressed something: what hides itself comes back."""
+        """Note that the user moved the mouse or pressed something, so that hidden controls come back."""
         self.last_input = self.clock()
 
     @property
     def idle(self) -> float:
-        """Seconds since the user did something."""
+        """Seconds since the last input of the user."""
         return self.clock() - self.last_input
 
     @property
     def restless(self) -> bool:
-        """Whether the picture changes without the user's doing."""
-        going = self.clock() + NOTICE_GOES
+        """Whether the picture changes without input of the user."""
+        going = self.clock() + NOTICE_FADES
         leaving = any(notice.until < going for notice in self._notices)
         filming = self.recording is not None
         moving = self.transport.playing or self.viewpoint.gliding
         return moving or bool(self.rolling) or filming or leaving
 
     def shift_sound(self, seconds: float) -> None:
-        """Let the sound begin this much later than now, or earlier where negative."""
+        """Let the sound begin so many seconds later than now; earlier if negative."""
         self.sound_offset = round(self.sound_offset + seconds, 6)
         if self.audio is not None:
             self.audio.offset = self.sound_offset
 
     def view(self, time: float) -> View:
-        """What is drawn at a time, after `before_frame`."""
+        """What is drawn at a time in seconds, after the hooks of `before_frame`."""
         scene = self.scene
         if not self.before_frame or not isinstance(scene, Scene):
             return scene.at(time)
@@ -226,7 +226,7 @@ class Session:
         return scene.of(faps, baps)
 
     def toggle_view(self) -> None:
-        """Feature points and bones instead of the figure, or back; nothing where there is no such view."""
+        """Switch between the figure and its feature points and bones, where the scene has both views."""
         if isinstance(self.scene, Scene):
             self.scene.view = "figure" if self.scene.view == "points" else "points"
 
@@ -235,16 +235,16 @@ class Session:
         return SWITCHES
 
     def switch_key(self, switch: Switch) -> str:
-        """The key of a switch; "" where it has none, or where the window needs that key itself."""
+        """The key of a switch; "" if it has none, or the window uses that key for something else."""
         return "" if switch.key.lower() in by_name() else switch.key
 
     def switch_keys(self) -> list[tuple[str, str]]:
-        """(key, what it switches) of all switches that have a key."""
+        """(key, label) of all switches that have a key."""
         table = self.switch_table().values()
         return [(self.switch_key(one), one.label) for one in table if self.switch_key(one)]
 
     def press_switch(self, key: str) -> bool:
-        """Turn the switch of a key over; False where no switch has it."""
+        """Turn the switch with this key to its next value; returns False if there is none."""
         for name, switch in self.switch_table().items():
             if self.switch_key(switch).lower() == key:
                 self.touched()
@@ -254,5 +254,5 @@ class Session:
         return False
 
     def camera(self, time: float) -> Camera:
-        """The camera at a time."""
+        """The camera at a time in seconds."""
         return self.viewpoint.camera_at(time)

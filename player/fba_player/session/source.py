@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
 
 REFRESH = 0.2
-"""Seconds between looks at what has arrived of a stream."""
+"""Seconds between updates of the information about a live stream."""
 
 
 class Source:
     """The file behind a scene.
 
-    path: None where there is no file. bap_steps: the table of BAP steps it was decoded with. warnings: those
-    given while it was read. `info` describes its content: at first from the scene alone, once `probe` is done
-    with planes, bits and damage too.
+    path: None if there is no file. bap_steps: the table of BAP steps it was decoded with. warnings: those
+    given while it was read. `info` describes its content, at first from the scene alone, and once `probe` is
+    done also with planes, bits and damage.
     """
 
     def __init__(
@@ -58,12 +58,12 @@ class Source:
 
     @property
     def name(self) -> str:
-        """The file's name, or the scene's."""
+        """Name of the file, else the title of the scene."""
         return os.path.basename(os.fspath(self.path)) if self.path is not None else self._scene.title
 
     @property
     def info(self) -> StreamInfo:
-        """What it holds; the same object until something changes."""
+        """Information about the stream; the same object until something changes."""
         if self._probed is not None:
             return self._probed
         own, timeline, now = self._scene_info, self._scene.timeline, wall.monotonic()
@@ -74,7 +74,7 @@ class Source:
         return self._scene_info
 
     def probe(self, *, wait: bool = False) -> None:
-        """Read what the file holds, in the background unless `wait`: the window need not wait for it."""
+        """Read the planes, bits and damage of the file; in the background unless `wait` is True."""
         if self._thread is not None:
             return
         self._thread = threading.Thread(target=self._read_details, name="fba source", daemon=True)
@@ -84,12 +84,12 @@ class Source:
 
     @property
     def probing(self) -> bool:
-        """Whether that is still going on."""
+        """Whether `probe` is still running in the background."""
         return self._thread is not None and self._thread.is_alive()
 
     @property
     def trace(self) -> Trace | None:
-        """What is behind the timeline, once `probe` has found it: the planes' bits, or how much moves."""
+        """The graph behind the timeline: bits of planes, or amount of motion; None until `probe` is done."""
         if self._live is not None and self._trace_info is not self.info:
             self._trace_info = self.info
             self._trace = trace_of_planes(self._trace_info)
@@ -124,7 +124,7 @@ class Source:
         try:
             if self.path is not None and (found := format_of(self.path).name) == "fba":
                 self._probed = probe(self.path, bap_steps=self.bap_steps)
-            elif self.path is not None:  # what was read of it counts: at the rate that was asked for
+            elif self.path is not None:  # described by the animation, whose rate the user may have set
                 self._format_and_size = (found, os.stat(self.path).st_size)
                 self._scene_info = None
         except (FbaError, OSError) as error:

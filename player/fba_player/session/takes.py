@@ -1,4 +1,4 @@
-"""Takes: what is shown, sampled at a stream's rate while it is performed, and kept as an .fba file."""
+"""Takes: recordings of the values that are shown, sampled at a frame rate and saved as .fba files."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ Faps = Float32
 Baps = Float64
 
 RATE = Fraction(25)
-"""Frames a second where what is played has no usable rate."""
+"""Frames per second of a take where the rate of the animation is outside of `RATES`."""
 RATES = (5, 120)
 LONGEST = 3600.0
-"""Seconds that a take may last."""
+"""Most seconds of a take."""
 STILL = 0.2
-"""Where nothing was shown for so many seconds, nothing changed in the meantime."""
+"""Seconds without a picture after which values are held, not interpolated, until the next one."""
 ALWAYS = slice(180, 186)
-"""BAPs of the whole body, which a take with a body always sends."""
+"""BAPs of the root, which a take with a body always sends."""
 
 
 def take_rate(rate: Fraction) -> Fraction:
-    """The rate at which a take over a performance of that rate is sampled."""
+    """The frame rate of a take over an animation with this rate."""
     return rate if RATES[0] <= rate <= RATES[1] else RATE
 
 
 class TakeRecorder:
-    """Samples what is shown. `add` it with its time, as often as it is drawn; `take` gives the result.
+    """Records the values of pictures as a take: `add` those of each picture, then call `take`.
 
-    rate: frames a second. face, body: what the take is to have. Between two pictures values are
-    interpolated, so the take does not depend on how often something was drawn.
+    rate: frames per second. face, body: whether the take has one. Values are interpolated between pictures,
+    so that the take does not depend on how often pictures were drawn.
     """
 
     def __init__(self, rate: Fraction, *, face: bool = True, body: bool = False) -> None:
@@ -55,9 +55,9 @@ class TakeRecorder:
         return len(self._faps)
 
     def add(self, seconds: float, faps: Faps, baps: Baps) -> None:
-        """FAPs (68,) and BAPs (296,) shown `seconds` after the take began; times must not go back.
+        """Add FAPs (68,) and BAPs (296,) shown `seconds` after the take began.
 
-        What comes after `LONGEST` is left out, and `full` set.
+        After `LONGEST` nothing more is added, and `full` is set. Raises ValueError if times go back.
         """
         before = self._last or (0.0, faps, baps)
         if seconds < before[0]:
@@ -75,10 +75,10 @@ class TakeRecorder:
         self.seconds = seconds
 
     def take(self, name: str = "take") -> Animation:
-        """What was recorded; ValueError where nothing was.
+        """The recording as an animation. Raises ValueError if nothing was recorded.
 
-        All FAPs are sent in every frame: one left out would be filled in by the face that shows it. Of BAPs,
-        which are 0 where nothing is sent, only those that were ever moved.
+        All FAPs are sent in every frame, because a face fills in those that are not sent. BAPs are 0 unless
+        sent, so only those that ever moved are.
         """
         if not self._faps:
             raise ValueError("nothing was recorded")
@@ -98,7 +98,7 @@ class TakeRecorder:
 
 
 class Takes:
-    """The takes of a session, the last one on top. folder: where they are saved."""
+    """The takes of a session in order. folder: where they are saved; by default the current one."""
 
     def __init__(self, folder: str | os.PathLike[str] | None = None) -> None:
         self.folder = Path(folder) if folder is not None else Path()
@@ -109,19 +109,19 @@ class Takes:
 
     @property
     def last(self) -> Animation | None:
-        """The last take that was not undone."""
+        """The last take that was not undone; None without one."""
         return self._takes[-1] if self._takes else None
 
     def add(self, take: Animation) -> None:
-        """Keep a take."""
+        """Add a take as the last one."""
         self._takes.append(take)
 
     def undo(self) -> Animation | None:
-        """Forget the last take, and return it; files that were saved stay."""
+        """Remove and return the last take; saved files stay."""
         return self._takes.pop() if self._takes else None
 
     def path(self, name: str) -> Path:
-        """Where a name leads: into the folder, with .fba at its end; FormatError for no name."""
+        """The path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty name."""
         name = name.strip()
         if not name or name.endswith(("/", os.sep)) or name in (".", ".."):
             raise FormatError("is no name for a file; write one, such as take.fba", path=name or "take")
@@ -129,18 +129,18 @@ class Takes:
         return path if path.suffix.lower() == ".fba" else path.with_name(path.name + ".fba")
 
     def free_name(self, name: str = "take") -> str:
-        """`name`, or `name-2` and so on, whichever no file has yet."""
+        """`name`, or `name-2` and so on: the first that no file has yet."""
         number, found = 2, name
         while self.path(found).exists():
             found, number = f"{name}-{number}", number + 1
         return found
 
     def save(self, name: str, *, bap_steps: str = "iso") -> tuple[Path, str]:
-        """Write the last take; its path, and the table of BAP steps that readers need.
+        """Write the last take; returns its path, and the table of BAP steps that readers need.
 
-        Where the standard's steps ("iso") do not reach as far as a joint was turned, "visage" are used.
-        Raises FormatError where there is a file of that name already, where nothing was recorded or it
-        cannot be written, RangeError for values that no stream holds.
+        If the steps of the standard ("iso") cannot code a turn of a joint, "visage" are used. Raises
+        FormatError if a file of that name exists, nothing was recorded or the file cannot be written,
+        RangeError for values that no stream can code.
         """
         path = self.path(name)
         if self.last is None:

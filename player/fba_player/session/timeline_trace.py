@@ -1,4 +1,4 @@
-"""What is behind the timeline: the bits of each plane, I planes in another colour; else how much moves."""
+"""The graph behind the timeline: bits of each plane, I planes in another colour, or amount of motion."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from fba.codec import StreamInfo
 PREDICTED = (120, 160, 190)
 INTRA = (238, 178, 84)
 LEAST = 0.06
-"""Height that even the smallest plane has, as a share of the whole."""
+"""Least height of a plane, as a share of the full height."""
 GAP = 5
-"""From so many pixels on, planes have a gap between them."""
+"""Pixels per plane from which there is a gap between planes."""
 ROWS = 4096
-"""Frames looked at together."""
+"""Frames processed at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """(T,) amounts, 0 or more, at (T,) times in seconds; of them, which are I planes.
+    """Amounts (T,), 0 or more, at times (T,) in seconds. intra (T,): which of them are I planes.
 
-    bits: whether amounts are the bits of planes, else they are how much moves, without a unit.
+    bits: whether amounts are bits of planes; else they are amounts of motion, without a unit.
     """
 
     amounts: Float64
@@ -34,7 +34,7 @@ class Trace:
 
 
 def trace_of_planes(info: StreamInfo) -> Trace | None:
-    """The bits of a stream's planes; None where it has none."""
+    """The bits of a stream's planes; None if it has no planes."""
     if info.plane_bits is None or info.plane_intra is None or info.frame_index is None:
         return None
     times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
@@ -42,9 +42,9 @@ def trace_of_planes(info: StreamInfo) -> Trace | None:
 
 
 def trace_of_motion(animation: Animation) -> Trace | None:
-    """How much each frame differs from the one before: parameters as shares of their range, added up.
+    """How much each frame differs from the one before; None if nothing moves.
 
-    None where nothing moves.
+    It is the sum over all parameters of the change divided by the range of values in the animation.
     """
     moved = np.zeros(len(animation))
     face, body = animation.face, animation.body
@@ -63,10 +63,10 @@ def trace_of_motion(animation: Animation) -> Trace | None:
 
 
 def trace_picture(trace: Trace, low: float, high: float, size: tuple[int, int]) -> UInt8:
-    """uint8 (H, W, 4), transparent but for a column for each plane, or frame, from time low to high.
+    """Draw a column for each plane, or frame, from time low to high: uint8 (H, W, 4), else transparent.
 
-    size: width and height. Heights go with the square root of the amounts, so that small planes are seen
-    beside large ones. A pixel that several planes share shows the largest.
+    size: width and height in pixels. Heights are proportional to the square root of the amounts, so that
+    small planes are visible next to large ones. A pixel that several planes share shows the largest.
     """
     width, height = size
     picture = np.zeros((height, width, 4), dtype=np.uint8)

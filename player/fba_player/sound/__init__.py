@@ -1,4 +1,4 @@
-"""Sound: files decoded as needed, mixed for the device, and recorded into films.
+"""Sound: files decoded as needed, mixed for the sound device, and recorded into films.
 
 May use: playback.
 """

@@ -1,4 +1,4 @@
-"""Time as a sound device counts it."""
+"""A clock that follows a sound device."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from collections import deque
 from collections.abc import Callable
 
 GAIN = 0.05
-"""Share of the difference by which each call of the device moves the clock: calls come irregularly."""
+"""Share of the measured error by which each call of the device corrects the clock: calls are irregular."""
 WINDOW = 10
-"""Calls of which the most punctual tells: a busy machine answers late, never early."""
+"""Number of latest calls of which the earliest is used: a busy machine answers late, never early."""
 JUMP = 0.05
-"""Seconds of difference, in the most punctual call, beyond which the device has stopped for a while."""
+"""Seconds of error, in the earliest call, beyond which the device must have stopped for a while."""
 
 
 class SoundClock:
-    """Seconds of sound that have been heard, read at any moment.
+    """Seconds of sound that have been heard; call it for a reading.
 
-    The device says how many samples it takes each time; in between, and to even out when exactly it is
-    served, the wall clock goes on. Never goes back. Where the device stops taking any, the wall clock alone
-    counts on, and the samples it did not take in time are never heard.
+    It counts the samples that the device takes, and follows the wall clock in between, which evens out the
+    irregular times of its calls. It never goes back. Where the device stops taking samples, it goes on with
+    the wall clock, and the samples that were not taken in time are never heard.
 
-    rate: samples a second. latency: seconds from handing over samples to hearing them. monotonic: the wall
+    rate: samples per second. latency: seconds from handing over samples to hearing them. monotonic: the wall
     clock, for tests. `take` is for the device's thread, reading the clock for any.
     """
 
@@ -45,7 +45,7 @@ class SoundClock:
         return self._last
 
     def take(self, samples: int) -> float:
-        """The device takes so many samples; the reading at which the first of them is heard."""
+        """Count samples that the device takes; returns the reading at which the first of them is heard."""
         now = self._monotonic()
         if self._ahead is None:
             # A device fills its buffers at once when it starts, and begins to play then.

@@ -1,4 +1,4 @@
-"""What a sound device is given: the sound of the moment at which it will be heard."""
+"""Samples for a sound device, matching the animation at the time when they are heard."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from fba.arrays import Float32, Int16
 from fba_player.playback.playhead import Motion
 
 FADE = 0.004
-"""Seconds in which sound begins, ends, and goes over into another place: without them it would click."""
+"""Seconds over which sound fades in, out, and across a jump: without them it would click."""
 ROUNDING = 1e-7
-"""Seconds: a turn this far ahead, by rounding, is now."""
+"""Seconds: a jump this little ahead is due now, and late by rounding only."""
 SLIP = 0.002
-"""Seconds by which the place that is due may differ from the one that follows the last."""
+"""Seconds by which the sample that is due may differ from the one that follows the last, without a jump."""
 
 
 class SoundMixer:
-    """Samples for a device from where the performance is when they are heard.
+    """Mixes the samples of a file that belong to the animation's time, with fades at starts, ends and jumps.
 
-    take: gives samples, `SoundBlocks.take`. rate: of both. motion: where the performance is. origin: time of
-    the animation, seconds, at which the first sample is heard; it may change at any time.
+    take: returns samples of the file, as `SoundBlocks.take`. rate: samples per second, of the file and the
+    device. motion: returns how the animation's time follows the clock. origin: time of the animation, in
+    seconds, at which the file begins; it may change at any time.
 
-    At other speeds the sound is that of a tape: faster is higher. volume: 0 to 1; muted: silence, whatever
-    the volume.
+    At other speeds than 1 the pitch changes, as with a tape. volume: 0 to 1; muted: silence, whatever the
+    volume.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class SoundMixer:
         self._tail: Float32 = np.zeros((0, 2), dtype=np.float32)  # what is left of the fading end
 
     def fill(self, clock: float, count: int) -> Int16:
-        """Samples int16 (count, 2), of which the first is heard at that reading of the clock."""
+        """Samples int16 (count, 2); the first is heard at this reading of the clock."""
         motion, rate = self._motion(), self._rate
         mixed = np.zeros((count, 2), dtype=np.float32)
         done = 0
@@ -67,7 +68,7 @@ class SoundMixer:
         return np.asarray(np.clip(np.rint(mixed * np.float32(level)), -32768, 32767), dtype=np.int16)
 
     def _continue_at(self, due: float | None, speed: float) -> None:
-        """Go on with the sample that is due; where it does not follow the last, end that one softly."""
+        """Go on with the sample that is due; fade out the last one if this is a jump. None: silence."""
         here = self._cursor
         if here is not None and due is not None and abs(due - here) <= SLIP * self._rate * max(speed, 1.0):
             self._speed = speed
@@ -86,7 +87,7 @@ class SoundMixer:
         return samples
 
     def _read_at_speed(self, first: float, speed: float, count: int) -> Float32:
-        """(count, 2) samples from a place on, so many of the file's for one."""
+        """Samples float32 (count, 2) of the file from `first` on, resampled by `speed`."""
         if speed == 1.0:
             return self._take(round(first), count).astype(np.float32)
         low = math.floor(first)
@@ -97,7 +98,7 @@ class SoundMixer:
             share = (at[:-1] - rows).astype(np.float32)[:, None]
             slow: Float32 = samples[rows] * (1 - share) + samples[rows + 1] * share
             return slow
-        # The mean over what one sample stands for: the highest tones, which no device could play, are lost.
+        # The mean over the samples that become one: it removes the tones that would alias.
         sums = np.concatenate([np.zeros((1, 2)), np.cumsum(samples, axis=0, dtype=np.float64)])
         rows = np.minimum(at.astype(np.intp), len(samples) - 1)
         whole = sums[rows] + samples[rows] * (at - rows)[:, None]

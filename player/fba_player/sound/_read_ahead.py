@@ -1,4 +1,4 @@
-"""The part of an audio file that is about to be heard, in memory: decoded ahead by a thread of its own."""
+"""The part of an audio file that will be heard soon, decoded ahead by a thread."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from fba.errors import FbaError
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 
 SECONDS = 0.5
-"""Length of a block."""
+"""Length of a block, in seconds."""
 KEPT = 64
 """Blocks in memory, half a minute: 6 MB at 48 kHz."""
 PAUSE = 0.03
-"""Seconds between looks at what is wanted."""
+"""Seconds between checks of which samples are wanted."""
 
 
 class SoundBlocks:
-    """Samples of a sound file, there at once where they were wanted before.
+    """Samples of a sound file, in blocks that a thread decodes before they are needed.
 
-    file: closed with this. wanted: gives the samples, by number, that will be heard soon, the most urgent
-    first; asked for all the time by the thread that decodes.
+    file: closed together with this. wanted: returns the numbers of samples that will be heard soon, the most
+    urgent first; the decoding thread calls it all the time.
     """
 
     def __init__(self, file: SoundFile, wanted: Callable[[], Iterable[int]]) -> None:
@@ -40,7 +40,7 @@ class SoundBlocks:
         self._thread.start()
 
     def take(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2); silence outside, and where none are there yet."""
+        """Samples int16 (count, 2); zeros outside of the file, and where it is not decoded yet."""
         taken = np.zeros((count, CHANNELS), dtype=np.int16)
         for number in range(max(start, 0) // self._size, (start + count - 1) // self._size + 1):
             block = self._blocks.get(number)
@@ -52,7 +52,7 @@ class SoundBlocks:
         return taken
 
     def load(self) -> bool:
-        """Decode the most urgent block that is wanted and not here. False where all of them are."""
+        """Decode the most urgent block that is not in memory; returns False where all wanted ones are."""
         for sample in self._wanted():
             number = sample // self._size
             if number < 0:

@@ -1,4 +1,4 @@
-"""Any stretch of an audio file, decoded when it is asked for: an hour of sound needs no hour's memory."""
+"""Any part of an audio file, decoded when it is read, so that long files need little memory."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from fba_player.sound.pyav import av_version, import_av
 
 CHANNELS = 2
 RATES = (8000, 192_000)
-"""Sound outside these is resampled to `USUAL_RATE`."""
+"""Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
 RUN_UP = 0.5
-"""Seconds decoded before the place that is wanted: MP3 and AAC frames need the ones before them."""
+"""Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
 GAP = 0.02
-"""Seconds by which a file's own times may leave its count of samples before they are believed."""
+"""Seconds by which the times in a file must exceed its count of samples to be taken as a gap."""
 MOST_AT_ONCE = 1 << 24
-"""Samples; one piece of a file that decodes to more is damaged."""
+"""Samples; a packet that decodes to more is damaged."""
 
 
 def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
@@ -49,13 +49,13 @@ def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
 
 
 class SoundFile:
-    """The first sound of an audio or video file, as stereo samples at one rate.
+    """The first audio track of a file, as stereo samples at one rate.
 
-    path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rate: samples a second, the file's own
-    where devices play it, or where it is one of `rates`. duration: seconds as the file says itself, None
-    where it does not. Mono goes to both sides; more than two channels are mixed down.
+    path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rates: samples per second that need no
+    resampling; by default those that devices play. rate: that of the samples. duration: seconds as stated in
+    the file; None where it does not say. Mono goes to both sides; more than two channels are mixed down.
 
-    Not for several threads at once. Raises FormatError where it cannot be read or holds no sound.
+    Use it from one thread at a time. Raises FormatError where it cannot be read or holds no sound.
     """
 
     _container: Any = None
@@ -83,7 +83,7 @@ class SoundFile:
             raise FormatError("holds no sound that can be decoded", path=path)
 
     def read(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2) from a sample on; fewer, or none, where the sound ends."""
+        """Samples int16 (count, 2) from sample number `start` on; fewer, or none, where the sound ends."""
         start, missing = max(start, 0), max(count, 0)
         at = self._next
         if at is None or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP * self.rate:
@@ -128,7 +128,7 @@ class SoundFile:
         return rate if fits else USUAL_RATE
 
     def _seek(self, start: int) -> int:
-        """Let `_parts` begin at or before a sample; the one it begins with."""
+        """Let `_parts` begin at or before a sample; returns the number of the sample after `_rest`."""
         self._rest = self._rest[:0]
         before = max(start / self.rate - RUN_UP, 0.0)
         stream = self._stream
@@ -144,7 +144,7 @@ class SoundFile:
         return self._first + len(self._rest)
 
     def _decoded(self) -> Iterator[Int16]:
-        """Parts (N, 2) one after the other from where the container is; the first one's place is `_first`."""
+        """Parts (N, 2) from where the container is; sets `_first` to the number of the first sample."""
         stream = self._stream
         convert = _Converter(self._av, self.rate, mono=stream.channels == 1)
         begun, at = stream.start_time or 0, None
@@ -170,7 +170,7 @@ class SoundFile:
             yield from convert(None)
 
     def _frames(self) -> Iterator[Any]:
-        """Decoded frames; what is damaged is left out, with a warning the first time."""
+        """Decoded frames; damaged ones are left out, with a warning the first time."""
         error_type = self._av.error.FFmpegError
         packets = self._container.demux(self._stream)
         while True:
@@ -200,7 +200,7 @@ class SoundFile:
 
 
 class _Converter:
-    """Decoded frames as samples (N, 2) at one rate; frames may change their own format."""
+    """Converts decoded frames to samples (N, 2) at one rate; the format of frames may change on the way."""
 
     def __init__(self, av: Any, rate: int, *, mono: bool) -> None:
         self._av = av
@@ -209,7 +209,7 @@ class _Converter:
         self._resampler = self._new_resampler()
 
     def __call__(self, frame: Any) -> list[Int16]:
-        """The samples of a frame, or what is still held back for None."""
+        """The samples of a frame; for None, those that the resampler still holds back."""
         try:
             pieces = self._resampler.resample(frame)
         except ValueError:  # another format than before

@@ -1,8 +1,8 @@
-"""Sound beside the picture: the device's clock leads, and the samples that it is given follow the transport.
+"""Sound in step with the picture: the transport follows the clock of the sound device.
 
-A device counts the samples it plays, and that count is the clock of the transport. What the device asks
-for next will be heard at a known reading of that clock, so it gets the sound of the time that the transport
-will show then: pausing, seeking, looping and speeds need no code of their own, and nothing can drift.
+The samples that a device has played are the clock of the transport. The samples that it asks for next will be
+heard at a known reading of that clock, so it gets those of the time that the transport will show then.
+Pausing, seeking, looping and speeds need no code of their own, and nothing can drift.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from fba_player.sound.soundtrack import find_sound_beside
 __all__ = ["Audio", "find_sound_beside", "open_audio"]
 
 PERIOD, PERIODS = 0.04, 3
-"""Seconds that a device asks for at a time, and how many of them it holds."""
+"""Seconds that a device asks for at a time, and how many such periods it buffers."""
 AHEAD = (0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5)
-"""Seconds after which a sample will be wanted."""
+"""Seconds ahead of now whose samples are decoded in advance."""
 
 
 class NoDeviceError(Exception):
-    """No sound can be played here; the text says why."""
+    """No sound can be played on this machine; the text says why."""
 
 
 class Audio:
-    """An audio file, heard while a transport plays; a context manager.
+    """Plays an audio file in step with a transport; a context manager.
 
     path: anything that FFmpeg reads. transport: follows the device's clock from now on. offset: seconds by
-    which the sound begins after the first frame, or before it where negative. backend: "null" for a device
-    that nobody hears, for tests; None for what the system has.
+    which the sound begins after the first frame; before it if negative. backend: "null" for a silent device,
+    for tests; None for the system's default.
 
-    Raises FormatError where the file cannot be read or holds no sound, NoDeviceError where there is no
-    device. Use `open_audio`, which goes on without sound there.
+    Raises FormatError where the file cannot be read or holds no sound, NoDeviceError where there is no sound
+    device; `open_audio` goes on without sound then.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Audio:
 
     @property
     def offset(self) -> float:
-        """Seconds by which the sound begins after the first frame; it may be set while it is heard."""
+        """Seconds by which the sound begins after the first frame; it may be set while it plays."""
         return self._offset
 
     @offset.setter
@@ -97,7 +97,7 @@ class Audio:
 
     @property
     def muted(self) -> bool:
-        """Whether nothing is heard, whatever the volume."""
+        """Whether it is silent, whatever the volume."""
         return self._mixer.muted
 
     @muted.setter
@@ -119,14 +119,14 @@ class Audio:
         self.close()
 
     def _device_samples(self) -> Generator[bytes, int, None]:
-        """What the device gets; runs in its thread."""
+        """Samples for the device as bytes; runs in its thread."""
         samples = yield b""
         while True:
             first = self.clock.take(samples)
             samples = yield self._mixer.fill(first, samples).tobytes()
 
     def _samples_ahead(self) -> Iterator[int]:
-        """Samples that will be heard soon, the next one first."""
+        """Numbers of samples that will be heard soon, the next one first."""
         motion, now = self.transport.motion, self.clock()
         for ahead in AHEAD:
             yield int((motion.time(now + ahead) - self._origin) * self.rate)
@@ -136,7 +136,9 @@ class Audio:
 def open_audio(
     path: PathLike, transport: Transport, *, offset: float = 0.0, backend: str | None = None
 ) -> Audio | None:
-    """`Audio`; or None, with an FbaWarning, where there is no sound device: the wall clock goes on then.
+    """Open an audio file as `Audio`; None, with an FbaWarning, where there is no sound device.
+
+    The transport then goes on with the wall clock.
 
     Raises FormatError where the file cannot be read or holds no sound.
     """
@@ -176,7 +178,7 @@ def _open_device(rate: int, backend: str | None) -> Any:
 
 @contextlib.contextmanager
 def _silence_stderr() -> Iterator[None]:
-    """Libraries for sound on Linux write pages to standard error where there is no device."""
+    """Silence standard error: sound libraries on Linux write pages to it where there is no device."""
     if not sys.platform.startswith("linux"):
         yield
         return

@@ -1,4 +1,4 @@
-"""PyAV, which encodes films and decodes sound: imported here only, in any of its versions from 12 on."""
+"""The import of PyAV, from version 12 on, which encodes films and decodes sound."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fba.errors import DisplayError
 
 
 def import_av(purpose: str = "films need") -> Any:
-    """The module `av`. purpose: how the message begins. Raises DisplayError where it cannot be imported."""
+    """The module `av`; DisplayError where it cannot be imported. purpose: the beginning of the message."""
     try:
         import av
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""The sound of a film of a window: what is heard while it is recorded, pauses and jumps among it."""
+"""The sound of a film of the window: as it is heard during the recording, with pauses and jumps."""
 
 from __future__ import annotations
 
@@ -19,15 +19,14 @@ from fba_player.sound.pyav import import_av
 from fba_player.sound.soundtrack import AAC_RATES, BLOCK
 
 PIECE = 1.0
-"""Seconds mixed at once, at most."""
+"""Most seconds mixed at once."""
 
 
 class FilmSound:
-    """Samples for a film, from where a transport is at each of its moments; a
-    `fba_player.sound.soundtrack.FilmedSound`.
+    """Samples for a film that follow a transport; a `fba_player.sound.soundtrack.FilmedSound`.
 
-    path: an audio file. transport: what is played; `offset` gives the seconds by which the sound begins after
-    the first frame. muted: whether nothing is to be heard now.
+    path: an audio file. transport: what is played. offset: returns the seconds by which the sound begins
+    after the first frame. muted: returns whether it is silent now.
 
     The window's thread calls `advance` and `end`, the encoder's `frames`. It needs no sound device. Raises
     FormatError where the file cannot be read.
@@ -54,7 +53,7 @@ class FilmSound:
         self._ended = False
 
     def advance(self, seconds: float) -> None:
-        """The film is so many seconds long now, and the transport is where it then is."""
+        """Mix the sound up to a length of the film in seconds, which the transport has reached now."""
         now = self._transport.clock
         self._mixer.origin = self._transport.start + self._offset()
         self._mixer.muted = self._muted()
@@ -68,11 +67,11 @@ class FilmSound:
             missing -= count
 
     def end(self) -> None:
-        """No more will come: what the film still lacks is silence."""
+        """End the sound: the rest of the film is silent."""
         self._ended = True
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """As many of the next samples as are there, as `av.AudioFrame`s ("fltp") without times."""
+        """The next samples, at most as many as are mixed, as `av.AudioFrame`s ("fltp") without times."""
         while samples > 0:
             with self._lock:
                 part = self._mixed.popleft() if self._mixed else None
@@ -95,7 +94,7 @@ class FilmSound:
         self._file.close()
 
     def _take(self, start: int, count: int) -> Int16:
-        """Samples int16 (count, 2); silence outside."""
+        """Samples int16 (count, 2) of the file; zeros outside."""
         taken = np.zeros((count, CHANNELS), dtype=np.int16)
         first = min(max(-start, 0), count)
         found = self._file.read(start + first, count - first)

@@ -1,4 +1,4 @@
-"""The sound that goes with a film: any part of an audio file, sample by sample."""
+"""The sound track of a film: any part of an audio file."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from fba_player.sound.pyav import import_av
 
 AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
 BLOCK = 1024
-"""Samples at a time; AAC's own."""
+"""Samples of an AAC frame."""
 
 
 class FilmedSound(Protocol):
-    """What the sound track of a film is made of: samples as far as they are known."""
+    """A source of samples for the sound track of a film."""
 
     rate: int
     channels: int
     layout: str
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """The next samples, or as many of them as are there, as `av.AudioFrame`s ("fltp") without times."""
+        """The next samples, or those of them that are ready, as `av.AudioFrame`s ("fltp") without times."""
 
     def close(self) -> None:
-        """Give back what it holds; safe to call twice."""
+        """Release its resources; safe to call twice."""
 
 
 def find_sound_beside(path: PathLike) -> Path | None:
-    """The WAV file of the same name beside a stream, where there is one."""
+    """The WAV file of the same name in the folder of a stream; None where there is none."""
     stream = Path(path)
     for suffix in (".wav", ".WAV", ".Wav"):
         found = stream.with_suffix(suffix)
@@ -45,12 +45,12 @@ def find_sound_beside(path: PathLike) -> Path | None:
 
 
 class Soundtrack:
-    """Samples of an audio file from a moment on, then silence.
+    """Samples of an audio file from a time on, then silence; a `FilmedSound`.
 
-    path: anything that FFmpeg reads. start: seconds in the file; where it is negative, silence comes
-    first. rate: samples a second, the file's own where AAC knows it, else 48000. One or two channels.
+    path: anything that FFmpeg reads. start: seconds in the file; if negative, silence comes first. rate:
+    samples per second, that of the file if AAC has it, else 48000. channels: 1 or 2.
 
-    Raises FormatError where it cannot be read or holds no sound.
+    Raises FormatError where the file cannot be read or holds no sound.
     """
 
     def __init__(self, path: PathLike, start: Fraction) -> None:
@@ -80,7 +80,7 @@ class Soundtrack:
             yield frame
 
     def take(self, samples: int) -> Float32:
-        """The next samples: float32 (channels, samples), -1..1; zeros after the end of the file."""
+        """The next samples, float32 (channels, samples), -1..1; zeros after the end of the file."""
         while self._rest.shape[1] < samples:
             part = next(self._parts, None)
             if part is None:
@@ -106,7 +106,7 @@ class Soundtrack:
     def _decoded(self, resampler: Any) -> Iterator[Any]:
         try:
             for frame in self._container.decode(self._stream):
-                frame.pts = None  # sound is what follows: times of damaged files do not matter
+                frame.pts = None  # the order counts: times in damaged files are wrong
                 yield from resampler.resample(frame)
             yield from resampler.resample(None)
         except (self._av.error.FFmpegError, ValueError) as error:  # or its format changes on the way

@@ -1,4 +1,4 @@
-"""The timeline and the buttons at the bottom of the picture."""
+"""The bar at the bottom of the picture: timeline and buttons."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from fba_player.ui.panels.panel import EITHER_BUTTON, STANDING
 from fba_player.ui.ruler import Ruler, label
 
 HEIGHT = 124.0
-"""Points at the bottom that it covers."""
+"""Height of the bar in points."""
 LOW_HEIGHT = 60.0
-"""The same where the window is too low for more than the timeline."""
+"""Height in windows that have room for the timeline only."""
 MARGIN = 18.0
 TOP = 24.0
 TRACK = 40.0
 BUTTONS = TOP + TRACK + 13.0
 GRIP = 7.0
-"""Points beside a mark at which it is taken hold of."""
+"""Distance in points within which the mouse grabs a mark."""
 APART = 86.0
-"""Least points between the labels of the ruler."""
+"""Least distance in points between labels of the ruler."""
 
 
 class Bar:
-    """Draws the transport of a session and lets the mouse move it. One object for each window."""
+    """Draws the transport of a session; the mouse seeks and moves marks in it. One for each window."""
 
     def __init__(self, renderer: ImguiRenderer) -> None:
         self._renderer = renderer
@@ -40,20 +40,20 @@ class Bar:
         self._trace: tuple[object, ...] = ()
         self._ticks: tuple[Ruler | None, list[float], list[tuple[float, float, str]]] = (None, [], [])
         self.place = (0.0, 0.0, 0.0, 0.0)
-        """Where the timeline is: left, top, right, bottom in points; for tests and pictures."""
+        """Left, top, right, bottom of the timeline in points; for tests and pictures."""
         self.buttons = Buttons()
 
     @property
     def held(self) -> bool:
-        """Whether the mouse has hold of the timeline."""
+        """Whether the mouse is dragging in the timeline."""
         return bool(self._held)
 
     def height(self, display: tuple[float, float]) -> float:
-        """Points that it covers in a display of that size."""
+        """Height of the bar in points, in a display of this size."""
         return HEIGHT if display[1] >= 260 and display[0] >= 330 else LOW_HEIGHT
 
     def draw(self, session: Session, display: tuple[float, float]) -> None:
-        """Draw it along the bottom of a display of that size in points."""
+        """Draw the bar at the bottom of a display of this size in points."""
         wide, high = display
         tall = self.height(display)
         imgui.set_next_window_pos((0, high - tall))
@@ -179,7 +179,7 @@ class Bar:
     def _hover_text(
         self, session: Session, ruler: Ruler, to: imgui.ImDrawList, top: float, bottom: float
     ) -> None:
-        """What is under the mouse: time, frame, and the plane's kind and bits."""
+        """Draw the time, the frame, and the kind and bits of the plane under the mouse."""
         x = min(max(imgui.get_io().mouse_pos.x, ruler.left), ruler.right)
         time = ruler.time(x)
         frame = session.scene.timeline.position(time)[0]
@@ -200,7 +200,7 @@ class Bar:
 
 
 def _ticks(ruler: Ruler) -> tuple[list[float], list[tuple[float, float, str]]]:
-    """Places of the small ticks; and place, left edge of the label and label of the large ones."""
+    """x of the small ticks; and (x, left edge of the label, label) of the large ones."""
     step = ruler.step(APART)
     large = []
     for time in ruler.ticks(step):

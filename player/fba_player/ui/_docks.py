@@ -1,6 +1,6 @@
-"""Where open panels stand: in a column at the left and one at the right, which leave the middle free.
+"""The layout of open panels: a column at the left and one at the right, which leave the middle free.
 
-Geometry only: it knows no imgui. All lengths are points.
+All lengths are in points.
 """
 
 from __future__ import annotations
@@ -9,18 +9,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 EDGE, GAP, CLOSE = 14.0, 10.0, 4.0
-"""Points around columns, between panels, and below folded ones."""
+"""Points around columns, between panels, and below folded panels."""
 TITLE = 32.0
-"""Height of a panel of which only the title is seen."""
+"""Height of a folded panel, which shows only its title."""
 MIDDLE, LEAST_MIDDLE = 0.3, 240.0
-"""Share of the width, and points, that columns leave to who is seen."""
+"""Least width between the columns: a share of the display's, and points."""
 NARROWEST = 280.0
-"""A column's least width; where two do not fit beside the middle, there is one."""
+"""Least width of a column; if two do not fit beside the middle, there is only the right one."""
 
 
 @dataclass(frozen=True, slots=True)
 class DockRequest:
-    """What a panel would like: its side, width and height, and the least height that it is of use with."""
+    """The size that a panel asks for. side: "left" or "right". least: the least useful height."""
 
     name: str
     side: str
@@ -31,7 +31,7 @@ class DockRequest:
 
 @dataclass(frozen=True, slots=True)
 class Dock:
-    """Where a panel stands; folded: only its title is seen."""
+    """Position and size of a panel. folded: whether only its title is shown."""
 
     left: float
     top: float
@@ -41,7 +41,7 @@ class Dock:
 
 
 class Docks:
-    """Keeps panels at the side where they opened, and folds those used longest ago where room is short."""
+    """Arranges panels: each stays at the side where it opened; without room, the least recently used fold."""
 
     def __init__(self) -> None:
         self._sides: dict[str, str] = {}
@@ -49,15 +49,15 @@ class Docks:
         self._arranged: tuple[object, dict[str, Dock]] = ((), {})
 
     def use(self, name: str) -> None:
-        """The user works with it: others are folded before it."""
+        """Note that the user works with a panel: others are folded before it."""
         if name in self._sides and self._used[-1:] != [name]:
             self._used = [*(one for one in self._used if one != name), name]
             self._arranged = ((), {})
 
     def arrange(self, requests: list[DockRequest], wide: float, top: float, high: float) -> dict[str, Dock]:
-        """Places in a display `wide` points wide, of which `high` points from `top` on are free.
+        """Positions of panels by name, in a display `wide` points wide with `high` free points from `top` on.
 
-        Those for whose title there is no room are left out.
+        Panels whose title has no room are left out.
         """
         key = (tuple(requests), wide, top, high)
         if self._arranged[0] == key:
@@ -69,7 +69,7 @@ class Docks:
         middle = max(MIDDLE * wide, LEAST_MIDDLE)
         both = room - middle >= 2 * NARROWEST
         columns: dict[str, list[DockRequest]] = {"left": [], "right": []}
-        known = [name for name in self._sides if name in names]  # in the order of their opening
+        known = [name for name in self._sides if name in names]  # in the order in which they opened
         for request in sorted(
             requests, key=lambda one: known.index(one.name) if one.name in known else len(known)
         ):
@@ -112,7 +112,7 @@ class Docks:
 
 
 def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
-    """Shares of the width that columns cover at the left and at the right."""
+    """Shares of the width that the columns cover at the left and at the right."""
     left = right = 0.0
     for dock in docks:
         if dock.left <= EDGE:
@@ -123,7 +123,10 @@ def free_middle(docks: Iterable[Dock], wide: float) -> tuple[float, float]:
 
 
 def _side(request: DockRequest, columns: dict[str, list[DockRequest]], high: float) -> str:
-    """Its own side, or the other: where all fit as they like, else where they fit, else the emptier."""
+    """The side for a new panel: its own if all fit there, else the other if they do, else the emptier.
+
+    All fit with the heights that they ask for if possible, else with their least heights.
+    """
     own, other = request.side, "right" if request.side == "left" else "left"
     for size in (_liked_height, _least_height):
         for side in (own, other):
@@ -146,7 +149,7 @@ def _gaps(column: list[DockRequest], folded: set[str]) -> float:
 
 
 def _share_height(least: list[float], most: list[float], room: float) -> list[float]:
-    """Heights between the least and what is liked, the room beyond the least shared by what is missing."""
+    """Heights from `least` to `most`; the room beyond the least is shared in proportion to the difference."""
     least = [min(low, high) for low, high in zip(least, most, strict=True)]
     missing = sum(most) - sum(least)
     spare = min(max(room - sum(least), 0.0), missing)

@@ -1,4 +1,4 @@
-"""What is always over the picture: name and panel buttons above, words that come and go."""
+"""The overlay of the picture: file name and panel buttons at the top, notices above the bar."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from fba_player.ui._docks import EDGE
 from fba_player.ui.panels.panel import STANDING, Panel, tooltip
 
 ABOVE = 40.0
-"""Points from the bar to words: what the timeline tells under the mouse stands between."""
+"""Points from the bar to notices, which leaves room for the text under the mouse of the timeline."""
 FADE = 0.4
-"""Seconds in which a word goes."""
+"""Seconds in which a notice fades."""
 MOST_OF_WIDTH = 0.55
-"""Wider than this share of the window, the buttons become one: they must not cover who is seen."""
+"""Share of the window's width; wider buttons become one with a menu, so that they do not cover the figure."""
 NARROW = 560.0
-"""Below so many points of width the name is left out; below 300 the buttons too."""
+"""Width in points below which the name is left out."""
 
 
 def draw_recording(session: Session) -> float:
-    """That a film is recorded, in the upper left corner; returns the points that it takes."""
+    """Draw "REC" and the time in the upper left corner during a recording; returns its width in points."""
     if session.recording is None:
         return 0.0
     to = imgui.get_background_draw_list()
@@ -36,7 +36,10 @@ def draw_recording(session: Session) -> float:
 
 
 def draw_name(session: Session, display: tuple[float, float], taken: float, room: float) -> None:
-    """The file's name and rate in the upper left corner, beside the points that are taken, within `room`."""
+    """Draw the name and rate of the file in the upper left corner.
+
+    taken: points that are used at the left. room: right limit in points.
+    """
     if display[0] < NARROW or display[1] < 200:
         return
     to = imgui.get_background_draw_list()
@@ -54,7 +57,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
 
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
-    """A button for each panel in the upper right corner, or one for all; returns where they begin."""
+    """Draw a button for each panel, or one for all, in the upper right corner; returns their left edge."""
     if display[0] < 130 or display[1] < 200:
         return display[0]
     labels = [panel.label for panel in panels]
@@ -103,7 +106,7 @@ def _flat_button(label: str, *, lit: bool) -> bool:
 
 
 def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
-    """Words to the user, in the middle above the bar."""
+    """Draw the notices, centred above the bar."""
     to = imgui.get_foreground_draw_list()
     y = display[1] - above - ABOVE
     for notice in reversed(session.notices()):
@@ -126,7 +129,7 @@ def draw_notices(session: Session, display: tuple[float, float], above: float) -
 
 def _facts(session: Session) -> str:
     if isinstance(session.scene, CompareScene):
-        return ""  # each has its own
+        return ""  # each file has its own label
     info = session.source.info
     parts = [f"{session.scene.timeline.frames} frames", f"{float(session.scene.timeline.rate):g} frames/s"]
     if info.size and info.plane_bits is not None:
@@ -135,7 +138,7 @@ def _facts(session: Session) -> str:
 
 
 def _shaded(to: imgui.ImDrawList, place: tuple[float, float], colour: int, text: str) -> None:
-    """Text that is read over light and dark."""
+    """Draw text with a shadow, readable over light and dark."""
     x, y = place
     to.add_text((x + 1, y + 1), theme.packed((0, 0, 0, 0.55), (colour >> 24) / 255), text)
     to.add_text((x, y), colour, text)

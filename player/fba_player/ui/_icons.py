@@ -1,6 +1,6 @@
-"""The signs on buttons, as shapes: sharp at every size, and no font to ship.
+"""Icons of buttons, drawn as shapes: sharp at every size, without a font.
 
-Each is a function (draw list, centre x, centre y, half size, colour).
+Each is a function of (draw list, centre x, centre y, half size, colour).
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def mark_out(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) ->
 
 
 def smooth(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
-    """Motion between frames: a wave."""
+    """A wave: smooth motion between frames."""
     to.path_clear()
     for number in range(25):
         at = number / 24
@@ -83,7 +83,7 @@ def smooth(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> N
 
 
 def stepped(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
-    """Frame by frame: stairs."""
+    """Stairs: motion frame by frame."""
     to.path_clear()
     for at_x, at_y in ((-0.95, 0.6), (-0.3, 0.6), (-0.3, 0.0), (0.3, 0.0), (0.3, -0.6), (0.95, -0.6)):
         to.path_line_to((x + at_x * r, y + at_y * r))
@@ -122,7 +122,7 @@ def muted(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> No
 
 
 def full_screen(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:
-    """Full screen: four corners."""
+    """Four corners: full screen."""
     for side, way in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
         to.path_clear()
         to.path_line_to((x + side * 0.8 * r, y + way * 0.25 * r))
@@ -132,7 +132,7 @@ def full_screen(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int)
 
 
 def _arrow(to: imgui.ImDrawList, x: float, y: float, half: float, length: float, colour: int) -> None:
-    """A triangle with its upright side at x, pointing right, or left for a negative length."""
+    """Draw a triangle with its vertical side at x, pointing right, or left for a negative length."""
     to.add_triangle_filled((x, y - half), (x, y + half), (x + length, y), colour)
 
 

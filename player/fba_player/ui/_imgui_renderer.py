@@ -1,7 +1,7 @@
-"""Draws what Dear ImGui asks for with moderngl: OpenGL 3.3, into whatever framebuffer is bound.
+"""A renderer of Dear ImGui with moderngl, OpenGL 3.3, for whatever framebuffer is bound.
 
-Follows the protocol of Dear ImGui 1.92 for textures that grow while they are used: the library asks for
-textures to be created, updated in part and destroyed, and this does so before it draws.
+It follows the protocol of Dear ImGui 1.92 for dynamic textures: before drawing, it creates, updates and
+destroys textures as the library asks.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from imgui_bundle import imgui
 from fba.arrays import Array, UInt8
 
 VERTEX_BYTES = 20
-"""A vertex as Dear ImGui lays it out: place and place in the texture, two float32 each, and four bytes."""
+"""Size of a Dear ImGui vertex: position and texture coordinates, two float32 each, and four bytes."""
 INDEX = np.dtype(np.uint32)
 BYTE = np.dtype(np.uint8)
 
 
 class ImguiRenderer:
-    """Draws the lists of the current imgui context on a moderngl context; `close` gives all back.
+    """Draws the lists of the current imgui context on a moderngl context; `close` releases its resources.
 
-    Raises RuntimeError where imgui was built with another layout of vertices or indices.
+    Raises RuntimeError if imgui was built with another layout of vertices or indices.
     """
 
     def __init__(self, context: Any) -> None:
@@ -53,7 +53,7 @@ class ImguiRenderer:
         platform.renderer_texture_max_width = platform.renderer_texture_max_height = largest
 
     def draw(self, data: imgui.ImDrawData) -> None:
-        """Draw; the viewport is set to the whole of the bound framebuffer."""
+        """Draw into the bound framebuffer; sets the viewport to all of it."""
         for texture in data.textures:
             if texture.status != imgui.ImTextureStatus.ok:
                 self._update(texture)
@@ -82,7 +82,7 @@ class ImguiRenderer:
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA
 
     def set_picture(self, name: str, pixels: UInt8) -> imgui.ImTextureRef:
-        """A picture, uint8 (H, W, 4), for imgui to draw; it takes the place of the last of that name."""
+        """Upload a picture, uint8 (H, W, 4), for imgui to draw; it replaces the last of this name."""
         height, width = pixels.shape[:2]
         made = self._gl.texture((width, height), 4, np.ascontiguousarray(pixels).tobytes())
         made.filter = (self._gl.LINEAR, self._gl.LINEAR)
@@ -94,7 +94,7 @@ class ImguiRenderer:
         return imgui.ImTextureRef(made.glo)
 
     def close(self) -> None:
-        """Give everything back; imgui is told that its textures are gone."""
+        """Release its resources, and tell imgui that its textures are gone."""
         for texture in imgui.get_platform_io().textures:
             if texture.tex_id in self._textures:
                 texture.set_tex_id(0)
@@ -104,9 +104,9 @@ class ImguiRenderer:
         self._textures.clear()
 
     def _upload(self, data: imgui.ImDrawData) -> list[tuple[tuple[float, ...], int, int, int]]:
-        """All lists into one pair of buffers: (clip rectangle, texture, first index, indices) to draw.
+        """Upload all lists to one pair of buffers; returns (clip rectangle, texture, first index, count) to draw.
 
-        Neighbours with one texture and one clip rectangle become one: a call costs more than what it draws.
+        Neighbours with the same texture and clip rectangle are merged: a call costs more than its triangles.
         """
         vertices, indices = data.total_vtx_count, data.total_idx_count
         self._reserve(vertices * VERTEX_BYTES, indices * INDEX.itemsize)
@@ -186,6 +186,6 @@ class ImguiRenderer:
 
 
 def _view(vector: Any, count: int, dtype: np.dtype[Any]) -> Array:
-    """An imgui vector's memory as so many numbers, without a copy; valid until the next frame."""
+    """The memory of an imgui vector as an array, without a copy; valid until the next frame."""
     memory = (ctypes.c_char * (count * dtype.itemsize)).from_address(vector.data_address())
     return np.frombuffer(memoryview(memory).cast("B"), dtype)

@@ -1,4 +1,4 @@
-"""Draws open panels where `Docks` puts them, or where the user has moved them."""
+"""The windows of open panels: docked in columns, or where the user has moved them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fba_player.ui._docks import EDGE, GAP, Dock, DockRequest, Docks, free_middl
 from fba_player.ui.panels.panel import Panel
 
 TOP = 56.0
-"""Where panels begin below the buttons."""
+"""Top of the columns, below the buttons, in points."""
 
 
 _FLAGS = imgui.WindowFlags_
@@ -17,14 +17,14 @@ FREE = int(_FLAGS.no_saved_settings | _FLAGS.no_collapse)
 DOCKED = int(FREE | _FLAGS.no_resize | _FLAGS.no_bring_to_front_on_focus)
 FOLDED = int(_FLAGS.no_scrollbar | _FLAGS.no_scroll_with_mouse)
 OVER = 0.985
-"""How opaque a panel is that covers others."""
+"""Opacity of a panel that covers others."""
 
 
 class PanelWindows:
-    """Where panels are: in columns, until the user drags one away by its title.
+    """Draws panels in columns, until the user drags one away by its title.
 
-    A click on the title of a folded one unfolds it; a double click on the title of one that was moved brings
-    it back. sides: shares of the display's width that columns cover at the left and the right.
+    A click on the title of a folded panel unfolds it; a double click on the title of a moved one docks it
+    again. sides: shares of the display's width that the columns cover at the left and the right.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class PanelWindows:
         self._focused = ""
 
     def draw(self, panels: list[Panel], session: Session, display: tuple[float, float], below: float) -> None:
-        """Draw open panels; `below`: points at the bottom that are taken."""
+        """Draw open panels. display: size in points. below: points that are used at the bottom."""
         wide, high = display
         room = high - TOP - below - GAP
         self.sides = (0.0, 0.0)
@@ -52,7 +52,7 @@ class PanelWindows:
                 self._draw_free(panel, session, display, room)
 
     def forget(self, names: set[str]) -> None:
-        """These have been closed, and open where they belong again."""
+        """Dock these closed panels when they open again."""
         self._moved -= names
 
     def _request(self, panel: Panel) -> DockRequest:
@@ -80,7 +80,7 @@ class PanelWindows:
             session.open.discard(panel.name)
 
     def _window(self, panel: Panel, session: Session, flags: int, *, folded: bool) -> bool:
-        """Draw one; False where it is to be closed."""
+        """Draw the window of a panel; returns False if the user closed it."""
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (32, 1))
         expanded, stays_open = imgui.begin(f"{panel.title}###{panel.name}", True, flags)
         imgui.pop_style_var()
@@ -96,7 +96,7 @@ class PanelWindows:
         return bool(stays_open)
 
     def _handle_title(self, panel: Panel, *, folded: bool) -> None:
-        """What the mouse does with the title, and which panel is in use."""
+        """Handle clicks and drags of the title, and note which panel is in use."""
         name = panel.name
         focused = imgui.is_window_focused(imgui.FocusedFlags_.root_and_child_windows)
         if focused and self._focused != name:  # clicked, or opened
@@ -114,7 +114,7 @@ class PanelWindows:
 
     @staticmethod
     def _holds_title() -> bool:
-        """Whether the mouse has hold of the title of the window that is being drawn."""
+        """Whether the mouse is pressed on the title of the window that is being drawn."""
         x, y = imgui.get_window_pos()
         start_x, start_y = imgui.get_mouse_pos() - imgui.get_mouse_drag_delta(0)
         on_title = y <= start_y <= y + imgui.get_frame_height()

@@ -1,4 +1,4 @@
-"""The buttons below the timeline: time code, play and step, marks, speed, what is kept."""
+"""The row below the timeline: time code, buttons to play and step, marks, speed, captures, sound."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ MARGIN = 18.0
 
 
 class Buttons:
-    """Draws them; those for which there is no room are left out."""
+    """Draws the row; buttons without room are left out."""
 
     def __init__(self) -> None:
         self.slider = (0.0, 0.0)
-        """Where the slider of speed begins and ends, in points; for tests."""
+        """Left and right end of the speed slider in points; for tests."""
 
     def draw(self, session: Session, wide: float, y: float) -> None:
-        """Draw them in a display of that width; y: of their upper edge, in points."""
+        """Draw the row. wide: of the display, y: of the upper edge, in points."""
         transport = session.transport
         room = wide >= 640
         if room:
@@ -136,7 +136,7 @@ class Buttons:
 
 
 def snap_speed(speed: float) -> float:
-    """A speed of the slider: one of the steps where it is near one, else with two digits."""
+    """The speed for a position of the slider: one of `SPEEDS` if it is near, else with two digits."""
     speed = min(max(speed, SPEEDS[0]), SPEEDS[-1])
     near = min(SPEEDS, key=lambda step: abs(math.log(step / speed)))
     return near if abs(math.log(near / speed)) < 0.045 else round(speed, 2)

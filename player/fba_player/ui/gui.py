@@ -1,4 +1,4 @@
-"""All that is over the picture: the imgui context, the bar, the panels. Draws in a window or into memory."""
+"""Everything over the picture: the imgui context, the bar and the panels."""
 
 from __future__ import annotations
 
@@ -16,18 +16,14 @@ from fba_player.ui._panel_windows import PanelWindows
 from fba_player.ui.panels.registry import make_panels
 
 HIDES = 3.0
-"""Seconds without the mouse after which the bar hides itself while playing."""
+"""Seconds without input after which the bar is hidden while playing."""
 FADE = 0.25
-FRAMES_AFTER = 3
-"""Pictures that imgui needs after an input until all has settled."""
-FAR = -3.0e38
 
 
 class Gui:
-    """The panels of one session on a moderngl context; see `draw`. `close` gives everything back.
+    """Draws the bar and panels of a session on a moderngl context, in a window or into memory.
 
-    hides: whether the bar hides itself while playing. Raises RuntimeError where this build of imgui
-    cannot be used.
+    hides: whether the bar is hidden while playing. Raises RuntimeError if this build of imgui cannot be used.
     """
 
     def __init__(self, context: Any, session: Session, *, hides: bool = True) -> None:
@@ -52,23 +48,23 @@ class Gui:
         self._button = -1
         self._listed = False
         self.shown = 1.0
-        """How much of the bar is there, 0 to 1."""
+        """Opacity of the bar, 0 to 1."""
 
     @property
     def io(self) -> imgui.IO:
-        """Where input goes, in points: `add_mouse_pos_event` and its like."""
+        """Input for imgui, in points: `add_mouse_pos_event` and so on."""
         imgui.set_current_context(self._context)
         return imgui.get_io()
 
     @property
     def cursor(self) -> str:
-        """What the mouse looks like over what is under it: imgui's name, such as "arrow"."""
+        """The mouse cursor that imgui asks for, by its name, such as "arrow"."""
         imgui.set_current_context(self._context)
         shape = imgui.get_mouse_cursor()
         return imgui.MouseCursor_(shape).name or "arrow"
 
     def draw(self, delta: float) -> None:
-        """Draw over the bound framebuffer, of the session's size; delta: seconds since the last time.
+        """Draw over the bound framebuffer, which has the session's size. delta: seconds since the last call.
 
         Input over the picture moves the camera.
         """
@@ -83,11 +79,11 @@ class Gui:
         self._cover()
         session.viewpoint.refit()
         imgui.new_frame()
-        if imgui.get_frame_count() > 2:  # before, imgui does not know what is where
+        if imgui.get_frame_count() > 2:  # before, imgui does not know the layout yet
             self._mouse(io)
         if not session.bare:
             self._draw_all(display, io)
-        if session.recording is None:  # a film does not move because a panel is opened
+        if session.recording is None:  # opening a panel must not move the picture of a film
             sides = (0.0, 0.0) if session.bare else self._panel_windows.sides
             session.viewpoint.uncover(*sides, smoothly=self.hides)
         draw_notices(session, display, self.bar.height(display) * self.shown if not session.bare else 0.0)
@@ -96,7 +92,7 @@ class Gui:
         self._renderer.draw(imgui.get_draw_data())
 
     def close(self) -> None:
-        """Give everything back; safe to call twice."""
+        """Release its resources; safe to call twice."""
         if self._context is None:
             return
         imgui.set_current_context(self._context)
@@ -108,7 +104,7 @@ class Gui:
         self._context = None
 
     def _popups(self) -> None:
-        """Whether a list is open, which the session may have closed."""
+        """Tell the session whether a list is open, and close it if the session asks for that."""
         flags = imgui.PopupFlags_
         there = imgui.is_popup_open("", flags.any_popup_id | flags.any_popup_level)
         if there and self._listed and not self.session.popup:
@@ -117,7 +113,7 @@ class Gui:
         self._listed = self.session.popup = there
 
     def _cover(self) -> None:
-        """Tell the camera how much of the picture the bar takes."""
+        """Tell the camera how much of the picture the bar covers."""
         session = self.session
         wide, high = (pixels / session.scale for pixels in session.size)
         session.viewpoint.covered = 0.0 if session.bare else self.bar.height((wide, high)) / max(high, 1.0)
@@ -153,7 +149,7 @@ class Gui:
         self.shown = max(self.shown - step, 0.0) if away else min(self.shown + 2 * step, 1.0)
 
     def _mouse(self, io: imgui.IO) -> None:
-        """The mouse over the picture, where no panel is under it."""
+        """Pass the mouse to the controls where no panel is under it."""
         controls, scale = self.controls, self.session.scale
         x, y = io.mouse_pos.x * scale, io.mouse_pos.y * scale
         if controls.holding:

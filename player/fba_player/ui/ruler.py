@@ -1,4 +1,4 @@
-"""Time along a line on the screen: places for times and back, and where its marks and labels go."""
+"""A time axis: times to positions on the screen and back, ticks and labels."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ STEPS = (
     *(0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30),
     *(60, 120, 300, 600, 900, 1800, 3600, 7200, 18000, 36000),
 )
-"""Seconds between labels that people read easily."""
+"""Steps between labels that are easy to read, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ruler:
-    """From time `low` at x = `left` to `high` at x = `right`; seconds and any unit of length."""
+    """An axis from time `low` at x = `left` to `high` at x = `right`; seconds, and any unit of length."""
 
     low: float
     high: float
@@ -22,30 +22,30 @@ class Ruler:
     right: float
 
     def x(self, time: float) -> float:
-        """Where a time is, within left and right."""
+        """x of a time, limited to left..right."""
         share = (time - self.low) / (self.high - self.low) if self.high > self.low else 0.0
         return self.left + min(max(share, 0.0), 1.0) * (self.right - self.left)
 
     def time(self, x: float) -> float:
-        """What time is at a place, within low and high."""
+        """Time at x, limited to low..high."""
         wide = self.right - self.left
         share = min(max((x - self.left) / wide, 0.0), 1.0) if wide > 0 else 0.0
         return self.low + share * (self.high - self.low)
 
     def step(self, apart: float) -> float:
-        """Seconds between labels that are at least `apart` from each other."""
+        """Least step in seconds for labels that are at least `apart` from each other."""
         wide = max(self.right - self.left, 1e-6)
         least = (self.high - self.low) * apart / wide
         return next((step for step in STEPS if step >= least), max(math.ceil(least / 36000), 1) * 36000.0)
 
     def ticks(self, step: float) -> list[float]:
-        """The multiples of step from low to high; at most a thousand."""
+        """Multiples of a step from low to high; at most 1001."""
         first, last = math.ceil(self.low / step - 1e-6), math.floor(self.high / step + 1e-6)
         return [number * step for number in range(first, min(last, first + 1000) + 1)]
 
 
 def label(seconds: float, step: float) -> str:
-    """A time as short as the step between labels allows: "0:05", "0:05.2", "1:00:05"."""
+    """Label of a time, with the digits that the step needs: "0:05", "0:05.2", "1:00:05"."""
     digits = 0 if step >= 1 else 1 if step >= 0.1 else 2
     parts = round(abs(seconds) * 10**digits)
     whole, rest = divmod(parts, 10**digits)

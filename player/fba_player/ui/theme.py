@@ -25,7 +25,7 @@ LINE: Colour = (1.0, 1.0, 1.0, 0.075)
 
 
 def packed(colour: Colour, alpha: float = 1.0) -> int:
-    """A colour as imgui's draw lists take it."""
+    """A colour as the 32-bit integer that draw lists of imgui take."""
     red, green, blue, opacity = colour
     return (
         int(red * 255 + 0.5)
@@ -36,7 +36,7 @@ def packed(colour: Colour, alpha: float = 1.0) -> int:
 
 
 def apply_theme() -> None:
-    """Set the current imgui context's style and font."""
+    """Set the style and font of the current imgui context."""
     style = imgui.get_style()
     imgui.style_colors_dark()
     style.window_rounding = style.popup_rounding = 8.0
@@ -109,7 +109,7 @@ def apply_theme() -> None:
 
 
 def _load_font() -> None:
-    """Roboto (Apache 2.0), which imgui-bundle ships with its licence; else imgui's own font."""
+    """Load Roboto (Apache 2.0), which imgui-bundle ships with its licence, else the font of imgui."""
     fonts = imgui.get_io().fonts
     path = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
     if path.is_file():

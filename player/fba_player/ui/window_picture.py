@@ -1,4 +1,4 @@
-"""Pictures of the window with its panels, without a window: for tests and for the documentation.
+"""Pictures of the window with its panels, drawn without a window, for tests and documentation.
 
 python -m fba_player.ui.window_picture talk.fba -o window.png --panels file,view --time 1.5
 """
@@ -17,13 +17,13 @@ from fba_player.gl.renderer import Renderer
 from fba_player.session.session import Session
 
 SETTLES = 4
-"""Pictures until panels have found their size and place."""
+"""Pictures until panels have found their size and position."""
 
 
 class Studio:
-    """A window's inside without the window: `draw` shows a session as its window would.
+    """Draws a session as its window would, into memory.
 
-    Raises DisplayError where there is no OpenGL, ImportError where there is no imgui.
+    Raises DisplayError without OpenGL, ImportError without imgui.
     """
 
     def __init__(self, session: Session) -> None:
@@ -44,9 +44,9 @@ class Studio:
             raise
 
     def draw(self, pictures: int = 1, delta: float = 1 / 60) -> UInt8:
-        """Draw so many pictures, `delta` seconds apart; the last as uint8 (H, W, 4), top row first.
+        """Draw pictures, `delta` seconds apart; returns the last as uint8 (H, W, 4), top row first.
 
-        Those before the last are only for the panels to settle: the scene is not drawn in them.
+        The others only let the panels settle: the scene is not drawn in them.
         """
         session = self.session
         with self._gl:
@@ -62,7 +62,7 @@ class Studio:
         return np.frombuffer(data, np.uint8).reshape(height, width, 4)[::-1]
 
     def close(self) -> None:
-        """Give everything back; safe to call twice."""
+        """Release its resources; safe to call twice."""
         if self._gl is None:
             return
         with self._gl:
@@ -104,7 +104,7 @@ class Studio:
 
 
 def picture(session: Session, panels: tuple[str, ...] = ()) -> UInt8:
-    """The session's window with these panels open: uint8 (H, W, 4), top row first."""
+    """The window of a session with these panels open: uint8 (H, W, 4), top row first."""
     session.source.probe(wait=True)
     session.open |= set(panels)
     with Studio(session) as studio:
@@ -112,7 +112,7 @@ def picture(session: Session, panels: tuple[str, ...] = ()) -> UInt8:
 
 
 def main(arguments: list[str]) -> int:
-    """The command; see the module's text."""
+    """Run the command that the module's docstring shows."""
     import argparse
 
     from PIL import Image

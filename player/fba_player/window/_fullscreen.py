@@ -1,4 +1,4 @@
-"""Which monitor a window is on, and how it gets to cover it and back."""
+"""Full screen: covering the monitor that a window is on, and going back."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 class FullScreen:
-    """Full screen and back for a glfw window."""
+    """Turns full screen on and off for a glfw window."""
 
     def __init__(self, glfw: Any, window: Any) -> None:
         self._glfw, self._window = glfw, window
@@ -14,11 +14,11 @@ class FullScreen:
 
     @property
     def active(self) -> bool:
-        """Whether it covers a monitor."""
+        """Whether the window covers a monitor."""
         return bool(self._glfw.get_window_monitor(self._window))
 
     def toggle(self) -> None:
-        """Cover the monitor on which most of the window is, or go back to where it was."""
+        """Cover the monitor that shows most of the window, or go back to its former position and size."""
         glfw, window = self._glfw, self._window
         if self.active:
             x, y, wide, high = self._before or (60, 60, 1280, 720)
@@ -46,7 +46,7 @@ class FullScreen:
 
 
 def overlap(first: tuple[int, int, int, int], second: tuple[int, int, int, int]) -> int:
-    """Area that two rectangles (x, y, width, height) share."""
+    """Area of the intersection of two rectangles (x, y, width, height)."""
     wide = min(first[0] + first[2], second[0] + second[2]) - max(first[0], second[0])
     high = min(first[1] + first[3], second[1] + second[3]) - max(first[1], second[1])
     return max(wide, 0) * max(high, 0)

@@ -1,4 +1,4 @@
-"""glfw's keyboard and mouse -> the names of the table of keys, and -> imgui."""
+"""Input from glfw: keys by their names in the table of keys, and keyboard and mouse for imgui."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CURSORS = {
     "resize_ew": "HRESIZE_CURSOR",
     "resize_ns": "VRESIZE_CURSOR",
 }
-"""glfw's name of imgui's cursors; an arrow for all others."""
+"""Cursors of glfw by the names of imgui; all others are an arrow."""
 BUTTONS = ("left", "right", "middle")
 KEY_NAMES = {
     "SPACE": "space", "LEFT": "left", "RIGHT": "right", "UP": "up", "DOWN": "down", "HOME": "home",
@@ -24,20 +24,20 @@ KEY_NAMES = {
     **{f"F{number}": f"f{number}" for number in range(1, 13)},
     **{f"KP_{number}": str(number) for number in range(10)},
 }  # fmt: skip
-"""Keys that bear no letter, by glfw's name; and those that mean the same on every keyboard."""
+"""Names in the table of keys by those of glfw, for keys without a letter, or equal on all keyboards."""
 US_LAYOUT = {
     "LEFT_BRACKET": "[", "RIGHT_BRACKET": "]", "BACKSLASH": "\\",
     **{str(number): str(number) for number in range(10)},
     **{letter: letter.lower() for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"},
 }  # fmt: skip
-"""What a US keyboard has where the user's own has something that means nothing here."""
+"""Keys of the US layout, used where the character of the user's own layout has no meaning here."""
 
 
 class GlfwInput:
-    """Hears a glfw window's events and hands them to the panels and the controls.
+    """Hands the events of a glfw window to the panels and the controls.
 
-    gui: a `fba_player.ui.gui.Gui`, or None where there are no panels. on_input: called after each event that may
-    change the picture.
+    gui: a `fba_player.ui.gui.Gui`, or None where there are no panels. on_input: called after each event that
+    may change the picture.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class GlfwInput:
         glfw.set_window_refresh_callback(window, lambda *_: on_input())
 
     def on_key(self, window: Any, key: int, code: int, action: int, modifiers: int) -> None:
-        """A key went down, is held, or went up."""
+        """Handle a key that goes down, repeats, or goes up."""
         glfw = self._glfw
         if self._gui is not None:
             self._send_key_to_imgui(key, action, modifiers)
@@ -83,18 +83,18 @@ class GlfwInput:
         self._on_input()
 
     def on_drop(self, window: Any, paths: list[str]) -> None:
-        """Files were dropped onto the window: it closes, for them to be opened, if they can be."""
+        """Handle files that were dropped onto the window; see `Session.drop`."""
         self._session.drop(tuple(Path(_decode(path)) for path in paths))
         self._on_input()
 
     def on_character(self, window: Any, character: int) -> None:
-        """A character was typed."""
+        """Pass a typed character to imgui."""
         if self._gui is not None:
             self._gui.io.add_input_character(character)
             self._on_input()
 
     def on_button(self, window: Any, button: int, action: int, modifiers: int) -> None:
-        """A mouse button went down or up."""
+        """Handle a mouse button that goes down or up."""
         down = action == self._glfw.PRESS
         self._session.touched()
         if self._gui is not None:
@@ -107,7 +107,7 @@ class GlfwInput:
         self._on_input()
 
     def on_move(self, window: Any, x: float, y: float) -> None:
-        """The mouse moved; x, y in the window's own units."""
+        """Handle a move of the mouse. x, y: in the units of the window."""
         self._session.touched()
         right, down = self.pixels(x, y)
         if self._gui is not None:
@@ -118,13 +118,13 @@ class GlfwInput:
         self._on_input()
 
     def on_enter(self, window: Any, entered: int) -> None:
-        """The mouse came into the window or left it."""
+        """Handle the mouse entering or leaving the window."""
         if self._gui is not None and not entered:
             self._gui.io.add_mouse_pos_event(-3.4e38, -3.4e38)
         self._on_input()
 
     def on_scroll(self, window: Any, right: float, up: float) -> None:
-        """The wheel was turned."""
+        """Handle a turn of the wheel."""
         self._session.touched()
         if self._gui is not None:
             self._gui.io.add_mouse_wheel_event(right, up)
@@ -133,12 +133,12 @@ class GlfwInput:
         self._on_input()
 
     def on_focus(self, window: Any, focused: int) -> None:
-        """The window got the keyboard or lost it."""
+        """Handle the window getting or losing the keyboard focus."""
         if self._gui is not None:
             self._gui.io.add_focus_event(bool(focused))
 
     def set_cursor(self, *, hidden: bool) -> None:
-        """Give the mouse the shape that fits what is under it, or hide it."""
+        """Set the mouse cursor that imgui asks for, or hide it."""
         glfw = self._glfw
         shape = "hidden" if hidden else self._gui.cursor if self._gui is not None else "arrow"
         if shape == self._cursor:
@@ -154,7 +154,7 @@ class GlfwInput:
         glfw.set_cursor(self._window, self._cursors.get(shape))
 
     def name(self, key: int, code: int, modifiers: int) -> str | None:
-        """A key's name in the table of keys: "space", "l", "shift+left", "ctrl+s"; None for none."""
+        """Name of a key as in the table of keys: "space", "l", "shift+left", "ctrl+s"; None without one."""
         glfw = self._glfw
         word = self._key_names.get(key)
         if word is None:
@@ -169,7 +169,7 @@ class GlfwInput:
         return ("ctrl+" if control else "") + ("shift+" if shift else "") + word
 
     def pixels(self, x: float, y: float) -> tuple[float, float]:
-        """The window's units to pixels of the picture."""
+        """Convert from the units of the window to pixels of the picture."""
         wide, high = self._glfw.get_window_size(self._window)
         size = self._glfw.get_framebuffer_size(self._window)
         return x * size[0] / max(wide, 1), y * size[1] / max(high, 1)
@@ -199,7 +199,7 @@ class GlfwInput:
 
 
 def _imgui_keys(glfw: Any) -> dict[int, Any]:
-    """Keys that edit text in imgui."""
+    """The keys that imgui needs to edit text, by those of glfw."""
     from imgui_bundle import imgui
 
     words = {

@@ -1,7 +1,7 @@
 """A plain timeline and help page, drawn with Pillow and shown as textures, for windows without imgui.
 
-imgui-bundle has no wheels for Macs with Intel processors, nor for Python 3.15; moderngl has both or builds
-there, so that the window opens without panels (see the markers in pyproject.toml).
+imgui-bundle has no wheels for Macs with Intel processors, nor for Python 3.15, where moderngl can be
+installed: the window then opens without panels (see the markers in pyproject.toml).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Overlay:
         self._textures: dict[str, tuple[object, Any]] = {}
 
     def draw(self, controls: Controls) -> None:
-        """Timeline and status, and the help where it is wanted."""
+        """Draw the timeline and status, and the help if it is open."""
         session = controls.session
         gl, (width, height) = self._gl, session.size
         gl.enable_only(gl.BLEND)
@@ -53,7 +53,7 @@ class Overlay:
             )
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release its resources."""
         for _, texture in self._textures.values():
             texture.release()
         self._textures.clear()
@@ -82,7 +82,7 @@ class Overlay:
 
 
 def bar_picture(controls: Controls) -> Image:
-    """The strip at the bottom: timeline above, status text below."""
+    """A picture of the bar at the bottom: the timeline, and below it the status text."""
     from PIL import Image, ImageDraw
 
     session = controls.session
@@ -111,7 +111,7 @@ def bar_picture(controls: Controls) -> Image:
 
 
 def help_picture(scale: float) -> Image:
-    """The help: two columns of keys."""
+    """A picture of the help: two columns of keys."""
     from PIL import Image, ImageDraw
 
     rows = [row for row in keys() if not row.action.startswith("panel") or row.action == "panel help"]
@@ -135,7 +135,7 @@ _FONTS: dict[int, FreeTypeFont | ImageFont] = {}
 
 
 def label_font(size: float) -> FreeTypeFont | ImageFont:
-    """Pillow's own font: the same on every machine."""
+    """Pillow's built-in font, which is the same on every machine. size: pixels."""
     from PIL import ImageFont
 
     pixels = max(round(size), 6)

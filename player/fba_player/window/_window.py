@@ -34,22 +34,22 @@ LOST = (
     "player again; a smaller window, or LIBGL_ALWAYS_SOFTWARE=1 (drawing without the graphics card), may help"
 )
 IDLE = 0.05
-"""Seconds between looks at the input while nothing moves."""
+"""Seconds to wait for input while nothing moves."""
 FASTEST = 1 / 250
-"""Least seconds a picture takes, where the display does not set the pace."""
+"""Least seconds per picture, for displays that do not limit the rate."""
 WARNED = 12.0
-"""Seconds for which it shows what was wrong with what was read."""
+"""Seconds for which warnings about the file are shown."""
 IDLE_MOUSE = 3.0
-"""Seconds after which the mouse hides itself on a full screen, while playing."""
+"""Seconds after which the mouse cursor is hidden, in full screen while playing."""
 SETTLES = 4
-"""Pictures drawn after an input, until panels have settled."""
+"""Pictures drawn after an input: imgui needs some until the panels have settled."""
 
 
 class Window:
-    """A window that shows a scene; see `player.play`. A context manager; one at a time, in the main thread.
+    """A window that shows a scene; a context manager. See `fba.player.play`.
 
-    panels: False for the plain timeline without panels, which there also is where imgui is missing. folder:
-    where pictures and films go, by default the current one.
+    There can be one at a time, in the main thread. panels: False shows the plain timeline instead of panels,
+    as it does if imgui is missing. folder: where pictures and films are saved; by default the current one.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Window:
 
     @property
     def transport(self) -> Transport:
-        """Where the performance is."""
+        """The current time, playing, and what else `Transport` has."""
         return self.session.transport
 
     def run(self) -> None:
@@ -104,22 +104,22 @@ class Window:
             pass
 
     def _warn_of_bap_steps(self) -> None:
-        """Warn once where an arriving stream looks as if it was made with another table of BAP steps."""
+        """Warn once if a live stream seems to be made with another table of BAP steps."""
         timeline = self._timeline
         if isinstance(timeline, LiveTimeline) and timeline.animation.doubt and not self._doubted:
             self._doubted = True
             self.session.say(timeline.animation.doubt, "warning", WARNED)
 
     def update(self) -> bool:
-        """Handle the input and draw one picture, or wait where nothing moves. False once closed."""
+        """Handle input and draw one picture, or wait if nothing moves. Returns False once closed."""
         glfw, session = self._glfw, self.session
         begun = wall.perf_counter()
         self._warn_of_bap_steps()
-        arrived = self._timeline.arrived  # more of a stream makes the line longer, while paused too
+        arrived = self._timeline.arrived  # a live stream makes the timeline longer, also while paused
         restless = session.restless
         if restless or self._restless or session.source.probing or arrived != self._arrived:
             self._pictures_due, self._arrived = max(self._pictures_due, 1), arrived
-        self._restless = restless  # one more picture when all has come to rest
+        self._restless = restless  # one more picture after everything has stopped
         if self._pictures_due:
             glfw.poll_events()
         else:
@@ -146,7 +146,7 @@ class Window:
         return True
 
     def close(self) -> None:
-        """Finish a film that is being recorded, close the window, give all back; safe to call twice."""
+        """Finish a film, close the window and release its resources; safe to call twice."""
         try:
             self.captures.close()
         finally:
@@ -203,7 +203,7 @@ class Window:
         self._renderer = Renderer(self._gl)
 
     def _make_panels(self, panels: bool) -> None:
-        """The panels, or the plain timeline in their place; and who hears the input."""
+        """Make the panels, or the plain timeline in their place, and connect the input."""
         session = self.session
         session.size, session.scale = self._framebuffer(), self._scale()
         if panels:
@@ -237,17 +237,17 @@ class Window:
         return int(width), int(height)
 
     def _scale(self) -> float:
-        """Pixels a point: 1 on plain displays, 2 on dense ones."""
+        """Pixels per point: 1 on normal displays, 2 on high-resolution ones."""
         return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
 
     def _draw_checked(self, size: tuple[int, int]) -> None:
-        """Draw. Raises DisplayError on an OpenGL error that cannot be recovered from."""
+        """Draw a picture. Raises DisplayError on an unrecoverable OpenGL error."""
         try:
             self._draw(size)
             problem = self._gl.error
         except import_moderngl().Error as error:
             raise DisplayError(LOST.format(reason=" ".join(str(error).split()))) from error
-        if problem in ("GL_OUT_OF_MEMORY", "GL_UNKNOWN_ERROR"):  # a lost context is not known by name
+        if problem in ("GL_OUT_OF_MEMORY", "GL_UNKNOWN_ERROR"):  # moderngl has no name for a lost context
             raise DisplayError(LOST.format(reason=problem))
 
     def _draw(self, size: tuple[int, int]) -> None:
@@ -280,7 +280,7 @@ class Window:
         self._show_title()
 
     def _handle_requests(self) -> None:
-        """What the user asked for, which needs the picture or the window."""
+        """Do what the user requested: screenshots, films, full screen."""
         session = self.session
         while session.requests:
             request = session.requests.popleft()

@@ -1,4 +1,4 @@
-"""Whether there is a display for a window: glfw, the library that opens it, knows."""
+"""Check for a display, and start glfw, the library that opens windows."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ HOW_WITHOUT = (
 
 
 def check_display() -> None:
-    """Raises DisplayError, which says what to do, where no window can be opened. Takes no time."""
+    """Raise DisplayError, which says what to do, if no window can be opened."""
     start_glfw([]).terminate()
 
 
 def start_glfw(problems: list[str]) -> Any:
-    """The module glfw, ready for a window. What it reports from now on is added to problems.
+    """Start glfw and return the module. problems: gets the messages that glfw reports from now on.
 
-    Raises DisplayError where it is not installed or finds no display.
+    Raises DisplayError if it is not installed or finds no display.
     """
     try:
         import glfw

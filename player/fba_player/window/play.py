@@ -1,4 +1,4 @@
-"""Opening a window that plays something, from a single call."""
+"""`play`: open a window and play an animation in it."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ def play(
     warnings: tuple[str, ...] = (),
     panels: tuple[str, ...] = (),
 ) -> tuple[Path, ...]:
-    """Open a window, play an animation in it, and return when it is closed.
+    """Play an animation in a window; returns when it is closed, with the files dropped onto it.
 
-    Returns the files that were dropped onto it: they can be read, and the user wants to see them next.
+    Those files can be read, and the user wants to see them next.
 
-    title: of the window; the animation's name by default. size: of the window. camera: a `Camera`, the
-    name of a preset, or None for the one that suits the content. speed: 0.1 to 4. start: seconds.
-    interpolate: whether motion is smooth between frames. audio: a sound file to be heard with it; the
-    sound's clock then leads; it begins audio_offset seconds after the first frame, earlier where negative.
-    file: where the animation was read from (with bap_steps), for what the window
-    tells about it. warnings: what was said while it was read; the window shows it for some seconds, and the
-    file's panel lists it. panels: names of those open at the beginning ("file", "view", "camera", "help").
-    F1 shows the keys. Motion follows the clock: a slow machine shows fewer pictures, not slower ones.
+    title: of the window; the animation's name by default. size: of the window. camera: a `Camera`, the name
+    of a preset, or None for the one that suits the content. speed: 0.1 to 4. start: seconds. interpolate:
+    whether motion is smooth between frames. audio: a sound file, which begins audio_offset seconds after the
+    first frame (earlier if negative); the picture then follows the clock of the sound device. file: where the
+    animation was read from, with bap_steps, for the panels about the file. warnings: those given while it was
+    read; the window shows them for some seconds, and the file panel lists them. panels: names of those open
+    at first ("file", "view", "camera", "help"). F1 shows the keys. Motion follows the clock: a slow machine
+    shows fewer pictures, not slower ones.
 
-    Raises DisplayError where there is no display or no OpenGL 3.3, or where it stops working, saying what
-    to do; ValueError for a speed, size or preset that does not exist; FormatError for a sound file that
-    cannot be read.
+    Raises DisplayError if there is no display or no OpenGL 3.3, or OpenGL stops working, saying what to do;
+    ValueError for an impossible speed or size or an unknown preset; FormatError for a sound file that cannot
+    be read.
     """
     if not math.isfinite(audio_offset):
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
@@ -86,7 +86,7 @@ def play(
 
 
 def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
-    """The session has a sound from now on; None where nobody hears it, which the user is told."""
+    """Add a sound to the session; returns None, with a notice, if there is no sound device."""
     from fba_player.sound.player import open_audio
 
     session.audio = open_audio(path, session.transport, offset=offset)

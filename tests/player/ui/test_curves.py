@@ -94,18 +94,18 @@ def test_few_frames_are_all_there() -> None:
 
 
 @given(st.integers(300, 2000), st.integers(1, 60), st.data())
-def test_many_frames_keep_their_extremes(frames: int, courses: int, data: st.DataObject) -> None:
+def test_many_frames_keep_their_extremes(frames: int, columns: int, data: st.DataObject) -> None:
     values = np.random.default_rng(frames).normal(size=frames)
     spike = data.draw(st.integers(0, frames - 1))
     values[spike] = 99.0
     sent = np.arange(frames) == spike
-    drawn = envelope(np.arange(frames) / 25, values, sent, 0.0, (frames - 1) / 25, courses)
-    assert len(drawn.x) <= 2 * courses
+    drawn = envelope(np.arange(frames) / 25, values, sent, 0.0, (frames - 1) / 25, columns)
+    assert len(drawn.x) <= 2 * columns
     assert (drawn.values.min(), drawn.values.max()) == (values.min(), 99.0)  # nothing is lost
     assert (np.diff(drawn.x) >= 0).all()
     assert 0 <= drawn.x[0] <= drawn.x[-1] <= 1
     at = drawn.x[drawn.values.argmax()]
-    assert abs(at - spike / (frames - 1)) <= 1 / courses + 1e-9  # within its column
+    assert abs(at - spike / (frames - 1)) <= 1 / columns + 1e-9  # within its column
     assert drawn.sent[drawn.values.argmax()]
 
 
