@@ -104,7 +104,7 @@ class ImguiRenderer:
         self._textures.clear()
 
     def _upload(self, data: imgui.ImDrawData) -> list[tuple[tuple[float, ...], int, int, int]]:
-        """Upload all lists to one pair of buffers; returns (clip rectangle, texture, first index, count) to draw.
+        """Upload all lists to one pair of buffers; returns (clip, texture, first index, count) to draw.
 
         Neighbours with the same texture and clip rectangle are merged: a call costs more than its triangles.
         """

@@ -1,4 +1,4 @@
-"""The panels, one module each, and the curves and lists that they are made of.
+"""The panels, one module each, with the curves and lists that they share.
 
 May use: session, scene, playback.
 """

@@ -1,4 +1,4 @@
-"""Bit rates of a stream over time, and what its planes take together."""
+"""Bit rate of a stream over time, and totals of its I and P planes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from fba.codec import StreamInfo
 from fba.compiled import is_compiled
 
 WINDOW = 1.0
-"""Seconds over which a rate is taken."""
+"""Seconds over which the bit rate is averaged."""
 MOST_VALUES = 3_000_000 if is_compiled() else 30_000
-"""Values that are encoded only to see what they would take: about a second."""
+"""Most values of an animation that is encoded only to show its bit rate: about a second."""
 
 
 @dataclass(frozen=True)
 class Total:
-    """Planes of a kind together. planes: None for bits that belong to none. share: of all bits."""
+    """Sum over one kind of planes. planes: number, None for bits outside of planes. share: of all bits."""
 
     name: str
     planes: int | None
@@ -29,11 +29,11 @@ class Total:
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """What a stream takes.
+    """Bits of a stream over time.
 
-    times: seconds of the planes (T,). bits, intra (T,): of each. rate: kbit/s (N,) in the second that ends
-    with each of the last N planes; those before have no whole second behind them. totals: I planes, P planes
-    and what is around them. mean: kbit/s.
+    times: seconds of the planes (T,). bits, intra (T,): size and kind of each. rate: kbit/s (N,) in the
+    second that ends with each of the last N planes; for those before, less than a second is known. totals: of
+    I planes, P planes and the bits around them. mean: kbit/s.
     """
 
     times: Float64
@@ -45,7 +45,7 @@ class Rates:
 
 
 def measure_rates(info: StreamInfo) -> Rates | None:
-    """Of a stream; None where there are no planes."""
+    """The bit rates of a stream; None if it has no planes."""
     if info.plane_bits is None or info.plane_intra is None or info.frame_index is None or not info.frames:
         return None
     times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
@@ -66,7 +66,7 @@ def measure_rates(info: StreamInfo) -> Rates | None:
 
 
 def probe_encoded(animation: Animation) -> StreamInfo | None:
-    """What a performance would be as a stream; None where it is long, or where no stream holds its values."""
+    """Information about an animation as if encoded; None if it is too long or cannot be encoded."""
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MOST_VALUES:
         return None
@@ -79,10 +79,13 @@ def probe_encoded(animation: Animation) -> StreamInfo | None:
         return None
 
 
-def bars_of_planes(times: Float64, bits: Float64, intra: Bool, low: float, high: float,
-            count: int) -> tuple[Float64, Bool]:  # fmt: skip
-    """(count,) the largest plane in each of so many equal parts of a time, 0 for none, and whether it has an
-    I plane."""
+def bars_of_planes(
+    times: Float64, bits: Float64, intra: Bool, low: float, high: float, count: int
+) -> tuple[Float64, Bool]:
+    """Bits (count,) of the largest plane in each equal part of low..high, and whether it has an I plane.
+
+    Parts without a plane have 0.
+    """
     tall, key = np.zeros(count), np.zeros(count, bool)
     if not high > low:
         return tall, key

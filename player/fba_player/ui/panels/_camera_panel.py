@@ -1,4 +1,4 @@
-"""F4: the camera and its presets."""
+"""F4: the camera panel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fba_player.view.camera import DISTANCES, PITCH_LIMIT, PRESETS
 
 
 class CameraPanel(Panel):
-    """Named views, angles, distance and whether it follows."""
+    """Presets, angles, distance, and whether the camera follows the figure."""
 
     name, title, label = "camera", "Camera", "Camera"
     width, height, fitted, least = 300.0, 320.0, True, 180.0

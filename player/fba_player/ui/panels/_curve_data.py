@@ -1,4 +1,4 @@
-"""The course of single FAPs and BAPs over all frames of a performance, for curves."""
+"""Data of curves: values of single FAPs and BAPs over all frames, and the range of time that is shown."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from fba.face.resolve import Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
 
 BLOCK = 512
-"""Frames of a face worked out at once: about two milliseconds."""
+"""Frames of a face resolved at once: about two milliseconds."""
 FILLED_IN_WEIGHT = 0.5
-"""What a FAP that is only filled in counts beside those that are sent."""
+"""Weight of a FAP that is only filled in, where 1 is that of a FAP that is sent."""
 TYPICAL_ANGLE, TYPICAL_SHIFT = 45.0, 300.0
-"""What counts as moving as much as a FAP at full: degrees, millimetres."""
+"""Degrees and millimetres of a BAP that count as much as the typical motion of a FAP."""
 
 SHORTEST = 0.05
-"""Seconds that are always shown."""
+"""Least seconds that are shown."""
 NEAR = 1e-6
+"""Seconds of tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """One parameter over time.
+    """Values of one parameter over time.
 
-    kind: "fap" or "bap". times: seconds (T,); values (T,) as they are shown, in its unit; sent (T,), where
-    a frame says so itself.
+    kind: "fap" or "bap". times: seconds (T,). values (T,): as shown, in the unit of the parameter. sent (T,):
+    whether the frame sends the value itself.
     """
 
     kind: str
@@ -39,10 +40,10 @@ class Course:
 
 
 class Courses:
-    """Courses of a timeline's parameters; what is looked at is worked out when it is needed.
+    """Courses of the parameters of a timeline, computed when they are needed.
 
-    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds by which
-    it is shown later than its own times say.
+    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds added to
+    its times.
     """
 
     def __init__(self, timeline: Any, model: Any = None, later: float = 0.0) -> None:
@@ -57,21 +58,21 @@ class Courses:
 
     @property
     def has_face(self) -> bool:
-        """Whether it has FAPs."""
+        """Whether the timeline has FAPs."""
         return self._timeline.animation.face is not None
 
     @property
     def has_body(self) -> bool:
-        """Whether it has BAPs."""
+        """Whether the timeline has BAPs."""
         return self._timeline.animation.body is not None
 
     @property
     def known(self) -> float:
-        """The share of the frames whose FAPs have been worked out."""
+        """Share of the frames whose FAPs have been resolved."""
         return self._done / max(self._timeline.frames, 1) if self.has_face else 1.0
 
     def advance(self, blocks: int = 1) -> bool:
-        """Work out the next frames; whether there are more. Called for each picture, it holds none up."""
+        """Resolve the next blocks of frames; returns whether there are more. Fast enough for each picture."""
         timeline = self._timeline
         frames, animation = timeline.frames, timeline.animation
         if frames == len(self._times) and self.known >= 1.0:
@@ -95,16 +96,16 @@ class Courses:
         return bool(self._done < frames)
 
     def course(self, kind: str, number: int) -> Course:
-        """A parameter's course, as far as it is known; the same object until more is."""
+        """The course of a parameter as far as it is resolved; the same object until more is."""
         key = (kind, number)
         if key not in self._courses:
             self._courses[key] = self._fap(number) if kind == "fap" else self._bap(number)
         return self._courses[key]
 
     def movers(self, count: int) -> list[tuple[str, int]]:
-        """(kind, number) of those that move most, each measured by what is a lot for it; the most first.
+        """(kind, number) of the parameters that move most, relative to their typical motion; the most first.
 
-        Of FAPs that are each other's mates, one.
+        Of FAPs that mirror each other, only one.
         """
         found: list[tuple[float, str, int]] = []
         animation, frames = self._timeline.animation, len(self._times)
@@ -143,19 +144,19 @@ class Courses:
             return _empty_course("bap", number)
         sent = np.asarray(body.mask[:frames, number - 1])
         values = np.asarray(body.values[:frames, number - 1]).astype(np.float64)
-        if not sent.all():  # each frame shows what was sent last
+        if not sent.all():  # each frame shows the value that was sent last
             last = np.maximum.accumulate(np.where(sent, np.arange(frames), -1))
             values = np.where(last >= 0, values[np.maximum(last, 0)], 0.0)
         return Course("bap", number, self._times, values, sent)
 
 
 def parameter(kind: str, number: int) -> Fap | Bap:
-    """The table's row of a "fap" or "bap"."""
+    """The table row of a parameter. kind: "fap" or "bap"."""
     return faps()[number - 1] if kind == "fap" else baps()[number - 1]
 
 
 def amount(kind: str, number: int, value: float) -> tuple[str, str]:
-    """(number, unit) of a value as people read it: angles in degrees, others as they are coded."""
+    """(number, unit) of a value as text: angles in degrees, others as coded."""
     row = parameter(kind, number)
     if row.unit in ("AU", "1e-5 rad"):
         return f"{np.degrees(value * 1e-5):.1f}", "deg"
@@ -163,14 +164,14 @@ def amount(kind: str, number: int, value: float) -> tuple[str, str]:
 
 
 def fap_reach(number: int) -> float:
-    """What is a lot for a FAP, in its unit: what the gallery shows of it."""
+    """Typical strong motion of a FAP, in its unit: that of the gallery."""
     from fba_player.ui.panels._puppet_rows import reach
 
     return reach(number)
 
 
 def bap_reach(number: int) -> float:
-    """What is a lot for a BAP, in its unit."""
+    """Typical strong motion of a BAP, in its unit."""
     shift = baps()[number - 1].unit == "mm"
     root = number >= bap_numbers()["HumanoidRoot_tr_vertical"]
     if shift:
@@ -179,7 +180,7 @@ def bap_reach(number: int) -> float:
 
 
 def _is_mate(kind: str, number: int, chosen: list[tuple[str, int]]) -> bool:
-    """Whether it is the mate of a FAP that has been chosen, on the other side or on the other lip contour."""
+    """Whether a FAP is the mate of a chosen one, on the other side or on the other lip contour."""
     if kind != "fap":
         return False
     fap = faps()[number - 1]
@@ -194,23 +195,23 @@ def _empty_course(kind: str, number: int) -> Course:
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """Points (N,) of a line: x as a share of the width, values, and whether the frame there was sent."""
+    """Points (N,) of a curve: x as a share of the width, values, and whether the value was sent."""
 
     x: Float64
     values: Float64
     sent: Bool
 
     def runs(self) -> list[tuple[int, int]]:
-        """(first, behind the last) of the stretches of points that were sent; single points have a pair."""
+        """(first, last + 1) of each run of points that were sent."""
         edges = np.flatnonzero(np.diff(np.r_[False, self.sent, False].astype(np.int8)))
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: float, columns: int) -> Envelope:
-    """The curve between two times in so many columns.
+    """A curve between two times with as many points as pixel columns can show.
 
-    times: ascending. Where there are few frames, each is a point, and one before and one after the stretch
-    as well; where there are many, each column has its least and its largest value.
+    times: ascending. With few frames, each is a point, and also the one before and the one after the range;
+    with many, each column has its least and its largest value.
     """
     if not len(times) or columns < 1 or not high > low:
         return Envelope(np.zeros(0), np.zeros(0), np.zeros(0, bool))
@@ -220,32 +221,37 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
         part = slice(max(int(first) - 1, 0), min(int(last) + 1, len(times)))
         return Envelope((times[part] - low) / (high - low), values[part], sent[part])
     edges = np.searchsorted(times, np.linspace(low, high, columns + 1)[:-1], side="left")
-    starts, places = np.unique(edges, return_index=True)  # the last of those that begin alike has the frames
+    starts, places = np.unique(
+        edges, return_index=True
+    )  # of columns that begin at the same frame, the last has it
     places = np.r_[places[1:] - 1, columns - 1]
     kept = starts < last
     starts, places = starts[kept], places[kept]
     seen = values[: int(last)]
     least, largest = np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)
     any_sent = np.logical_or.reduceat(sent[: int(last)], starts)
-    # there and back, so that neighbours are joined
+    # up in one column, down in the next, so that neighbours are joined
     up = (np.arange(len(starts)) % 2).astype(bool)
     pairs = np.where(up, [largest, least], [least, largest]).T
     return Envelope(np.repeat((places + 0.5) / columns, 2), pairs.ravel(), np.repeat(any_sent, 2))
 
 
 class TimeZoom:
-    """From `low` to `high`, seconds, within the first and the last time of what is shown."""
+    """The range of time that curves show: `low` to `high` in seconds, within `first` to `last`.
+
+    At first it is all; the mouse zooms and moves it.
+    """
 
     def __init__(self) -> None:
         self.first = self.last = self.low = self.high = 0.0
 
     @property
     def shows_all(self) -> bool:
-        """Whether all of it is shown."""
+        """Whether the full range is shown."""
         return self.low <= self.first + NEAR and self.high >= self.last - NEAR
 
     def bound(self, first: float, last: float) -> None:
-        """What there is; where all of it was shown, it still is."""
+        """Set the full range; if all of it was shown, it still is."""
         if (first, last) == (self.first, self.last):
             return
         everything = self.shows_all
@@ -256,21 +262,21 @@ class TimeZoom:
             self._set(self.low, self.high)
 
     def reset(self) -> None:
-        """Show all."""
+        """Show the full range."""
         self.low, self.high = self.first, self.last
 
     def zoom(self, factor: float, about: float) -> None:
-        """Show so many times as much; the time `about` stays where it is."""
+        """Show `factor` times as much; the time `about` stays where it is on the screen."""
         self._set(about - (about - self.low) * factor, about + (self.high - about) * factor)
 
     def pan(self, seconds: float) -> None:
-        """Move on by seconds, as far as there is something."""
+        """Move the range by seconds, within the full range."""
         wide = self.high - self.low
         low = min(max(self.low + seconds, self.first), max(self.last - wide, self.first))
         self.low, self.high = low, low + wide
 
     def follow(self, time: float) -> None:
-        """Turn the page where a time lies outside: it is then near the left edge."""
+        """If a time lies outside, move on by a page: the time is then near the left edge."""
         wide = self.high - self.low
         if not self.low - NEAR <= time <= self.high + NEAR:
             self.pan(time - wide * 0.1 - self.low)

@@ -1,4 +1,4 @@
-"""Curves one below the other over a common time, drawn with imgui; the mouse seeks, zooms and moves them."""
+"""Curves one below the other over a common time axis; the mouse seeks, zooms and moves them."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ COLOURS: tuple[theme.Colour, ...] = (
     (0.68, 0.58, 0.94, 1.0), (0.35, 0.80, 0.78, 1.0), (0.93, 0.58, 0.36, 1.0), (0.72, 0.78, 0.40, 1.0),
 )  # fmt: skip
 WORDS = 19.0
-"""Points above a curve for its name and values."""
+"""Height in points of the name and values above a curve."""
 CURVE = 36.0
 GAP = 7.0
 AXIS = 22.0
-"""Points below the lanes for the times."""
+"""Height in points of the time labels below the curves."""
 APART = 74.0
 THIN, THICK = 1.0, 1.6
-"""Of stretches that were not sent, and that were."""
+"""Thickness in points of parts of a curve that were not sent, and that were."""
 ZOOM = 0.8
 
 
 @dataclass(frozen=True)
 class Lane:
-    """A curve: the parameter's course, its name, and how its values are written: (number, unit)."""
+    """A curve: the course of a parameter and its title. write: formats a value as (number, unit)."""
 
     course: Course
     title: str
@@ -43,13 +43,13 @@ class Lane:
 
     @property
     def key(self) -> tuple[str, int]:
-        """What it is a curve of."""
+        """(kind, number) of the parameter."""
         return self.course.kind, self.course.number
 
 
 @dataclass(eq=False)
 class _Lines:
-    """A lane's points on the screen, relative to its upper left corner, and where its zero is."""
+    """Points of a lane relative to its upper left corner, and the height of its zero line."""
 
     made_for: tuple[object, ...]
     whole: list[imgui.ImVec2]
@@ -62,18 +62,18 @@ class _Lines:
 
 
 class Lanes:
-    """Draws lanes; keeps their points until the course, the stretch of time or the size changes."""
+    """Draws lanes; their points are reused until the course, the time range or the size changes."""
 
     def __init__(self) -> None:
         self._lines: dict[tuple[str, int], _Lines] = {}
         self._ticks: tuple[tuple[float, ...], float, list[tuple[float, str]]] = ((), 1.0, [])
         self.place = (0.0, 0.0, 0.0, 0.0)
-        """Where the first lane's curve is: left, top, right, bottom in points; for tests."""
+        """Left, top, right, bottom of the first curve in points; for tests."""
 
     def draw(
         self, session: Session, lanes: list[Lane], time_zoom: TimeZoom, now: dict[tuple[str, int], float]
     ) -> None:
-        """Draw them into the rest of the window. now: values at this moment, by the lanes' keys."""
+        """Draw the lanes into the rest of the window. now: current values by the keys of the lanes."""
         room = imgui.get_content_region_avail()
         if session.transport.playing and not imgui.is_mouse_down(1):
             time_zoom.follow(session.transport.time)
@@ -198,7 +198,7 @@ def _mouse(session: Session, ruler: Ruler, time_zoom: TimeZoom, *, hovered: bool
 
 
 def _hover(to: imgui.ImDrawList, lane: Lane, ruler: Ruler, top: float) -> None:
-    """The time under the mouse, and the value there."""
+    """Show the time under the mouse, and the value there."""
     x = min(max(imgui.get_io().mouse_pos.x, ruler.left), ruler.right)
     to.add_line((x, top), (x, top + CURVE), theme.packed(theme.TEXT, 0.35))
     if imgui.is_mouse_down(0) or not len(lane.course.times):
@@ -209,7 +209,7 @@ def _hover(to: imgui.ImDrawList, lane: Lane, ruler: Ruler, top: float) -> None:
 
 
 def _make_lines(found: Envelope, key: tuple[object, ...], low: float, high: float, wide: float) -> _Lines:
-    """Values to places: the course's whole range fills the lane."""
+    """Convert values to points; their range fills the height of the lane."""
     room = high - low or 1.0
     middle = high == low
     inner = CURVE - 6
@@ -231,13 +231,13 @@ def _make_lines(found: Envelope, key: tuple[object, ...], low: float, high: floa
 
 
 def _darken(colour: theme.Colour) -> theme.Colour:
-    """Of what fills its lane: it is not to outshine the others."""
+    """A darker colour, for a curve so dense that it fills its lane."""
     red, green, blue, alpha = colour
     return red * 0.6, green * 0.6, blue * 0.6, alpha
 
 
 def _widen(points: list[imgui.ImVec2]) -> list[imgui.ImVec2]:
-    """A single point becomes a dash that can be seen."""
+    """A run of points; a single point becomes a visible dash."""
     if len(points) > 1:
         return points
     x, y = points[0].x, points[0].y
@@ -256,6 +256,6 @@ def _line(
         return
     first = to.vtx_buffer.size()
     to.add_polyline(cast(Any, points), theme.packed(colour, alpha), thickness, 0)
-    # The points are kept from picture to picture; where the lane is now is added to what they became.
+    # The points are reused in each picture: the position of the lane is added to their vertices.
     shade = imgui.internal.shade_verts_transform_pos
     shade(to, first, to.vtx_buffer.size(), imgui.ImVec2(0, 0), 1.0, 0.0, corner)

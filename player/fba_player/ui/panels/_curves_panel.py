@@ -1,4 +1,4 @@
-"""F5: curves of chosen FAPs and BAPs over time."""
+"""F5: the panel of curves of chosen FAPs and BAPs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from fba_player.ui.panels._parameter_chooser import Chooser
 from fba_player.ui.panels.panel import Panel, choose_name, tooltip
 
 BEGINS_WITH = 3
-"""Curves that are there at first: those that move most."""
+"""Number of curves at first: those that move most."""
 MOVERS = 8
+"""Number of curves of the button "Most moving"."""
 
 
 class CurvesPanel(Panel):
-    """One curve below the other, each with its least and largest value and the one now."""
+    """Curves one below the other, each with its least, largest and current value."""
 
     name, title, label = "curves", "Curves", "Curves"
     side = "left"
@@ -33,18 +34,18 @@ class CurvesPanel(Panel):
         self._courses_of: Any = None
         self._chosen_once = False
         self.which = 0
-        """Of several performances, the one whose curves are shown."""
+        """Number of the animation whose curves are shown, if several are compared."""
         self._lanes: list[Lane] = []
         self.time_zoom = TimeZoom()
         self.lanes = Lanes()
         self.chooser = Chooser()
 
     def available(self, session: Session) -> bool:
-        """Where there are parameters."""
+        """Whether the scene has FAPs or BAPs."""
         return _timeline(session) is not None
 
     def draw(self, session: Session) -> None:
-        """Draw it."""
+        """Draw the content."""
         names = session.scene.names if isinstance(session.scene, CompareScene) else ()
         if len(names) > 1:
             self.which = choose_name("##which", names, min(self.which, len(names) - 1))
@@ -65,7 +66,7 @@ class CurvesPanel(Panel):
         self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, chosen, self.which))
 
     def closed(self, session: Session) -> None:
-        """What has been worked out is kept."""
+        """Stop asking for pictures; computed courses stay."""
         session.rolling.discard(self.name)
 
     def _update_courses(self, session: Session) -> Courses:
@@ -107,7 +108,7 @@ class CurvesPanel(Panel):
 
 
 def _timeline(session: Session, which: int = 0) -> Any:
-    """Of what is shown, or of one of several."""
+    """The timeline of the scene, or of one of several animations that are compared."""
     scene = session.scene
     if isinstance(scene, CompareScene):
         return scene.scenes[which].timeline
@@ -126,7 +127,7 @@ def _lane(course: Any, place: int) -> Lane:
 
 
 def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tuple[str, int], float]:
-    """Values of this moment: with what hooks make of them."""
+    """Current values of parameters, after the hooks."""
     kinds = {kind for kind, _ in chosen}
     if session.before_frame:
         faps, baps = session.values

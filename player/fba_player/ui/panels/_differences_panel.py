@@ -1,4 +1,4 @@
-"""D: by how much performances that are shown together differ, parameter by parameter, over time."""
+"""D: the panel of differences between animations that are compared, by parameter and over time."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from fba_player.ui import theme
 from fba_player.ui.panels.panel import Panel, choose_name, heading, tooltip
 
 ROWS = 9
-"""Parameters listed, those that differ most."""
+"""Number of parameters listed: those that differ most."""
 POINTS = 1500
-"""Of a curve; of longer ones the largest in each stretch is drawn."""
+"""Most points of a curve; longer ones are thinned to the largest value of each part."""
 WORDS = {"side": "side by side", "over": "over each other"}
 DEGREES = 180 / np.pi * 1e-5
 
 
 class DifferencesPanel(Panel):
-    """The parameters that differ most, and the course of one of them with where the player is."""
+    """The parameters that differ most, and the difference in one of them over time."""
 
     name, title, label = "differences", "Differences", "Differences"
     width, height, fitted, least = 390.0, 450.0, True, 260.0
@@ -36,11 +36,11 @@ class DifferencesPanel(Panel):
         self._curve: tuple[object, Float64, Float64] | None = None
 
     def available(self, session: Session) -> bool:
-        """Where several performances are shown."""
+        """Whether several animations are compared."""
         return isinstance(session.scene, CompareScene) and len(session.scene.scenes) > 1
 
     def draw(self, session: Session) -> None:
-        """Draw it."""
+        """Draw the content."""
         scene: Any = session.scene
         self._arrangement(session, scene)
         self._second = min(self._second, len(scene.scenes) - 1)
@@ -125,7 +125,7 @@ class DifferencesPanel(Panel):
 
 
 def _why_nothing_differs(scene: Any, second: int, found: Differences) -> str:
-    """Why nothing differs."""
+    """The text shown where nothing differs: the reason."""
     one, other = (scene.scenes[number].animation for number in (0, second))
     if not any(
         getattr(one, part) is not None and getattr(other, part) is not None for part in ("face", "body")
@@ -135,7 +135,7 @@ def _why_nothing_differs(scene: Any, second: int, found: Differences) -> str:
 
 
 def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Float64]:
-    """A curve of at most so many points: of each stretch the value furthest from 0, where it is."""
+    """A curve of at most `most` points: of each part, the value furthest from 0 at its time."""
     if len(times) <= most:
         return times, values
     borders = np.linspace(0, len(times), most + 1).astype(int)

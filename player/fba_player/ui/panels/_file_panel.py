@@ -1,4 +1,4 @@
-"""F2: what the file holds."""
+"""F2: the panel about the file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fba_player.ui.panels.panel import Panel, facts, heading
 
 
 class FilePanel(Panel):
-    """Name, kind, frames, rate, bits, planes, masks, and what was wrong with it."""
+    """Name, format, frames, rate, bits, planes, masks and warnings."""
 
     name, title, label = "file", "File", "File"
     side = "left"
@@ -27,7 +27,7 @@ class FilePanel(Panel):
         self._shown: tuple[StreamInfo, list[tuple[str, list[tuple[str, str]]]]] | None = None
 
     def draw(self, session: Session) -> None:
-        """Draw it."""
+        """Draw the content."""
         source, info = session.source, session.source.info
         if self._shown is None or self._shown[0] is not info:
             self._shown = (info, _sections(session, info))
@@ -49,7 +49,7 @@ class FilePanel(Panel):
 
 
 def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
-    """(heading, rows) of the panel."""
+    """(heading, rows) of each section of the panel."""
     if isinstance(session.scene, CompareScene):
         return _sections_of_several(session.scene)
     parts = [("", _about_file(session, info))]
@@ -62,7 +62,7 @@ def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[
 
 
 def _sections_of_several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
-    """A heading and rows for each performance of several."""
+    """(heading, rows) of each of several animations that are compared."""
     parts = []
     for number, (name, one) in enumerate(zip(scene.names, scene.scenes, strict=True)):
         times, animation = one.timeline, one.animation
@@ -118,7 +118,7 @@ def _part(part: PartInfo, name: str, frames: int) -> list[tuple[str, str]]:
 
 
 def _ranges(numbers: tuple[int, ...]) -> str:
-    """ "3..42, 48": runs of numbers in short."""
+    """Ascending numbers with runs shortened: "3..42, 48"."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][1] + 1:

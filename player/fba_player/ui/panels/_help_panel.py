@@ -1,4 +1,4 @@
-"""F1: what keys and mouse do."""
+"""F1: the help about keys and mouse."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from fba_player.ui import theme
 from fba_player.ui.panels.panel import Panel, heading
 
 WIDE = 296.0
-"""Points that a column needs."""
+"""Least width of a column in points."""
 KEY = 104.0
-"""Points of it for the keys."""
+"""Width of the keys in a column, in points."""
 
 
 class HelpPanel(Panel):
-    """All keys, from the table of keys, those of switches, and the mouse; in columns where they fit."""
+    """The keys of actions and switches, and the mouse; in as many columns as fit."""
 
     name, title, label = "help", "Keys and mouse", "Help"
     side = "middle"
     width, height = 1240.0, 520.0
 
     def draw(self, session: Session) -> None:
-        """Draw it."""
+        """Draw the content."""
         groups = _groups(session)
         columns = min(int(imgui.get_content_region_avail().x // WIDE), 4)
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
@@ -41,7 +41,7 @@ class HelpPanel(Panel):
 
 
 def _columns(count: int) -> list[list[str]]:
-    """The names of the groups in so many columns, 2 to 4."""
+    """Names of the groups in each of `count` columns, 2 to 4."""
     if count == 2:
         return [["Play", "Keep", "Window"], ["View", "Switches", "Mouse"]]
     if count == 3:
@@ -50,7 +50,7 @@ def _columns(count: int) -> list[list[str]]:
 
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
-    """(keys, what they do) by the name of their group."""
+    """(keys, what they do) by name of the group."""
     found: dict[str, list[tuple[str, str]]] = {}
     for row in keys():
         found.setdefault(row.group, []).append((row.shown, row.does))

@@ -1,4 +1,4 @@
-"""Choosing FAPs and BAPs from a list that can be searched."""
+"""A list of FAPs and BAPs with search, to choose curves from."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fba_player.session.session import Session
 from fba_player.ui import theme
 
 MOST = 24
-"""Curves at once."""
+"""Most parameters chosen at once."""
 
 
 @cache
@@ -29,7 +29,7 @@ def all_parameters() -> tuple[tuple[str, int, str, str], ...]:
 
 @cache
 def search_parameters(query: str, *, face: bool, body: bool) -> tuple[tuple[str, int, str], ...]:
-    """(kind, number, text) of those that have all the words: a number alone, a name, a group."""
+    """(kind, number, text) of the parameters that match all words: a number, or parts of name or group."""
     words = query.lower().split()
     rows = []
     for kind, number, text, searched in all_parameters():
@@ -41,14 +41,14 @@ def search_parameters(query: str, *, face: bool, body: bool) -> tuple[tuple[str,
 
 
 def _matches(word: str, number: int, searched: str) -> bool:
-    """A number and a single letter are meant as they are, other words may be parts of words."""
+    """Whether a word matches; numbers and single letters only as a full word, others also as a part."""
     if word.isdecimal():
         return word == str(number)
     return word in searched.split() if len(word) == 1 else word in searched
 
 
 class Chooser:
-    """A button that opens the list; what is ticked there is the session's selection."""
+    """A button that opens the list; its ticks are the selection of the session."""
 
     def __init__(self) -> None:
         self.query = ""
@@ -56,7 +56,7 @@ class Chooser:
         """The middle of the first row, in points; for tests."""
 
     def draw(self, session: Session, *, face: bool, body: bool) -> None:
-        """Draw the button, and the list where it is open."""
+        """Draw the button, and the list if it is open. face, body: whether to list FAPs, BAPs."""
         if imgui.button("Choose..."):
             imgui.open_popup("choose")
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
@@ -94,7 +94,7 @@ class Chooser:
 
 
 def _group(kind: str, number: int) -> None:
-    """The group that it belongs to, in short, at the right end of its row."""
+    """Draw the kind and group of a parameter at the right end of its row."""
     name = (faps() if kind == "fap" else baps())[number - 1].group_name.partition(",")[0]
     text = f"{kind.upper()} {name}"
     font, size = imgui.get_font(), theme.SMALL

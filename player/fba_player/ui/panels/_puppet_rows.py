@@ -1,4 +1,4 @@
-"""What the puppeteer's sliders are: groups of FAPs, and of segments of the body, with how far they go."""
+"""The sliders of the puppeteer: groups of FAPs and of body segments, with their ranges."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ import numpy as np
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
 
 BEYOND = 1.5
-"""Sliders go so many times as far as what the gallery shows of a FAP."""
+"""Range of a FAP's slider relative to the value that the gallery shows."""
 DEGREES = float(np.degrees(1e-5))
 SHIFT = 1000.0
-"""Millimetres that the whole body goes either way."""
+"""Millimetres that the body moves to either side."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
     """A slider.
 
-    title: for people, with its side at the end ("raise inner eyebrow L"). numbers: the FAPs, or the BAPs that
-    share the motion, by number. low, high: in the parameter's unit, or degrees. unit: as shown. mirror:
+    title: as shown, with its side at the end ("raise inner eyebrow L"). numbers: the FAP, or the BAPs that
+    share the motion. low, high: in the parameter's unit, or degrees. unit: as shown. mirror:
     position of the other side's row in its group, or None; flipped: whether that one then has the opposite
     value. side: "l", "r" or "".
     """
@@ -40,7 +40,7 @@ class Row:
 
     @property
     def scale(self) -> float:
-        """The slider's unit for one unit of the parameter."""
+        """Value of the slider for one unit of the parameter."""
         return DEGREES if self.unit == "deg" else 1.0
 
 
@@ -54,13 +54,13 @@ class Group:
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """All FAPs, or BAPs, that they move."""
+        """All FAPs or BAPs that the sliders move."""
         return tuple(number for row in self.rows for number in row.numbers)
 
 
 @cache
 def groups() -> tuple[Group, ...]:
-    """All groups: the face's first, then the body's."""
+    """All groups: those of the face, then those of the body."""
     text = (files(__package__) / "puppet.csv").read_text(encoding="utf-8")
     found = []
     for line in csv.DictReader(text.splitlines()):
@@ -72,7 +72,7 @@ def groups() -> tuple[Group, ...]:
 
 @cache
 def reach(number: int) -> float:
-    """What the gallery shows of a FAP, as an amount in its unit: a strong, plausible motion."""
+    """Amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
     text = (files("fba_player.export") / "contact_sheet.csv").read_text(encoding="utf-8")
     return next(
         abs(float(row["value"])) for row in csv.DictReader(text.splitlines()) if int(row["fap"]) == number
@@ -135,7 +135,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
 
 
 def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
-    """Degrees that a stream can carry at most (end 1) or at least (end 0), in whole degrees."""
+    """Largest (end 1) or smallest (end 0) angle that a stream can code, in whole degrees."""
     found = 0.0
     for number in numbers:
         bap = baps()[number - 1]
@@ -145,9 +145,9 @@ def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
 
 
 def _flipped(number: int) -> bool:
-    """Whether the other side's BAP turns the other way for the mirrored motion.
+    """Whether the BAP of the other side needs the opposite sign for the mirrored motion.
 
-    A mirror at the plane that halves the body keeps turns about X and reverses those about Y and Z.
+    Mirroring left and right keeps rotations about X and reverses those about Y and Z.
     """
     bap = baps()[number - 1]
     mate = baps()[bap_numbers()[_other_side(bap.name)] - 1]
@@ -163,7 +163,10 @@ def _other_side(name: str) -> str:
 
 
 def _title(name: str) -> str:
-    """ "raise inner eyebrow L" of "raise_l_i_eyebrow"; that a lip is its outer contour the group says."""
+    """The title of a FAP: "raise inner eyebrow L" for "raise_l_i_eyebrow".
+
+    It omits the outer contour of the lips, which is in the name of the group.
+    """
     full = {"t": "top", "b": "bottom", "i": "inner", "m": "middle", "o": "outer", "lm": "L", "rm": "R",
             "midlip": "mid lip", "cornerlip": "lip corner"}  # fmt: skip
     words = name.split("_")
@@ -174,7 +177,7 @@ def _title(name: str) -> str:
 
 
 def _body_title(name: str) -> str:
-    """ "upper arm flexion L" of a limit or a BAP."""
+    """The title of a limit or a BAP, such as "upper arm flexion L"."""
     for word, short in (("HumanoidRoot_tr_", ""), ("HumanoidRoot_rt_", ""), ("spine 3", "upper spine"),
                         ("spine 2", "middle spine"), ("spine 1", "lower spine")):  # fmt: skip
         name = name.replace(word, short)

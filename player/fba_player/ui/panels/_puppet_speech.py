@@ -1,4 +1,4 @@
-"""The puppeteer's visemes and expressions."""
+"""Visemes and expressions in the puppeteer panel."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fba_player.ui.panels.panel import heading
 
 
 def draw_visemes(performer: Performer) -> None:
-    """Two visemes and how they mix."""
+    """Draw the choice of two visemes and their mix."""
     heading("Visemes")
     puppet, now = performer.puppet, performer.puppet.viseme
     first = _choice("first##viseme", VISEMES, now.select1)
@@ -27,7 +27,7 @@ def draw_visemes(performer: Performer) -> None:
 
 
 def draw_expressions(performer: Performer) -> None:
-    """Two expressions and how strong they are."""
+    """Draw the choice of two expressions and their intensities."""
     heading("Expressions")
     puppet, now = performer.puppet, performer.puppet.expression
     chosen = []
@@ -55,7 +55,7 @@ def draw_expressions(performer: Performer) -> None:
 
 
 def _release(what: str, *, there: bool) -> bool:
-    """A button that is always at its place, so that nothing moves away from under the mouse."""
+    """Draw a button, disabled unless `there`, so that nothing moves under the mouse; returns a press."""
     imgui.begin_disabled(not there)
     pressed = imgui.button(f"Release##{what}")
     imgui.end_disabled()

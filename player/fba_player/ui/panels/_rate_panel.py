@@ -1,4 +1,4 @@
-"""F6: the bit rate over time, the bits of each plane, and what I and P planes take together."""
+"""F6: the panel of the bit rate over time, the bits of each plane, and totals of I and P planes."""
 
 from __future__ import annotations
 
@@ -22,17 +22,20 @@ from fba_player.ui.panels.panel import Panel, tooltip
 from fba_player.ui.ruler import Ruler
 
 BARS = 34.0
-"""Points of height of the largest plane."""
+"""Height of the bars in points."""
 LITTLE = 0.02
-"""What is around the planes is told from this share on."""
+"""Least share of bits around the planes that is listed."""
 ALL_COLUMNS = 340.0
-"""Points of width for the whole table; one column less is in a narrower one."""
+"""Least width in points for all columns of the table; a narrower one has one less."""
 STEP = 3.0
-"""Points that a bar takes with the gap beside it, at least."""
+"""Least width in points of a bar with its gap."""
 
 
 class RatePanel(Panel):
-    """kbit/s in the last second, a bar for each plane, and a table; of no stream, what it would take."""
+    """kbit/s in the last second, a bar for each plane, and a table.
+
+    An animation that is no stream is encoded to show what it would take.
+    """
 
     name, title, label = "rate", "Bit rate", "Bit rate"
     side = "left"
@@ -45,14 +48,14 @@ class RatePanel(Panel):
         self.time_zoom = TimeZoom()
         self.lanes = Lanes()
         self.bars = (0.0, 0.0, 0.0, 0.0)
-        """Where the bars of the planes are: left, top, right, bottom in points; for tests."""
+        """Left, top, right, bottom of the bars in points; for tests."""
 
     def available(self, session: Session) -> bool:
-        """Where one performance is shown."""
+        """Whether a single animation is shown."""
         return not isinstance(session.scene, CompareScene)
 
     def draw(self, session: Session) -> None:
-        """Draw it."""
+        """Draw the content."""
         info, own = self._stream(session)
         if info is None:
             imgui.text_colored(theme.FAINT, own)
@@ -76,11 +79,11 @@ class RatePanel(Panel):
         _table(found)
 
     def closed(self, session: Session) -> None:
-        """What has been worked out is kept."""
+        """Stop asking for pictures; what was encoded stays."""
         session.rolling.discard(self.name)
 
     def _stream(self, session: Session) -> tuple[StreamInfo | None, str]:
-        """What is measured, and a word about it where it is not the file itself."""
+        """(stream to measure, note about it); without a stream, the note is the text to show."""
         info = session.source.info
         if info.plane_bits is not None:
             return info, ""
@@ -103,7 +106,7 @@ class RatePanel(Panel):
         return would, "if encoded" if would else "No stream."
 
     def _planes(self, session: Session, found: Rates) -> None:
-        """The bars; a click seeks."""
+        """Draw the bars; a click seeks."""
         left, top = imgui.get_cursor_screen_pos()
         wide = max(imgui.get_content_region_avail().x, 8.0)
         imgui.invisible_button("planes", (wide, BARS))
@@ -131,7 +134,7 @@ class RatePanel(Panel):
             to.add_line((at, top), (at, top + BARS), theme.packed(theme.TEXT, 0.8))
 
     def _bar_boxes(self, found: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
-        """(left, right, height, I plane) of the bars; kept until something changes."""
+        """(left, right, height, I plane) of the bars; cached until something changes."""
         time_zoom = self.time_zoom
         made_for = (found, time_zoom.low, time_zoom.high, wide)
         if self._bars[0] == made_for:
@@ -160,7 +163,7 @@ def _lanes(found: Rates, word: str) -> list[Lane]:
 
 
 def _row(found: Rates, time: float) -> int:
-    """The plane shown at a time."""
+    """Position of the plane shown at a time."""
     return int(np.clip(np.searchsorted(found.times, time + 1e-6, side="right") - 1, 0, len(found.times) - 1))
 
 

@@ -1,4 +1,4 @@
-"""F3: what is shown, and how: the scene's switches."""
+"""F3: the panel of the scene's switches."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fba_player.view.switches import Switch, Switches
 
 
 class ViewPanel(Panel):
-    """Each switch of the scene as what suits it: a tick, a choice, a FAP."""
+    """Each switch of the scene as a tick, a list of choices, or a list of FAPs."""
 
     name, title, label = "view", "View", "View"
     width, height, fitted, least = 300.0, 430.0, True, 190.0

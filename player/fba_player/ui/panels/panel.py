@@ -1,4 +1,4 @@
-"""What a panel is, and the small things panels are made of."""
+"""The base class of panels, and the widgets that they share."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ STANDING = int(
     _FLAGS.no_decoration | _FLAGS.no_move | _FLAGS.no_saved_settings | _FLAGS.no_bring_to_front_on_focus
     | _FLAGS.no_nav | _FLAGS.no_focus_on_appearing
 )  # fmt: skip
-"""Flags of a window that is no panel: the bar, the buttons. Put together once, not for each picture."""
+"""Flags of a fixed window without a title: the bar, the buttons."""
 EITHER_BUTTON = int(imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right)
 
 
 class Panel:
-    """A window over the picture. A subclass sets the names and draws; it may keep what it needs.
+    """A window over the picture; subclasses set the names and draw the content.
 
-    name: in the table of keys ("panel NAME" is its action) and in `Session.open`. title: for people. label:
-    on its button above the picture. side: the column where it opens, "right" or "left"; "middle" for one
-    that covers all for a moment. width, height: points that it likes to have; fitted: its content says how
-    high it is. least: the height with which it is of use where several share a column. One object of each
-    panel lives as long as the window.
+    name: in the table of keys ("panel NAME" is its action) and in `Session.open`. title: as shown. label: on
+    its button above the picture. side: the column where it opens, "right" or "left"; "middle" for one that
+    covers the picture. width, height: size in points that it asks for. fitted: whether its content decides
+    its height. least: least useful height where several share a column. The window has one object of each
+    panel.
     """
 
     name: ClassVar[str]
@@ -44,20 +44,20 @@ class Panel:
         raise NotImplementedError
 
     def available(self, session: Session) -> bool:
-        """Whether it makes sense for what is shown; else it has no button."""
+        """Whether the panel is of use for this scene; else it has no button."""
         return True
 
     def closed(self, session: Session) -> None:
-        """Called once when the panel is closed, and when the window is."""
+        """Called once when the panel is closed, and when the window is closed."""
 
     @property
     def key(self) -> str:
-        """Its key, as shown to people; "" where it has none."""
+        """Its key as text; "" if it has none."""
         return key_of(f"panel {self.name}")
 
 
 def facts(name: str, rows: list[tuple[str, str]]) -> None:
-    """Two columns: what, faint, and how much."""
+    """Draw a table of (label, value) rows. name: its imgui identifier."""
     if imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x):
         imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed)
         imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch)
@@ -73,7 +73,7 @@ def facts(name: str, rows: list[tuple[str, str]]) -> None:
 
 
 def heading(text: str, *, exact: bool = False) -> None:
-    """A line that begins a part of a panel; exact: with names in it, which stay as they are."""
+    """Draw a heading, in capitals unless `exact`, which is for text with names in it."""
     imgui.dummy((0, 2))
     imgui.push_font(None, theme.SMALL)
     imgui.text_colored(theme.ACCENT, text if exact else text.upper())
@@ -81,7 +81,7 @@ def heading(text: str, *, exact: bool = False) -> None:
 
 
 def shorten(text: str, wide: float) -> str:
-    """The text, or as much of it as fits into so many points."""
+    """The text, cut with "..." to a width in points."""
     if imgui.calc_text_size(text).x <= wide:
         return text
     while text and imgui.calc_text_size(text + "...").x > wide:
@@ -90,7 +90,7 @@ def shorten(text: str, wide: float) -> str:
 
 
 def choose_name(label: str, names: Sequence[str], now: int) -> int:
-    """A list of names of which one is chosen, by number."""
+    """Draw a list of names, of which number `now` is chosen; returns the new choice."""
     imgui.set_next_item_width(-1)
     if imgui.begin_combo(label, names[now]):
         for number, name in enumerate(names):
@@ -101,7 +101,7 @@ def choose_name(label: str, names: Sequence[str], now: int) -> int:
 
 
 def tooltip(text: str, key: str = "") -> None:
-    """Shown while the mouse rests on the last item, with the key that does the same."""
+    """Show a text while the mouse rests on the last item, with the key that does the same."""
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and imgui.begin_tooltip():
         imgui.text_unformatted(text)
         if key:
@@ -119,7 +119,7 @@ def icon_button(
     colour: theme.Colour | None = None,
     filled: bool = False,
 ) -> bool:
-    """A square button with a sign on it; lit where what it stands for is on. True where it is pressed."""
+    """Draw a square button with an icon; returns whether it is pressed. lit: whether its state is on."""
     x, y = imgui.get_cursor_screen_pos()
     pressed = imgui.invisible_button(name, (size, size))
     to, held, hovered = imgui.get_window_draw_list(), imgui.is_item_active(), imgui.is_item_hovered()

@@ -1,4 +1,4 @@
-"""F7: moving the face and the body by hand, and recording that."""
+"""F7: the puppeteer panel, which moves the face and the body by hand, and records takes."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from fba_player.ui.panels._puppet_speech import draw_expressions, draw_visemes
 from fba_player.ui.panels.panel import Panel, shorten, tooltip
 
 TITLE, VALUE, RELEASE = 148.0, 68.0, 18.0
-"""Points that a row's name takes, its value, and the button that gives it back."""
+"""Widths in points of the title of a row, its value, and its release button."""
 SLIDER = 84.0
-"""Points that a slider has at least: names are cut before it is shorter."""
+"""Least width of a slider in points: titles are cut first."""
 SHORTEST = 70.0
+"""Least width of a title in points."""
 
 
 class PuppetPanel(Panel):
-    """Sliders for FAPs, visemes, expressions and the body; takes of what they do."""
+    """Sliders for FAPs and the body, visemes, expressions, and takes."""
 
     name, title, label = "puppet", "Puppeteer", "Puppet"
     width, height, least = 380.0, 530.0, 280.0
@@ -36,22 +37,22 @@ class PuppetPanel(Panel):
         self.together = True
         """Whether left and right move together."""
         self.places: dict[tuple[str, int], tuple[float, float, float]] = {}
-        """Sliders in view by (group, row): left, right and middle height in points; for tests."""
+        """Sliders in view by (group, row): left, right and vertical middle in points; for tests."""
         self.buttons: dict[str, tuple[float, float]] = {}
-        """The middle of the buttons above; for tests."""
+        """Centres of the buttons by name, in points; for tests."""
 
     def available(self, session: Session) -> bool:
-        """Where a single figure is shown."""
+        """Whether a single animation is shown."""
         return isinstance(session.scene, Scene)
 
     def performer(self, session: Session) -> Performer:
-        """What it moves."""
+        """The performer of the session, made when it is first needed."""
         if self._performer is None or self._performer.session is not session:
             self._performer = Performer(session)
         return self._performer
 
     def draw(self, session: Session) -> None:
-        """Draw it."""
+        """Draw the content."""
         performer = self.performer(session)
         performer.attach()
         self._takes(session, performer)
@@ -84,12 +85,12 @@ class PuppetPanel(Panel):
             imgui.end_tab_bar()
 
     def closed(self, session: Session) -> None:
-        """What was moved stays; a take that is being recorded ends."""
+        """End the take that is being recorded; moved values stay."""
         if self._performer is not None:
             self._performer.stop()
 
     def _takes(self, session: Session, performer: Performer) -> None:
-        """Record, and what is done with a take."""
+        """Draw the buttons to record, show, undo and save takes."""
         if performer.recording is not None:
             imgui.push_style_color(imgui.Col_.button, (0.62, 0.20, 0.18, 1.0))
             pressed = self._button(f"Stop   {performer.recording:.1f} s###record")
@@ -151,7 +152,7 @@ class PuppetPanel(Panel):
             _group_buttons(performer, group, touched=touched)
 
     def _row(self, performer: Performer, group: Group, place: int, row: Row) -> None:
-        """A name, a slider, and a button that gives it back where it was moved."""
+        """Draw a title, a slider, and a release button if it was moved."""
         x, y = imgui.get_cursor_screen_pos()
         high = imgui.get_frame_height()
         top = imgui.get_window_pos().y
@@ -213,7 +214,7 @@ class PuppetPanel(Panel):
             tooltip("release: it follows what is played again")
 
     def _both(self, group: Group, row: Row) -> list[tuple[Row, float]]:
-        """The rows that a slider moves, and with which sign."""
+        """The rows that a slider moves, each with its sign."""
         if not self.together or row.mirror is None:
             return [(row, 1.0)]
         return [(row, 1.0), (group.rows[row.mirror], -1.0 if row.flipped else 1.0)]
@@ -233,7 +234,7 @@ class PuppetPanel(Panel):
 
 
 def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None:
-    """Buttons for a whole group."""
+    """Draw the buttons of a group."""
     if imgui.small_button(f"All to zero##{group.name}"):
         for number in group.numbers:
             if group.kind == "fap":
@@ -248,7 +249,7 @@ def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None
 
 
 def _parameter_names(row: Row) -> str:
-    """Which parameters a row moves."""
+    """The parameters that a row moves, as text."""
     names = [parameter(row.kind, number).name for number in row.numbers]
     pairs = zip(row.numbers, names, strict=True)
     return f"{row.kind.upper()} " + ", ".join(f"{number} {name}" for number, name in pairs)

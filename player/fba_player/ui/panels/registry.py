@@ -1,4 +1,4 @@
-"""The panels that there are, in the order of their buttons."""
+"""The list of panels, in the order of their buttons."""
 
 from __future__ import annotations
 
@@ -25,5 +25,5 @@ PANELS: tuple[type[Panel], ...] = (
 
 
 def make_panels() -> list[Panel]:
-    """One object of each."""
+    """Make one object of each panel."""
     return [kind() for kind in PANELS]
