@@ -81,7 +81,7 @@ def test_views_fit_above_what_is_covered(talking: Animation, clock: Clock, prese
     scene = Scene(talking)
     viewpoint = Viewpoint(scene, 1.6, clock=clock)
     viewpoint.covered = 0.25
-    camera, subject = viewpoint.fitted(preset), scene.subject
+    camera, subject = viewpoint.fit(preset), scene.subject
     matrix = camera.projection_matrix(1.6) @ camera.view_matrix()
     ends = []
     for side in (-1, 1):
