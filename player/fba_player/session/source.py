@@ -128,7 +128,7 @@ class Source:
                 self._format_and_size = (found, os.stat(self.path).st_size)
                 self._scene_info = None
         except (FbaError, OSError) as error:
-            self.warnings.append(f"what the file holds cannot be read: {error}")
+            self.warnings.append(f"the planes of the file cannot be read: {error}")
         trace = trace_of_planes(self.info)
         animation = self._animation()
         if trace is None and isinstance(animation, Animation):

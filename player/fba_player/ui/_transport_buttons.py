@@ -36,7 +36,7 @@ class Buttons:
             ("first", icons.first, "first frame"),
             ("back", icons.back, "one frame back"),
             ("toggle", icons.pause if transport.playing else icons.play, "play, pause"),
-            ("on", icons.on, "one frame on"),
+            ("on", icons.on, "one frame forward"),
             ("last", icons.last, "last frame"),
         ]
         x = centre - (4 * size + big + 4 * gap) / 2
@@ -50,7 +50,7 @@ class Buttons:
         if wide >= 460:
             x += 10
             for action, sign, text, lit in (
-                ("mark_in", icons.mark_in, "begin of the loop here", transport.mark_in is not None),
+                ("mark_in", icons.mark_in, "start of the loop here", transport.mark_in is not None),
                 ("mark_out", icons.mark_out, "end of the loop here", transport.mark_out is not None),
                 ("loop", icons.loop, "loop", transport.loop),
             ):

@@ -31,7 +31,7 @@ class CameraPanel(Panel):
             tooltip(f"view: {name}", key_of(f"camera {name}"))
         if imgui.button("Reset", (-1, 0)):
             act(session, "reset_view")
-        tooltip("the view of the beginning", key_of("reset_view"))
+        tooltip("reset the view", key_of("reset_view"))
         heading("By hand")
         camera = viewpoint.camera
         imgui.push_item_width(-86)

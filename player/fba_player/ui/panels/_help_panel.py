@@ -43,10 +43,10 @@ class HelpPanel(Panel):
 def _columns(count: int) -> list[list[str]]:
     """Names of the groups in each of `count` columns, 2 to 4."""
     if count == 2:
-        return [["Play", "Keep", "Window"], ["View", "Switches", "Mouse"]]
+        return [["Play", "Save", "Window"], ["View", "Switches", "Mouse"]]
     if count == 3:
-        return [["Play"], ["View", "Switches", "Keep"], ["Window", "Mouse"]]
-    return [["Play"], ["View", "Switches", "Keep"], ["Window"], ["Mouse"]]
+        return [["Play"], ["View", "Switches", "Save"], ["Window", "Mouse"]]
+    return [["Play"], ["View", "Switches", "Save"], ["Window"], ["Mouse"]]
 
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
