@@ -28,7 +28,7 @@ def _numba() -> Any:
         import numba
     except ImportError:  # the codec runs anywhere Python and NumPy run
         return None
-    return numba
+    return numba if hasattr(numba, "njit") else None  # the folder of an uninstalled numba may still be there
 
 
 def compiled(function: Function) -> Function:

@@ -80,3 +80,13 @@ def test_the_same_without_machine_code(way: str, usual: dict[str, object]) -> No
         assert result["numba"] is False
     same = ("bytes", "long", "values", "fuzz", "findings")
     assert {name: result[name] for name in same} == {name: usual[name] for name in same}
+
+
+def test_an_emptied_folder_of_numba_is_no_numba() -> None:
+    """What an uninstalled numba may leave behind can be imported, and holds nothing."""
+    script = (
+        "import sys; sys.modules['numba'] = type(sys)('numba'); from fba import compiled; import fba.codec"
+    )
+    subprocess.run(
+        [sys.executable, "-W", "error", "-c", f"{script}; assert not compiled.is_compiled()"], check=True
+    )
