@@ -10,23 +10,30 @@ import numpy.typing as npt
 
 from fba.arrays import Bool, Float64
 from fba.errors import ModelError
-from fba.face.authoring.regions.brows_cheeks_nose import spot_motions
+from fba.face.authoring.regions.brows_cheeks_nose import brow_cheek_nose_motions
 from fba.face.authoring.regions.ears import ear_motions
-from fba.face.authoring.regions.eyes import Eye, eye_transforms, eyes, pupil_motions
-from fba.face.authoring.regions.jaw import CHIN, Jaw, jaw, opening, share_of_part, turned
+from fba.face.authoring.regions.eye_opening import LIDS
+from fba.face.authoring.regions.eyes import Eye, eye_transforms, find_eyes, pupil_motions
+from fba.face.authoring.regions.jaw import (
+    CHIN,
+    Jaw,
+    find_jaw,
+    jaw_share_of_part,
+    opening_angles,
+    opening_shifts,
+)
 from fba.face.authoring.regions.lashes import lash_motion
 from fba.face.authoring.regions.lids import lid_motion
 from fba.face.authoring.regions.lips import HANDLES, lip_motions
-from fba.face.authoring.regions.mouth_opening import LIDS
 from fba.face.authoring.regions.tongue import FAPS as TONGUE_FAPS
 from fba.face.authoring.regions.tongue import tongue_motion
 from fba.face.authoring.surface.attached_parts import LARGEST, NEAR, Anchors
-from fba.face.authoring.surface.binding import Binding, bind_points, face_size, part_lips
+from fba.face.authoring.surface.binding import Binding, bind_points, face_size, separate_lips
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
-from fba.face.authoring.surface.motion import Motion, by_part, tables
-from fba.face.authoring.surface.motion_limits import guarded, linear
-from fba.face.authoring.surface.unfold import relaxed
+from fba.face.authoring.surface.motion import Motion, build_tables, split_by_part
+from fba.face.authoring.surface.motion_limits import eased_linear_motion, stop_at_folds
+from fba.face.authoring.surface.unfold import unfold
 from fba.face.expressions import Definitions
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part
@@ -82,7 +89,7 @@ def author(
     binding = bind_points(parts, places, bound)
     surface, pool = surface_of(parts, binding.points, binding.bound)
     if bound is None:
-        binding = part_lips(surface, parts, places, binding, face_size(places))
+        binding = separate_lips(surface, parts, places, binding, face_size(places))
     marks = landmarks(surface, binding.points, binding.bound, pool)
     work = _Authoring(parts, marks, binding)
     work.run()
@@ -91,7 +98,9 @@ def author(
         points=binding.points,
         bound=binding.bound,
         tables=tuple(
-            tables(fap, marks.fapu[faps()[fap - 1].unit], work.moves.get(fap, {}), work.turns.get(fap, ()))
+            build_tables(
+                fap, marks.fapu[faps()[fap - 1].unit], work.moves.get(fap, {}), work.turns.get(fap, ())
+            )
             for fap in sorted({*work.moves, *work.turns})
         ),
         fit=fit,
@@ -130,12 +139,12 @@ class _Authoring:
         self.moves: dict[int, dict[str, Motion]] = {}
         self.turns: dict[int, list[FaceDefTransform]] = {}
         self.lost: dict[int, str] = {}
-        self.eyes: dict[str, Eye] = eyes(marks, parts)
+        self.eyes: dict[str, Eye] = find_eyes(marks, parts)
         self.anchors = self._anchors()
 
     def run(self) -> None:
         self._jaw()
-        for make in (lip_motions, spot_motions, ear_motions):
+        for make in (lip_motions, brow_cheek_nose_motions, ear_motions):
             motions, lost = make(self.marks, self.limiter)
             for fap, motion in motions.items():
                 self._surface(fap, motion)
@@ -157,9 +166,9 @@ class _Authoring:
 
     def _surface(self, fap: int, motion: Motion) -> None:
         """A motion of the surface, and of what it carries."""
-        moves = by_part(self.marks.surface, motion)
+        moves = split_by_part(self.marks.surface, motion)
         for name, anchors in self.anchors.items():
-            moves[name] = anchors.carried(motion)
+            moves[name] = anchors.carry(motion)
         self.moves[fap] = {**self.moves.get(fap, {}), **moves}
 
     def _anchors(self) -> dict[str, Anchors]:
@@ -176,28 +185,28 @@ class _Authoring:
         return found
 
     def _jaw(self) -> None:
-        found = jaw(self.marks)
+        found = find_jaw(self.marks)
         if isinstance(found, str):
             self.lost |= dict.fromkeys(JAW_FAPS, found)
             return
-        values, angles = opening(found, self.marks.fapu.MNS)
+        values, angles = opening_angles(found, self.marks.fapu.MNS)
         shares = {
-            part.name: share_of_part(self.marks, part, found.hinge)
+            part.name: jaw_share_of_part(self.marks, part, found.hinge)
             for part in self.parts
             if part.kind in ("teeth", "tongue")
         }
         points = self.marks.surface.vertices
         moving = np.flatnonzero(found.share)
-        shifts = turned(points[moving], found, angles) * found.share[moving][:, None]
-        whole = Motion(values, moving, shifts)
-        motion = relaxed(self.marks.surface, self.limiter, whole, self._pinned(), True)
-        motion = guarded(self.limiter, motion, turning=True)
+        shifts = opening_shifts(points[moving], found, angles) * found.share[moving][:, None]
+        unlimited = Motion(values, moving, shifts)
+        motion = unfold(self.marks.surface, self.limiter, unlimited, self._pinned(), True)
+        motion = stop_at_folds(self.limiter, motion, turning=True)
         self._surface(OPEN_JAW, motion)
         # what the skin stops at, teeth and tongue stop at too
-        reached = angles_at(motion, values, angles)
+        reached = jaw_angles_at_values(motion, values, angles)
         for part in self.parts:
             if part.name in shares:
-                inner = turned(part.vertices.astype(np.float64), found, reached)
+                inner = opening_shifts(part.vertices.astype(np.float64), found, reached)
                 inner *= shares[part.name][:, None]
                 self.moves[OPEN_JAW][part.name] = Motion(motion.values, np.arange(len(part.vertices)), inner)
         for fap in (THRUST_JAW, SHIFT_JAW):
@@ -216,7 +225,7 @@ class _Authoring:
         pinned = np.zeros(len(self.marks.surface), dtype=bool)
         pinned[[self.marks.vertex[name] for name in (*CHIN, *LIP_POINTS) if self.marks.has(name)]] = True
         field = found.sliding[moving][:, None] * step
-        motion = linear(self.marks.surface, self.limiter, moving, field, fap, pinned)
+        motion = eased_linear_motion(self.marks.surface, self.limiter, moving, field, fap, pinned)
         self._surface(fap, motion)
         chin = int(np.flatnonzero(motion.vertices == self.marks.vertex["2.1"])[0])
         ways = motion.shifts[:, chin]
@@ -264,12 +273,12 @@ class _Authoring:
                     self.moves.setdefault(fap, {})[part.name] = motion
 
     def _head(self) -> None:
-        centre = tuple(self.marks.guess("7.1").tolist())
+        centre = tuple(self.marks.point_or_average("7.1").tolist())
         for fap, axis in HEAD_AXES.items():
             self.turns[fap] = [FaceDefTransform(HEAD, "rotation", axis, centre)]
 
 
-def angles_at(motion: Motion, values: Float64, angles: Float64) -> Float64:
+def jaw_angles_at_values(motion: Motion, values: Float64, angles: Float64) -> Float64:
     """The jaw's angle at the values of a motion that may have been stopped on its way."""
     result = np.interp(motion.values, values, angles)
     for k in range(1, len(result)):

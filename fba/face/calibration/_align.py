@@ -1,4 +1,4 @@
-"""Feature points of a person in any unit and any pose -> metres, in the frame of a face model."""
+"""Aligns a person's feature points, in any unit and pose, with a face model: metres, in its frame."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from fba.face.feature_points import names, row_of
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of length that files are in, in metres."""
 HUMAN = (0.7, 1.4)
-"""A person's size by the model's: between a child of two and a giant. Beyond it a unit is a wrong guess."""
+"""A person's size relative to the model: from a child of two to a giant. Outside it the unit is wrong."""
 OWN_AXES = np.radians(15.0)
-"""Points turned by less keep their axes: then the axes are the file's own, and the face is not quite ours."""
+"""A rotation this close to whole right angles is rounded to them: the rest is a difference of faces."""
 FEWEST_POINTS = 4
 FLAT = 0.02
-"""Smallest by largest spread of points that lie in a plane, such as those of a photograph."""
+"""Ratio of smallest to largest spread below which points lie in a plane, as those of a photograph do."""
 MIRRORED_FIT = 0.6
 """Points are mirrored where their mirror image leaves less than this share of the error."""
 
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Where a person's points lie in the frame of the model, and how they came there.
+    """A person's feature points in the frame of the model, and the transform that brought them there.
 
     points: (84, 3), metres. scale: metres for one unit of the file. unit: its name, "" where none fits
-    and the size was taken from the model. angle: radians by which the points were turned. mirrored:
+    and the size was taken from the model. angle: of the rotation, radians. mirrored:
     left and right were swapped. flat: the points had no depth, and were given the model's. expected:
     (84, 3), where the model's points would be on a person of that size; residual: (84,), metres between
     the two, NaN where unknown.
@@ -46,32 +46,33 @@ class Alignment:
 
 
 def align(given: Float64, reference: Float64, *, unit: str | float | None = None) -> Alignment:
-    """Scale, turn and shift a person's feature points (84, 3) into the frame of reference (84, 3).
+    """A person's feature points (84, 3) scaled, rotated and shifted into the frame of reference (84, 3).
 
-    unit: a name of `UNITS`, or metres for one unit of the file; None finds it. Raises ModelError where
-    too few points are known to both, or where they stand on one spot or one line.
+    NaN marks unknown points. unit: a name of `UNITS`, or metres for one unit of the file; None finds it.
+    Raises ModelError where fewer than four points are known to both, or where they coincide or lie on one
+    line.
     """
     known = known_rows(given, reference)
     _check(given, known)
     here, there = given[known], reference[known]
-    flat = _ratio(here) < FLAT and _ratio(there) > 2 * FLAT
+    flat = _flatness(here) < FLAT and _flatness(there) > 2 * FLAT
     if flat:
-        turned, mirrored = _flat_pose(here, there), False
-        angle = _angle(turned)
+        rotation, mirrored = _find_flat_pose(here, there), False
+        angle = _angle(rotation)
     else:
-        turned, mirrored = _pose(here, there)
-        angle = _angle(turned)
-        turned = _own_axes(turned)
+        rotation, mirrored = _find_pose(here, there)
+        angle = _angle(rotation)
+        rotation = _snap_to_axes(rotation)
     if mirrored:
-        turned = np.diag([-1.0, 1.0, 1.0]) @ turned
-    posed = given @ turned.T
-    # Where the frame was the file's own, only size and place are left to find.
-    size, weight = _size(posed[known], there)
-    scale, name = _unit(size, unit)
+        rotation = np.diag([-1.0, 1.0, 1.0]) @ rotation
+    posed = given @ rotation.T
+    # Size and position are found last: rounding the rotation to right angles changes the best fit.
+    size, weight = _robust_size(posed[known], there)
+    scale, name = _find_unit(size, unit)
     placed = posed * scale
     if flat:
         placed[:, 2] = np.where(np.isfinite(placed[:, 2]), reference[:, 2] * scale / size, np.nan)
-    shift = _median(there * scale / size - placed[known], weight)
+    shift = _trusted_median(there * scale / size - placed[known], weight)
     placed += shift
     expected = reference * scale / size
     residual = np.linalg.norm(placed - expected, axis=1)
@@ -79,7 +80,7 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
 
 
 def known_rows(*points: Float64) -> Bool:
-    """Rows (N,) that are finite in every one of some arrays (N, 3)."""
+    """(N,) mask of the rows that are finite in all of the arrays (N, 3)."""
     return np.asarray(np.isfinite(np.hstack(points)).all(axis=1))
 
 
@@ -98,13 +99,13 @@ def _check(given: Float64, known: Bool) -> None:
         )
 
 
-def _ratio(points: Float64) -> float:
+def _flatness(points: Float64) -> float:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return float(spread[2] / spread[0])
 
 
-def _pose(here: Float64, there: Float64) -> tuple[Float64, bool]:
-    """The rotation that turns here into there, and whether here must be mirrored (x -> -x) for it."""
+def _find_pose(here: Float64, there: Float64) -> tuple[Float64, bool]:
+    """((3, 3) rotation from here to there, whether here must first be mirrored by x -> -x)."""
     plain = _rotation(here, there, 1.0)
     mirrored = _rotation(here, there, -1.0)
     if mirrored[1] < MIRRORED_FIT * plain[1]:
@@ -113,9 +114,9 @@ def _pose(here: Float64, there: Float64) -> tuple[Float64, bool]:
 
 
 def _rotation(here: Float64, there: Float64, handed: float) -> tuple[Float64, float]:
-    """Robust orthogonal matrix of that determinant with there ~ size * matrix @ here; (matrix, error).
+    """(orthogonal matrix of determinant `handed`, median error) with there ~ size * matrix @ here.
 
-    Procrustes, again and again: points that lie far off count less (Geman-McClure weights).
+    Procrustes analysis, iteratively reweighted: distant points count less (Geman-McClure weights).
     """
     weight = np.ones(len(here))
     matrix, error = np.eye(3), np.inf
@@ -134,8 +135,8 @@ def _rotation(here: Float64, there: Float64, handed: float) -> tuple[Float64, fl
     return matrix, error
 
 
-def _flat_pose(here: Float64, there: Float64) -> Float64:
-    """The rotation of points in a plane onto the model's seen from the front, turned over if need be."""
+def _find_flat_pose(here: Float64, there: Float64) -> Float64:
+    """(3, 3) rotation of points in a plane onto the model seen from the front, on the better of two sides."""
     _, _, axes = np.linalg.svd(here - here.mean(axis=0), full_matrices=True)
     axes[2] = np.cross(axes[0], axes[1])
     flat = (here - here.mean(axis=0)) @ axes.T
@@ -148,8 +149,8 @@ def _flat_pose(here: Float64, there: Float64) -> Float64:
     return best
 
 
-def _own_axes(matrix: Float64) -> Float64:
-    """The nearest turn by whole right angles, where one is near: files have axes, not chance poses."""
+def _snap_to_axes(matrix: Float64) -> Float64:
+    """The nearest rotation by whole right angles if it is within `OWN_AXES`, else the matrix unchanged."""
     quarter = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -165,8 +166,8 @@ def _angle(matrix: Float64) -> float:
     return float(np.arccos(np.clip((np.trace(matrix) - 1) / 2, -1.0, 1.0)))
 
 
-def _size(posed: Float64, there: Float64) -> tuple[float, Float64]:
-    """Robust size of there by that of posed, and how far each point can be trusted."""
+def _robust_size(posed: Float64, there: Float64) -> tuple[float, Float64]:
+    """(size of there relative to posed, (N,) weight of each point), robust against outliers."""
     weight = np.ones(len(posed))
     size = 1.0
     for _ in range(20):
@@ -179,7 +180,7 @@ def _size(posed: Float64, there: Float64) -> tuple[float, Float64]:
     return size, weight
 
 
-def _unit(size: float, unit: str | float | None) -> tuple[float, str]:
+def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
     if isinstance(unit, str):
         if unit not in UNITS:
             raise ModelError(f"there is no unit of length {unit!r}; there are {', '.join(UNITS)}")
@@ -189,20 +190,20 @@ def _unit(size: float, unit: str | float | None) -> tuple[float, str]:
             raise ModelError(f"a unit of length must be a positive number of metres, not {unit}")
         return float(unit), ""
     for name in ("mm", "cm", "m"):
-        # The size turns the file's units into the model's metres; a person may be smaller or bigger.
+        # `size` scales the points to the model; the true unit may differ from it by as much as people do.
         if HUMAN[0] <= UNITS[name] / size <= HUMAN[1]:
             return UNITS[name], name
     return size, ""
 
 
-def _median(rows: Float64, weight: Float64) -> Float64:
+def _trusted_median(rows: Float64, weight: Float64) -> Float64:
     trusted = rows[weight >= np.median(weight)]
     middle: Float64 = np.median(trusted, axis=0)
     return middle
 
 
-def centred(points: Float64, reference: Float64) -> Float64:
-    """Shifted so that the middle between the pupils is where the reference has it, if both know it."""
+def centre_on_pupils(points: Float64, reference: Float64) -> Float64:
+    """Points (84, 3) shifted so that the pupils' midpoint is the reference's; unchanged if unknown."""
     rows = [row_of()["3.5"], row_of()["3.6"]]
     shift = reference[rows].mean(axis=0) - points[rows].mean(axis=0)
     return points + shift if np.isfinite(shift).all() else points

@@ -1,4 +1,4 @@
-"""What FAPs do to a face, carried over to the same face in another shape."""
+"""The FaceDefTables of a face carried over to the same face in another shape."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from fba.arrays import Float64, Floating, Integer
 from fba.face.calibration._align import known_rows
-from fba.face.calibration._eyes import FittedEye, weight_of
-from fba.face.calibration._shape import Shape, similar
+from fba.face.calibration._eyes import FittedEye, eyeball_weight
+from fba.face.calibration._shape import Shape, fit_similarity
 from fba.face.feature_points import row_of
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
@@ -22,39 +22,41 @@ if TYPE_CHECKING:
 
 LID_FAPS = {19: "left", 20: "right", 21: "left", 22: "right"}
 LEAST = 1e-6
-"""How much a direction that no edge has counts as stretched like the others."""
+"""Weight with which a direction without edges is taken to stretch like the others."""
 
 
-def carried_tables(
+def carry_tables(
     model: FaceModel, parts: tuple[Part, ...], points: Float64, fapu: Fapu, shape: Shape
 ) -> tuple[FaceDefTables, ...]:
-    """The model's tables for its parts in another shape.
+    """The model's tables for its parts in another shape: one FaceDefTables per table of the model.
 
-    A displacement stays so many FAPU, turned with the face around it. Those of lids stretch with the skin
-    instead, as the opening between them does, and keep to the eyeball. Each FAP's own vertex then moves by
-    as many FAPU as before, in the same direction, and the others with it. Transforms keep their angles; if
-    these are counted in a length, they keep what the chin does at its distance.
+    parts: the parts after fitting, in the model's order. points: (84, 3) fitted feature points, metres.
+    fapu: of the fitted face. A displacement keeps its length in FAPU and turns with the face around it.
+    Displacements of lids stretch with the skin instead, as the opening between them does, and are
+    corrected to keep the lid on the eyeball. Each FAP's own vertex then moves by as many FAPU as before
+    in the same direction, and the other vertices are corrected with it. Transforms keep their angles;
+    where a FAP's unit is a length, the angle is scaled so that the chin moves as far as before.
     """
     names = {part.name: place for place, part in enumerate(parts)}
-    turns = {part.name: shape.turns.get(part.name) for part in model.parts}
+    rotations = {part.name: shape.rotations.get(part.name) for part in model.parts}
     stretched = _lid_stretches(model, parts) if LID_FAPS.keys() & model.table_of.keys() else {}
     tables = []
     for table in model.tables:
         fap = faps()[table.fap - 1]
         units = model.fapu[fap.unit], fapu[fap.unit]
         lid = table.fap in LID_FAPS
-        local = stretched if lid else turns
+        local = stretched if lid else rotations
         moved = {}
         for mesh in table.meshes:
             moves = mesh.displacements.astype(np.float64)
             matrices = local.get(mesh.part)
             if matrices is not None:
                 moves = np.einsum("vij,vkj->vki", matrices[mesh.vertices], moves)
-            if fap.unit == "AU":  # an angle, so the way is as long as the part is big
+            if fap.unit == "AU":  # an angle: displacements scale with the part
                 old, new = model.parts[names[mesh.part]], parts[names[mesh.part]]
-                moves = moves * similar(old.vertices, new.vertices.astype(np.float64)).size
+                moves = moves * fit_similarity(old.vertices, new.vertices.astype(np.float64)).size
             moved[mesh.part] = moves * (units[0] / units[1] if lid else 1.0)
-        right = _correction(model, table, moved) if fap.unit != "AU" else None
+        right = _point_correction(model, table, moved) if fap.unit != "AU" else None
         meshes = []
         for mesh in table.meshes:
             moves = moved[mesh.part]
@@ -65,21 +67,23 @@ def carried_tables(
                 places = [part.vertices[mesh.vertices].astype(np.float64) for part in (old, new)]
                 before = places[0], mesh.displacements.astype(np.float64) * units[0]
                 after = places[1], moves * units[1]
-                moves = slid(shape.eyes, table.fap, mesh.borders, before, after) / units[1]
+                moves = keep_lid_on_eyeball(shape.eyes, table.fap, mesh.borders, before, after) / units[1]
             meshes.append(FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, moves.astype(np.float32)))
         balls = {eye.was.part: eye for eye in shape.eyes.values()}
         ratio = units[0] / units[1]
-        transforms = [_moved(model, one, points, fap.unit, ratio, balls) for one in table.transforms]
+        transforms = [
+            _carry_transform(model, one, points, fap.unit, ratio, balls) for one in table.transforms
+        ]
         tables.append(FaceDefTables(table.fap, tuple(meshes), tuple(transforms)))
     return tuple(tables)
 
 
 def _lid_stretches(model: FaceModel, parts: tuple[Part, ...]) -> dict[str, Float64]:
-    """How the skin stretched, for skin and for what stands on it: (V, 3, 3) by name of the part."""
+    """(V, 3, 3) by name of the part: stretch of the skin, for skin and for the parts on it."""
     from scipy.spatial import cKDTree
 
     found = {
-        old.name: stretches(old, new.vertices)
+        old.name: surface_stretches(old, new.vertices)
         for old, new in zip(model.parts, parts, strict=True)
         if old.kind in ("skin", "mouth")
     }
@@ -93,7 +97,7 @@ def _lid_stretches(model: FaceModel, parts: tuple[Part, ...]) -> dict[str, Float
     return found
 
 
-def _moved(
+def _carry_transform(
     model: FaceModel,
     transform: FaceDefTransform,
     points: Float64,
@@ -112,7 +116,7 @@ def _moved(
         if np.isfinite(points[head]).all() and np.isfinite(model.points[head]).all():
             centre = centre + points[head] - model.points[head]
     else:
-        centre, size = _hinge(model, points, centre)
+        centre, size = _carry_hinge(model, points, centre)
     if transform.kind == "rotation" and unit != "AU":
         amount = amount / size  # a longer arm turns by less for the same distance
     if transform.kind == "scale":
@@ -120,8 +124,10 @@ def _moved(
     return FaceDefTransform(transform.part, transform.kind, tuple(amount), tuple(centre))
 
 
-def _hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Float64, float]:
-    """A hinge inside the head: it keeps its place among the points around, and its distance from the chin."""
+def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Float64, float]:
+    """(centre (3,), size): a hinge moved by the affine map of the feature points, and the chin's new distance
+    from it relative to the old one.
+    """
     known = known_rows(points, model.points)
     here, there = model.points[known], points[known]
     a = np.column_stack([here - here.mean(axis=0), np.ones(len(here))])
@@ -136,8 +142,8 @@ def _hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Float64,
     return moved, float(arms[0] / arms[1]) if arms[1] > 0 else 1.0
 
 
-def _correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
-    """(K, 3, 3) that give the FAP's own point its motion per FAPU back; None where it has none."""
+def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
+    """(K, 3, 3) matrices that restore the motion per FAPU of the FAP's own point; None if no mesh has it."""
     for name in faps()[table.fap - 1].feature_points:
         vertex = int(model.bound[row_of()[name]])
         for mesh in table.meshes:
@@ -146,12 +152,12 @@ def _correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Floa
             if len(found):
                 wanted = mesh.displacements[found[0]].astype(np.float64)
                 got = moved[mesh.part][found[0]]
-                return np.stack([_turn(a, b) for a, b in zip(got, wanted, strict=True)])
+                return np.stack([_rotation_and_scale(a, b) for a, b in zip(got, wanted, strict=True)])
     return None
 
 
-def _turn(a: Float64, b: Float64) -> Float64:
-    """The smallest turn, with a scale, that takes a to b; the unit matrix where one of them is nothing."""
+def _rotation_and_scale(a: Float64, b: Float64) -> Float64:
+    """(3, 3) smallest rotation, with a scale, that takes a to b; the unit matrix where either is zero."""
     lengths = float(np.linalg.norm(a)), float(np.linalg.norm(b))
     if min(lengths) < 1e-9:
         return np.eye(3)
@@ -164,11 +170,11 @@ def _turn(a: Float64, b: Float64) -> Float64:
     return turn
 
 
-def stretches(part: Part, after: Floating) -> Float64:
-    """(V, 3, 3): how the surface around each vertex was turned and stretched.
+def surface_stretches(part: Part, after: Floating) -> Float64:
+    """(V, 3, 3) linear map of the surface around each vertex from before to after.
 
-    Least squares over the edges around it; along the normal it is turned with the surface and grows as
-    much as the surface does.
+    Least squares over the edges around the vertex; the normal is taken to the new normal, scaled as the
+    surface is.
     """
     from fba.mesh.meshes import vertex_normals
 
@@ -196,7 +202,7 @@ def stretches(part: Part, after: Floating) -> Float64:
     return matrices
 
 
-def slid(
+def keep_lid_on_eyeball(
     eyes: Mapping[str, FittedEye],
     fap: int,
     borders: Integer,
@@ -206,8 +212,9 @@ def slid(
     """Displacements (N, K - 1, 3), metres a step, corrected so that the lid keeps to the eyeball.
 
     before, after: neutral vertices (N, 3) and displacements (N, K - 1, 3) of the old face and of the new
-    one. At every border, a vertex comes to lie as many radii from the centre as it did, more or less what
-    it lacks of that in the neutral face; forwards or backwards, so that heights stay and lids meet.
+    one. At every border a vertex is as many radii from the eyeball's centre as on the old face, apart from
+    the difference that the neutral faces have already. Only depth is corrected, so that heights stay and
+    lids meet.
     """
     eye = eyes.get(LID_FAPS[fap])
     moves = after[1]
@@ -215,13 +222,13 @@ def slid(
         return moves
     steps = np.diff(borders.astype(np.float64))
     zero = int(np.flatnonzero(borders == 0)[0])
-    old, new = (_places(*one, steps, zero) for one in (before, after))
+    old, new = (_positions_at_borders(*one, steps, zero) for one in (before, after))
     wanted = np.linalg.norm(old - eye.was.centre, axis=2) * eye.size
     arms = new - eye.centre
     depth = wanted**2 - arms[..., 0] ** 2 - arms[..., 1] ** 2
     forward = np.sqrt(np.maximum(depth, 0.0)) - arms[..., 2]
-    near = weight_of(eye, old.reshape(-1, 3)).reshape(old.shape[:2]).min(axis=1)
-    # A vertex that leaves the front of the eyeball anywhere on its way is none of a lid's edge.
+    near = eyeball_weight(eye, old.reshape(-1, 3)).reshape(old.shape[:2]).min(axis=1)
+    # A vertex that leaves the front of the eyeball anywhere on its way is not on a lid's edge.
     near *= ((arms[..., 2] > 0) & (depth > 0)).all(axis=1)
     forward = (forward - forward[:, [zero]]) * near[:, None]
     corrected = moves.copy()
@@ -229,8 +236,8 @@ def slid(
     return corrected
 
 
-def _places(vertices: Float64, moves: Float64, steps: Float64, zero: int) -> Float64:
-    """(N, K, 3): where each vertex is at each border."""
+def _positions_at_borders(vertices: Float64, moves: Float64, steps: Float64, zero: int) -> Float64:
+    """(N, K, 3) position of each vertex at each border."""
     path = np.concatenate([np.zeros((len(vertices), 1, 3)), moves * steps[:, None]], axis=1).cumsum(axis=1)
     places: Float64 = vertices[:, None] + path - path[:, [zero]]
     return places

@@ -1,5 +1,5 @@
-"""From a person's aligned feature points to what the face is fitted to: doubtful ones left out, missing
-ones mirrored from the other side, the mouth shut."""
+"""Prepares a person's aligned feature points for fitting: drops doubtful ones, mirrors missing ones from
+the other side, shuts the mouth."""
 
 from __future__ import annotations
 
@@ -12,60 +12,60 @@ from fba.errors import FbaWarning
 from fba.face.feature_points import MIRRORED, names, row_of
 
 APART = 0.012
-"""Points that the face has further apart than this share of the pupils' distance are not one point."""
+"""Points of the face further apart than this share of the pupils' distance must not coincide."""
 TOGETHER = 0.1
-"""Points given nearer to each other than this share of their distance on the face stand on one spot."""
+"""Points given nearer to each other than this share of their distance on the face coincide."""
 FAR_OFF = 0.75
-"""A single point this share of the pupils' distance from where all others say, is a mistake ..."""
+"""A point this share of the pupils' distance from its expected position is a mistake ..."""
 FAR_OFF_USUAL = 6.0
-"""... if it is also so many times as far off as points usually are, and its mate on the other side is not."""
+"""... if it is also this many times the median deviation off, and its mate on the other side is not."""
 TURNED = np.radians(20.0)
-"""The plane of symmetry is found from the points unless it were turned by more."""
+"""The plane of symmetry is measured from the points unless it turns from x = 0 by more than this."""
 PUPIL = 0.2
-"""Of the iris: how far from the middle between the lids a pupil may be."""
+"""Share of the lid opening by which a pupil may be off the middle between the lids."""
 LIPS = (("2.2", "2.3", "8.2"), ("2.6", "2.8", "8.7"), ("2.7", "2.9", "8.8"))
 """Upper and lower inner lip, and the outer lip below."""
 OPEN = 0.01
-"""Share of the mouth's width by which lips may be apart before it is worth a word."""
-KEPT = 0.25
-"""Share of the distance between two such points by which the person's may differ and stay as given."""
+"""Share of the mouth's width by which lips may be apart without a warning."""
+CLOSE_ENOUGH = 0.25
+"""Share of the distance between two such points by which the person's may differ and stay unchanged."""
 TEETH = ("9.10", "9.11")
 FREE = ("7.1", "11.5")
-"""Points that stand on no surface: they say nothing about its shape, and vary from author to author."""
+"""Points on no surface: they say nothing about its shape, and each author places them differently."""
 
 _MEET = (
     *({upper, lower} for upper, lower, _ in LIPS),
     *(set(TEETH), {"6.1", "9.10"}, {"6.1", "9.11"}),
     *({"3.5", "3.1"}, {"3.5", "3.3"}, {"3.6", "3.2"}, {"3.6", "3.4"}),
 )
-"""Points that may well be one, or that `shut` and `between_lids` part."""
+"""Pairs that may coincide, or that `shut_mouth` and `centre_pupils` separate."""
 _OTHER = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 
 
-def without_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2) -> Float64:
-    """Points (84, 3) without those that cannot be meant; an FbaWarning names each.
+def drop_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2) -> Float64:
+    """Points (84, 3) with obvious mistakes set to NaN; an FbaWarning names each.
 
-    expected: where they would be on a person of that size. Two points on one spot that the face has
-    apart: the one that is less like its mate on the other side goes, or that is further from its place.
-    A single point far from its place: it goes.
+    expected: (84, 3), positions on a person of that size, metres. Of two points that coincide but are
+    apart on the face, the one less symmetric to its mate is dropped, or else the one further from its
+    expected position. A single point far from its expected position is dropped.
     """
-    kept = points.copy()
+    result = points.copy()
     away = np.linalg.norm(points - expected, axis=1)
     unit = _between(expected, "3.5", "3.6")
-    told = []
+    messages = []
     rows = np.flatnonzero(np.isfinite(away))
-    unlike = _unlike_mates(points)
+    unlike = _asymmetry(points)
     for place, a in enumerate(rows):
         for b in rows[place + 1 :]:
             apart = float(np.linalg.norm(expected[a] - expected[b]))
-            found = float(np.linalg.norm(points[a] - points[b]))
+            given = float(np.linalg.norm(points[a] - points[b]))
             meet = {names()[a], names()[b]} in _MEET
-            if meet or apart < APART * unit or found > TOGETHER * apart or np.isnan(kept[[a, b], 0]).any():
+            if meet or apart < APART * unit or given > TOGETHER * apart or np.isnan(result[[a, b], 0]).any():
                 continue
             worst = unlike if abs(unlike[a] - unlike[b]) > 0.01 * unit else away
             worse = a if worst[a] > worst[b] else b
-            kept[worse] = np.nan
-            told.append(
+            result[worse] = np.nan
+            messages.append(
                 f"{names()[a]} and {names()[b]} stand on one spot, but the face has them "
                 f"{apart * 1000:.0f} mm apart: {names()[worse]} is left out"
             )
@@ -73,19 +73,21 @@ def without_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2)
     limit = max(FAR_OFF * unit, FAR_OFF_USUAL * usual)
     shift = points - expected
     for row in rows:
-        if np.isnan(kept[row, 0]) or names()[row] in FREE or not away[row] > limit:
+        if np.isnan(result[row, 0]) or names()[row] in FREE or not away[row] > limit:
             continue
         other = _OTHER.get(names()[row])
         mate = shift[row_of()[other]] * (-1.0, 1.0, 1.0) if other else np.full(3, np.nan)
         if not np.linalg.norm(mate - shift[row]) < 0.5 * away[row]:
-            kept[row] = np.nan
-            told.append(f"{names()[row]} is {away[row] * 1000:.0f} mm from where the others put it: left out")
-    if told:
-        _warn("; ".join(told), stacklevel)
-    return kept
+            result[row] = np.nan
+            messages.append(
+                f"{names()[row]} is {away[row] * 1000:.0f} mm from where the others put it: left out"
+            )
+    if messages:
+        _warn("; ".join(messages), stacklevel)
+    return result
 
 
-def _unlike_mates(points: Float64) -> Float64:
+def _asymmetry(points: Float64) -> Float64:
     """(84,) metres between each point and the mirror image of its mate; 0 where there is none."""
     normal, offset = symmetry_plane(points)
     image = points - 2 * np.outer(points @ normal - offset, normal)
@@ -95,8 +97,8 @@ def _unlike_mates(points: Float64) -> Float64:
     return np.nan_to_num(apart)
 
 
-def mirrored(points: Float64) -> tuple[Float64, tuple[str, ...]]:
-    """Points with those missing on one side taken from the other, and the names of these."""
+def mirror_missing(points: Float64) -> tuple[Float64, tuple[str, ...]]:
+    """(points with those missing on one side mirrored from the other, their names)."""
     normal, offset = symmetry_plane(points)
     full = points.copy()
     added = []
@@ -111,7 +113,7 @@ def mirrored(points: Float64) -> tuple[Float64, tuple[str, ...]]:
 def symmetry_plane(points: Float64) -> tuple[Float64, float]:
     """(unit normal, offset) of the plane between left and right, normal . x = offset.
 
-    From the pairs and the midline points that are known; its normal is +x where they do not say.
+    From the known pairs and midline points; the normal is +x where these do not determine it.
     """
     rows = np.array([(row_of()[left], row_of()[right]) for left, right in MIRRORED.items()])
     known = np.isfinite(points[rows]).all(axis=(1, 2))
@@ -127,11 +129,11 @@ def symmetry_plane(points: Float64) -> tuple[Float64, float]:
     return normal, float(np.median(halves @ normal)) if len(halves) else 0.0
 
 
-def between_lids(points: Float64, *, stacklevel: int = 2) -> tuple[Float64, tuple[str, ...]]:
-    """Points with pupils half way up between the lids, and the names of those that were not.
+def centre_pupils(points: Float64, *, stacklevel: int = 2) -> tuple[Float64, tuple[str, ...]]:
+    """(points with pupils half way up between the lids, names of the pupils that were moved).
 
-    Lids are tangent to the iris in a neutral face, so the pupil is in the middle; an FbaWarning tells of
-    one that is further off than a sleepy look explains.
+    Lids are tangent to the iris in a neutral face, so the pupil is in the middle. Raises an FbaWarning for
+    a pupil further off than drooping lids explain.
     """
     full = points.copy()
     moved = []
@@ -152,11 +154,11 @@ def between_lids(points: Float64, *, stacklevel: int = 2) -> tuple[Float64, tupl
     return full, tuple(name for name, _ in moved)
 
 
-def shut(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64:
-    """Points with lips and teeth that meet as those of the reference do; the upper ones stay.
+def shut_mouth(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64:
+    """Points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones stay.
 
     reference: (84, 3), the face's own points at the size of the person. Where the person's mouth is
-    open, the lower lip comes up as a whole, and an FbaWarning tells how far.
+    open, the whole lower lip is raised, and an FbaWarning says how far.
     """
     full = points.copy()
     width = _between(full, "8.3", "8.4")
@@ -169,7 +171,7 @@ def shut(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64
         if np.isnan(full[a]).any():
             full[a] = full[b] - apart  # NaN where neither is known
         rise = full[a] + apart - full[b]
-        if np.linalg.norm(rise) < KEPT * np.linalg.norm(apart):
+        if np.linalg.norm(rise) < CLOSE_ENOUGH * np.linalg.norm(apart):
             continue
         if np.isfinite(rise).all():
             full[b] += rise
@@ -179,9 +181,9 @@ def shut(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64
         elif np.isfinite(full[a]).all():
             full[b] = full[a] + apart
     if abs(widest) > OPEN * width:
-        found = "the mouth is open by" if widest > 0 else "the lower lip is in the upper one by"
+        fault = "the mouth is open by" if widest > 0 else "the lower lip is in the upper one by"
         _warn(
-            f"{found} {abs(widest) * 1000:.1f} mm, but the lips of a neutral face touch: "
+            f"{fault} {abs(widest) * 1000:.1f} mm, but the lips of a neutral face touch: "
             "the lower lip was moved",
             stacklevel,
         )

@@ -10,29 +10,32 @@ import numpy as np
 from fba.arrays import Bool, Float64, Floating
 from fba.easing import smoothstep
 from fba.errors import FbaWarning
-from fba.face.calibration._field import between
+from fba.face.calibration._field import linear_field
 from fba.face.eyeball import Eyeball
 
 LID = 1.10
-"""Vertices within so many radii of the eyeball's centre lie on it: lids, and the skin that lines them."""
+"""Skin within this many radii of the eyeball's centre lies on it: the lids and their lining."""
 REACH = 1.6
-"""Beyond so many radii the skin knows nothing of the eyeball."""
+"""Beyond this many radii the eyeball has no influence on the skin."""
 SIZES = (0.75, 1.35)
-"""How far an eyeball may grow or shrink against the face around it."""
+"""Limits of an eyeball's size relative to the face around it."""
 WIDEST_IRIS = np.radians(42.0)
 """Half the angle that the widest iris takes of its eyeball."""
 BARELY = 1.003
 """Radii from the centre at which a lid is just outside the eyeball."""
 DEEP = 0.0005
-"""Metres by which an eyeball may go back without a word."""
+"""Metres by which an eyeball may be set back without a warning."""
 LEAST = 0.02
-"""Points that belong to the eyeball by less do not count for it."""
+"""Points of less weight (`eyeball_weight`) are ignored for the eyeball."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedEye:
-    """Where an eyeball went. centre: (3,), radius: new; was: the eyeball before; iris, iris_was: angle
-    between the gaze and the edge of the iris, radians."""
+    """An eyeball after fitting; call it with vertices (N, 3) of the old one.
+
+    centre: (3,) and radius: metres, after. was: the eyeball before. iris, iris_was: angle between the gaze
+    and the edge of the iris after and before, radians.
+    """
 
     was: Eyeball
     centre: Float64
@@ -41,7 +44,7 @@ class FittedEye:
     iris_was: float
 
     def __call__(self, vertices: Floating) -> Float64:
-        """Vertices of the eyeball moved: turned nowhere, scaled, the iris widened along the sphere."""
+        """Vertices (N, 3) of the old eyeball moved and scaled, the iris widened on the sphere."""
         arms = np.asarray(vertices, dtype=np.float64) - self.was.centre
         distance = np.linalg.norm(arms, axis=1)
         unit = arms / np.maximum(distance, 1e-12)[:, None]
@@ -71,13 +74,13 @@ def fit_eye(
     iris: tuple[float, float],
     given: tuple[Float64, Float64],
 ) -> FittedEye:
-    """The sphere that fits under the fitted lids as the old one under the old.
+    """The eyeball that fits under the fitted lids as the old one does under the old lids.
 
     skin, fitted: (V, 3) vertices before and after. pupil: its point before and after. size: of the
-    fitted face around the eye by the old one. pupil_given: keep the pupil exactly where it is; the centre
-    lies straight behind it. iris: its diameter before and after, metres. given: (K, 3) points of the
-    lids before, and where they must be; if they get inside the eyeball it goes back, and an FbaWarning
-    tells how far.
+    fitted face around the eye relative to the old one. pupil_given: keep the pupil exactly where it is;
+    the centre lies straight behind it. iris: its diameter before and after, metres. given: (K, 3) points
+    of the lids before, and their targets; if they get inside the eyeball it is set back, and an
+    FbaWarning says how far.
     """
     from scipy.optimize import least_squares
 
@@ -115,15 +118,15 @@ def fit_eye(
         for across, ball in ((iris[0], eye.radius), (iris[1], radius))
     ]
     clear = np.minimum(np.linalg.norm(given[0] - eye.centre, axis=1) / eye.radius, BARELY)
-    values[1] -= _sunk(given[1], clear * radius, centre(values), eye.side)
+    values[1] -= _setback(given[1], clear * radius, centre(values), eye.side)
     fitted_eye = FittedEye(eye, centre(values), radius, angles[1], angles[0])
     # The pupil's own vertex may stand a little off the axis.
     off = (front - fitted_eye(pupil[0][None])[0]) * (1.0, 1.0, 0.0)
     return replace(fitted_eye, centre=fitted_eye.centre + off)
 
 
-def _sunk(given: Float64, least: Float64, centre: Float64, side: str) -> float:
-    """How far an eyeball must go back for points (K, 3) to be at least so far from its centre: metres."""
+def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> float:
+    """Metres by which an eyeball must go back for points (K, 3) to be at least (K,) from its centre."""
     across = np.hypot(*(given - centre)[:, :2].T)
     room = np.sqrt(np.maximum(least**2 - across**2, 0.0))
     back = float(np.where(room > 0, centre[2] + room - given[:, 2], 0.0).max(initial=0.0))
@@ -137,48 +140,55 @@ def _sunk(given: Float64, least: Float64, centre: Float64, side: str) -> float:
     return back
 
 
-def lids_on(eye: FittedEye, skin: Float64, fitted: Float64, sources: Float64, targets: Float64) -> Float64:
-    """The skin around an eyeball laid on it as it lay before: (V, 3).
+def lay_lids_on(
+    eye: FittedEye, skin: Float64, fitted: Float64, sources: Float64, targets: Float64
+) -> Float64:
+    """(V, 3) the skin, laid on an eyeball as it lay before.
 
-    As far above the sphere as it was, in proportion, near it; as fitted, further out. The given points
-    (sources before, targets after) stay where they must be, and nothing but them is inside the eyeball
-    that was outside.
+    Near the sphere it keeps its height above it, in proportion; further out it stays as fitted. The given
+    points (sources before, targets after) reach their targets, and no other vertex that was outside the
+    eyeball ends up inside it.
     """
     moved = fitted.copy()
     near = np.linalg.norm(skin - eye.was.centre, axis=1) < REACH * eye.was.radius
-    moved[near] = _laid(eye, skin[near], fitted[near])
-    weight = weight_of(eye, sources)
+    moved[near] = _lay_on(eye, skin[near], fitted[near])
+    weight = eyeball_weight(eye, sources)
     local = weight > LEAST
     if local.any():
-        # What the given points still want after that, they get, with all that lies between them.
-        left = (targets[local] - _laid(eye, sources[local], targets[local])) / weight[local, None]
-        moved[near] += weight_of(eye, skin[near])[:, None] * between(sources[local], left)(skin[near])
-    return _outside(eye, skin, moved, near, sources)
+        # The remaining errors of the given points are interpolated over the skin between them.
+        left = (targets[local] - _lay_on(eye, sources[local], targets[local])) / weight[local, None]
+        moved[near] += eyeball_weight(eye, skin[near])[:, None] * linear_field(sources[local], left)(
+            skin[near]
+        )
+    return _push_outside(eye, skin, moved, near, sources)
 
 
-def _laid(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
+def _lay_on(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
     distance = np.linalg.norm(skin - eye.was.centre, axis=1)
     arms = fitted - eye.centre
     length = np.maximum(np.linalg.norm(arms, axis=1), 1e-12)
-    laid: Float64 = fitted + arms * (weight_of(eye, skin) * (distance * eye.size / length - 1))[:, None]
+    laid: Float64 = fitted + arms * (eyeball_weight(eye, skin) * (distance * eye.size / length - 1))[:, None]
     return laid
 
 
-def weight_of(eye: FittedEye, places: Float64) -> Float64:
-    """How much a place belongs to the eyeball: 1 on it, 0 out of its reach."""
-    distance = np.linalg.norm(places - eye.was.centre, axis=1)
+def eyeball_weight(eye: FittedEye, points: Float64) -> Float64:
+    """(N,) influence of the eyeball on points (N, 3): 1 on it, 0 beyond `REACH`."""
+    distance = np.linalg.norm(points - eye.was.centre, axis=1)
     weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID) / (REACH - LID))
     return weight
 
 
-def _outside(
+def _push_outside(
     eye: FittedEye,
     skin: Float64,
     moved: Float64,
     near: Bool,
     sources: Float64,
 ) -> Float64:
-    """What was outside the eyeball and has come inside, put back onto it; given points stay."""
+    """(V, 3) moved, with vertices that have got inside the eyeball put back on it; given points stay.
+
+    Changes `moved` in place.
+    """
     from scipy.spatial import cKDTree
 
     before = np.linalg.norm(skin - eye.was.centre, axis=1) / eye.was.radius

@@ -1,4 +1,4 @@
-"""A smooth deformation of space that takes given points exactly to others, and folds it makes in a mesh."""
+"""Smooth deformations of space that take given points exactly to others, and tests for folds."""
 
 from __future__ import annotations
 
@@ -12,47 +12,50 @@ from fba.face.feature_points import names
 from fba.mesh.meshes import vertex_normals
 
 WELL_KNOWN = 0.02
-"""Metres: the affine part is trusted along directions in which the points are spread by more."""
+"""Metres: the affine part is used along directions in which the points spread by more than this."""
 ANCHOR_DISTANCE = 0.08
-"""Metres from every point, on the scale of an adult head: beyond it the affine part alone holds."""
+"""Metres from every point, for an adult head: beyond it only the affine part acts."""
 ANCHORS = 60
 SAME_PLACE = 1e-5
-"""Metres between sources that are taken as one."""
+"""Sources within this many metres are merged into one."""
 SLACK = 1e-9
-"""Smoothing of the anchors: they hold the far field, but need not be met."""
+"""Smoothing of the anchors: they hold the far field at zero without being met exactly."""
 LEAST_VOLUME = 0.04
-"""Share of its usual volume to which space may be pressed together."""
+"""Smallest local volume of the deformation, as a share of the usual one, that is not a fold."""
 KERNELS = ("thin_plate_spline", "cubic", "linear")
-"""From the smoothest to the tamest."""
+"""Kernels of the radial basis functions, from the smoothest to the least prone to fold."""
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A deformation: call it with places (N, 3). matrix, origin, target: its affine part."""
+    """A deformation of space: call it with points (N, 3), metres.
+
+    matrix, origin, target: its affine part. rest: the non-affine part, a function of points (N, 3).
+    """
 
     matrix: Float64
     origin: Float64
     target: Float64
     rest: Any
 
-    def __call__(self, places: Floating) -> Float64:
-        flat = np.asarray(places, dtype=np.float64)
+    def __call__(self, points: Floating) -> Float64:
+        flat = np.asarray(points, dtype=np.float64)
         moved: Float64 = self.affine(flat) + self.rest(flat)
         return moved
 
-    def affine(self, places: Float64) -> Float64:
-        moved: Float64 = (places - self.origin) @ self.matrix.T + self.target
+    def affine(self, points: Float64) -> Float64:
+        moved: Float64 = (points - self.origin) @ self.matrix.T + self.target
         return moved
 
-    def turns(self, places: Floating) -> Float64:
-        """(N, 3, 3): the rotation in the deformation at each place, without its stretch."""
-        u, _, vt = np.linalg.svd(self.jacobians(places))
+    def rotations(self, points: Floating) -> Float64:
+        """(N, 3, 3) rotation of the deformation at each point, without its stretch."""
+        u, _, vt = np.linalg.svd(self.jacobians(points))
         turned: Float64 = u @ vt
         return turned
 
-    def jacobians(self, places: Floating, step: float = 1e-4) -> Float64:
-        """(N, 3, 3): how the deformation stretches and turns space at each place."""
-        flat = np.asarray(places, dtype=np.float64)
+    def jacobians(self, points: Floating, step: float = 1e-4) -> Float64:
+        """(N, 3, 3) Jacobian of the deformation at each point, by central differences of `step` metres."""
+        flat = np.asarray(points, dtype=np.float64)
         columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * step]
         return np.stack(columns, axis=2) / (2 * step)
 
@@ -60,19 +63,19 @@ class Field:
 def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str, size: float) -> Field:
     """The deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
 
-    size: how big the person is by the face. An affine part, trusted as far as the points are spread, and
-    a radial basis function (thin plate, biharmonic or triharmonic) for the rest, which anchors on the
-    mesh hold at zero far away from all points: the back of a head does not follow the tip of a nose.
+    size: of the person relative to the face. The affine part is used along directions in which the points
+    spread. A radial basis function (`KERNELS`) does the rest; anchors on the mesh hold it at zero far from
+    all points, so that the back of a head does not follow the tip of a nose.
     """
     from scipy.interpolate import RBFInterpolator
 
-    sources, targets = _distinct(sources, targets)
+    sources, targets = _merge_coincident(sources, targets)
     origin, target = sources.mean(axis=0), targets.mean(axis=0)
     here, there = sources - origin, targets - target
     spread = here.T @ here / len(here) + WELL_KNOWN**2 * np.eye(3)
     pull = there.T @ here / len(here) + size * WELL_KNOWN**2 * np.eye(3)
     matrix = pull @ np.linalg.inv(spread)
-    anchors = far_from(np.asarray(mesh, dtype=np.float64), sources)
+    anchors = anchors_far_from(np.asarray(mesh, dtype=np.float64), sources)
     centres = np.vstack([sources, anchors])
     left = np.vstack([there - here @ matrix.T, np.zeros((len(anchors), 3))])
     smoothing = np.concatenate([np.zeros(len(sources)), np.full(len(anchors), SLACK)])
@@ -81,8 +84,8 @@ def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str,
     return Field(matrix, origin, target, rest)
 
 
-def far_from(mesh: Float64, sources: Float64) -> Float64:
-    """Up to `ANCHORS` places spread over that part of a mesh which is far from all sources: (K, 3)."""
+def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
+    """(K, 3): up to `ANCHORS` vertices spread over the part of a mesh that is far from all sources."""
     from scipy.spatial import cKDTree
 
     away = cKDTree(sources).query(mesh)[0]
@@ -95,28 +98,28 @@ def far_from(mesh: Float64, sources: Float64) -> Float64:
             break
         chosen.append(nearest)
         distance = np.minimum(distance, np.linalg.norm(rest - rest[nearest], axis=1))
-    places: Float64 = rest[chosen]
-    return places
+    points: Float64 = rest[chosen]
+    return points
 
 
-def bumps(centres: Float64, shifts: Float64, width: float) -> Any:
-    """A field of shifts that are met exactly at the centres and fade within about `width` metres."""
-    centres, shifts = _distinct(centres, shifts)
+def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
+    """A function from points (N, 3) to shifts: exact at the centres, fading within about `width` metres."""
+    centres, shifts = _merge_coincident(centres, shifts)
     gram = np.exp(-_squares(centres, centres) / (2 * width**2))
     strength = np.linalg.lstsq(gram, shifts, rcond=None)[0]
 
-    def moved(places: Float64) -> Float64:
-        found: Float64 = np.exp(-_squares(places, centres) / (2 * width**2)) @ strength
+    def moved(points: Float64) -> Float64:
+        found: Float64 = np.exp(-_squares(points, centres) / (2 * width**2)) @ strength
         return found
 
     return moved
 
 
-def between(centres: Float64, shifts: Float64) -> Any:
-    """A field of shifts that are met exactly at the centres and go evenly from one to the other."""
+def linear_field(centres: Float64, shifts: Float64) -> Any:
+    """A function from points (N, 3) to shifts (N, 3): exact at the centres, linear between them."""
     from scipy.interpolate import RBFInterpolator
 
-    centres, shifts = _distinct(centres, shifts)
+    centres, shifts = _merge_coincident(centres, shifts)
     return RBFInterpolator(centres, shifts, kernel="linear", degree=0)
 
 
@@ -125,34 +128,35 @@ def _squares(a: Float64, b: Float64) -> Float64:
     return squares
 
 
-def _distinct(sources: Float64, targets: Float64) -> tuple[Float64, Float64]:
-    """Sources that stand on one spot (upper and lower lip) made one, going to the middle of its targets."""
+def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Float64]:
+    """Sources and targets (K, 3), coinciding sources (as of touching lips) merged, their targets averaged."""
     from scipy.spatial import cKDTree
 
     group = np.arange(len(sources))
     for a, b in sorted(cKDTree(sources).query_pairs(SAME_PLACE)):
         group[group == group[b]] = group[a]
-    kept, inverse = np.unique(group, return_inverse=True)
+    spots, inverse = np.unique(group, return_inverse=True)
     count = np.bincount(inverse).astype(np.float64)[:, None]
-    summed = np.zeros((len(kept), 6))
+    summed = np.zeros((len(spots), 6))
     np.add.at(summed, inverse, np.hstack([sources, targets]))
     mean = summed / count
     return mean[:, :3], mean[:, 3:]
 
 
-def folded(field: Field, mesh: Floating, size: float) -> Intp:
-    """Vertices at which the deformation turns space inside out, or nearly so; size: usual, of lengths."""
+def folded_vertices(field: Field, mesh: Floating, size: float) -> Intp:
+    """Vertices at which the deformation turns space inside out, or nearly so.
+
+    size: usual factor of lengths.
+    """
     volume = np.linalg.det(field.jacobians(mesh)) / size**3
     return np.flatnonzero(~(volume > LEAST_VOLUME))
 
 
-def turned_over(before: Floating, after: Float64, triangles: Integer) -> tuple[Intp, float]:
-    """Triangles that look the other way than their surroundings do after a deformation, and their area.
+def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) -> tuple[Intp, float]:
+    """(numbers of the triangles that a deformation turns over, their share of the total area before).
 
-    The area is a share of the whole, before.
-
-    Whether a triangle is turned is seen against the mean of its neighbours' normals, before and after: a
-    turn of the whole surface is none of the triangle.
+    A triangle has turned over where its normal agreed with the mean of its neighbours' normals before but
+    opposes it after: a rotation of the surface around it does not count.
     """
     agreeing, areas = [], []
     for vertices in (np.asarray(before, dtype=np.float64), after):
@@ -165,13 +169,13 @@ def turned_over(before: Floating, after: Float64, triangles: Integer) -> tuple[I
     return wrong, float(areas[0][wrong].sum() / max(areas[0].sum(), 1e-30))
 
 
-def blamed(places: Float64, sources: Float64, rows: Intp, count: int = 4) -> tuple[str, ...]:
-    """Names of the feature points (rows, at sources) that are nearest to most of the places."""
+def nearest_points(points: Float64, sources: Float64, rows: Intp, count: int = 4) -> tuple[str, ...]:
+    """Names of the feature points (rows, at sources (N, 3)) that are nearest to most of the points."""
     from scipy.spatial import cKDTree
 
-    if not len(places) or not len(sources):
+    if not len(points) or not len(sources):
         return ()
-    _, near = cKDTree(sources).query(places, k=min(3, len(sources)))
+    _, near = cKDTree(sources).query(points, k=min(3, len(sources)))
     votes = np.bincount(np.ravel(near), minlength=len(sources))
     order = np.argsort(-votes, kind="stable")[:count]
     return tuple(names()[int(rows[place])] for place in order if votes[place])

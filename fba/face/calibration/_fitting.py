@@ -1,4 +1,4 @@
-"""FDP calibration: a face model takes the shape of a person of whom feature points are known."""
+"""FDP calibration: fits a face model to a person's feature points."""
 
 from __future__ import annotations
 
@@ -13,10 +13,16 @@ import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning, ModelError
-from fba.face.calibration._align import Alignment, align, centred, known_rows
-from fba.face.calibration._complete import between_lids, mirrored, shut, without_mistakes
-from fba.face.calibration._field import KERNELS, blamed, deformation, folded, turned_over
-from fba.face.calibration._shape import INNER, Shape, deform, rebuilt
+from fba.face.calibration._align import Alignment, align, centre_on_pupils, known_rows
+from fba.face.calibration._complete import centre_pupils, drop_mistakes, mirror_missing, shut_mouth
+from fba.face.calibration._field import (
+    KERNELS,
+    deformation,
+    folded_vertices,
+    nearest_points,
+    turned_over_triangles,
+)
+from fba.face.calibration._shape import INNER, Shape, deform, rebuild_part
 from fba.face.fapu import PER_DISTANCE
 from fba.face.feature_points import names, row_of
 from fba.face.model import FaceModel, Part
@@ -28,9 +34,9 @@ if TYPE_CHECKING:
 
 
 TURNED_OVER = 0.002
-"""Share of the surface that may turn over, in wrinkles, before the deformation counts as folded."""
+"""Share of the surface that may turn over, in wrinkles, before the deformation is refused as folded."""
 FAPU_DISTANCES = ("ES0", "ENS0", "MNS0", "MW0", "IRISD0")
-"""The distances of a face that the FAPU are measured by."""
+"""The distances of a face that the FAPU are fractions of."""
 
 
 def fit(
@@ -49,18 +55,18 @@ def fit(
     every neutral face. The person keeps size and axes where unit and axes are a file's usual ones; the
     middle between the pupils stays where the model has it.
 
-    tables: how the model's FaceDefTables follow: "carry" bends them with the surface, "author" makes new
-    ones, "auto" carries them, and where they break more of the standard's rules than the model did, makes new
-    ones and takes for each FAP what serves it better.
+    tables: how FaceDefTables are made: "carry" bends the model's with the surface, "author" makes new ones,
+    "auto" carries them and, if these break more of the standard's rules than the model did, also makes new
+    ones and keeps the better ones of each FAP.
     name: of the fitted model, by default the model's own.
 
-    FbaWarning for what was odd: left and right swapped, a point out of place and left out, an open mouth.
-    Raises ModelError where the points are too few, stand on one spot, give no FAPU, or lie so that the
-    skin would fold; it names them.
+    Warns with FbaWarning about left and right swapped, misplaced points that were left out, an open mouth.
+    Raises ModelError, naming the points, where these are too few, coincide, give no FAPU, or would make
+    the skin fold.
     """
     if tables not in ("auto", "carry", "author"):
         raise ValueError(f"tables must be 'auto', 'carry' or 'author', not {tables!r}")
-    given = _checked(points)
+    given = _check_points(points)
     aligned = align(given, model.points, unit=unit)
     if aligned.mirrored:
         warnings.warn(
@@ -69,17 +75,17 @@ def fit(
             FbaWarning,
             stacklevel=2,
         )
-    kept = without_mistakes(_on_their_sides(aligned.points), aligned.expected)
-    full, added = mirrored(kept)
-    full, unsure = between_lids(shut(full, aligned.expected))
-    targets = centred(full, model.points)
+    plausible = drop_mistakes(_swap_to_own_sides(aligned.points), aligned.expected)
+    full, added = mirror_missing(plausible)
+    full, unsure = centre_pupils(shut_mouth(full, aligned.expected))
+    targets = centre_on_pupils(full, model.points)
     targets[np.isnan(model.points).any(axis=1)] = np.nan
     known = known_rows(targets)
     size = _size(model.points[known], targets[known])
-    iris = _iris(model, targets, size)
+    iris = _iris_diameters(model, targets, size)
     sure = known & ~np.isin(names(), unsure)
-    shape = _smooth(model, targets, known, sure, size, iris)
-    parts = tuple(rebuilt(part, shape.vertices[part.name]) for part in model.parts)
+    shape = _deform_without_folds(model, targets, known, sure, size, iris)
+    parts = tuple(rebuild_part(part, shape.vertices[part.name]) for part in model.parts)
     _check_folds(model, parts, targets, known)
     fitted = replace(
         model,
@@ -87,7 +93,7 @@ def fit(
         points=shape.points,
         tables=(),
         name=model.name if name is None else name,
-        notes={**model.notes, "fitted": _told(aligned, known, added)},
+        notes={**model.notes, "fitted": _fit_note(aligned, known, added)},
     )
     return _with_tables(model, fitted, shape, tables)
 
@@ -95,8 +101,8 @@ def fit(
 def points_of_distances(model: FaceModel, distances: Mapping[str, float]) -> Float64:
     """Feature points (84, 3) of a face of which only the distances behind the FAPU are known.
 
-    distances: any of `FAPU_DISTANCES` in any unit, as Xface files give them; ES0 tells the size, and
-    must be there. NaN for points that no distance moves. Raises ModelError for a distance that is
+    distances: any of `FAPU_DISTANCES` in any unit, as Xface files give them; ES0 is required, as it sets
+    the size. NaN for points that no distance moves. Raises ModelError for a distance that is
     unknown or not positive.
     """
     for key, value in distances.items():
@@ -128,7 +134,7 @@ def points_of_distances(model: FaceModel, distances: Mapping[str, float]) -> Flo
     return points
 
 
-def _checked(points: npt.ArrayLike) -> Float64:
+def _check_points(points: npt.ArrayLike) -> Float64:
     given = np.array(points, dtype=np.float64)
     if given.shape != (len(names()), 3):
         raise ModelError(f"feature points must have shape ({len(names())}, 3), not {given.shape}")
@@ -140,7 +146,7 @@ def _checked(points: npt.ArrayLike) -> Float64:
     return given
 
 
-def _on_their_sides(points: Float64) -> Float64:
+def _swap_to_own_sides(points: Float64) -> Float64:
     from fba.face.importers.points.fdp_data import repair_sides
 
     right, swaps, wrong = repair_sides(points)
@@ -152,7 +158,7 @@ def _on_their_sides(points: Float64) -> Float64:
 
 
 def _size(here: Float64, there: Float64) -> float:
-    """How big the person is by the model: the median over all pairs of points, which no outlier moves."""
+    """The person's size relative to the model: the median over all pairs of points, so no outlier counts."""
     from scipy.spatial.distance import pdist
 
     before, after = pdist(here), pdist(there)
@@ -160,8 +166,8 @@ def _size(here: Float64, there: Float64) -> float:
     return float(np.median(after[apart] / before[apart]))
 
 
-def _iris(model: FaceModel, targets: Float64, size: float) -> tuple[float, float]:
-    """Diameter of the iris before and after: the height of the lid opening, as the neutral face has it."""
+def _iris_diameters(model: FaceModel, targets: Float64, size: float) -> tuple[float, float]:
+    """(before, after) diameter of the iris, metres: the height of the lid opening of a neutral face."""
     row = row_of()
     before = model.fapu.IRISD * PER_DISTANCE
     heights = [
@@ -177,10 +183,13 @@ def _iris(model: FaceModel, targets: Float64, size: float) -> tuple[float, float
     return before, float(np.mean(known)) if known else before * size
 
 
-def _smooth(
+def _deform_without_folds(
     model: FaceModel, targets: Float64, known: Bool, sure: Bool, size: float, iris: tuple[float, float]
 ) -> Shape:
-    """The smoothest deformation that does not fold; ModelError naming points where every one does."""
+    """The parts under the smoothest deformation that does not fold.
+
+    Raises ModelError, naming the points, where every kernel folds.
+    """
     outer = known & np.array([name not in INNER for name in names()])
     pupils = [row_of()["3.5"], row_of()["3.6"]]
     if outer.sum() < 4:
@@ -193,66 +202,69 @@ def _smooth(
     worst: Intp = np.zeros(0, dtype=np.intp)
     for kernel in KERNELS:
         field = deformation(sources, places, mesh, kernel, size)
-        worst = folded(field, mesh, size)
+        worst = folded_vertices(field, mesh, size)
         if not len(worst):
             return deform(model, field, targets, sure, iris)
-    blame = blamed(mesh[worst].astype(np.float64), sources, rows)
+    near = nearest_points(mesh[worst].astype(np.float64), sources, rows)
     raise ModelError(
         f"the face would fold: {len(worst)} of {len(mesh)} vertices of the skin turn inside out around "
-        f"feature points {', '.join(blame)}; are these where they should be?"
+        f"feature points {', '.join(near)}; are these where they should be?"
     )
 
 
 def _check_folds(model: FaceModel, parts: tuple[Part, ...], targets: Float64, known: Bool) -> None:
-    """The same for the finished skin, laid on the eyeballs as well."""
+    """Raise ModelError where too many triangles of the finished skin have turned over."""
     for old, new in zip(model.parts, parts, strict=True):
         if old.kind not in ("skin", "mouth") or not len(old.triangles):
             continue
-        wrong, share = turned_over(old.vertices, new.vertices.astype(np.float64), old.triangles)
+        wrong, share = turned_over_triangles(old.vertices, new.vertices.astype(np.float64), old.triangles)
         if share > TURNED_OVER:
             rows = np.flatnonzero(known)
             where = new.vertices[new.triangles[wrong]].mean(axis=1).astype(np.float64)
             raise ModelError(
                 f"part {old.name!r} would fold: {len(wrong)} of {len(old.triangles)} triangles turn over "
-                f"around feature points {', '.join(blamed(where, targets[rows], rows))}; "
+                f"around feature points {', '.join(nearest_points(where, targets[rows], rows))}; "
                 "are these where they should be?"
             )
 
 
 def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) -> FaceModel:
-    from fba.face.calibration._carry import carried_tables
+    from fba.face.calibration._carry import carry_tables
     from fba.face.checks.posing import Poser
 
     if not model.tables:
         return fitted
     if how == "author":
-        return _authored(model, fitted)
-    carried = replace(fitted, tables=carried_tables(model, fitted.parts, fitted.points, fitted.fapu, shape))
+        return _author_anew(model, fitted)
+    carried = replace(fitted, tables=carry_tables(model, fitted.parts, fitted.points, fitted.fapu, shape))
     if how == "carry":
         return carried
     bent = Poser(carried)
-    broken = _errors(bent)
-    if broken <= _errors(Poser(model)):
+    broken = _count_errors(bent)
+    if broken <= _count_errors(Poser(model)):
         return carried
-    new = Poser(_authored(model, fitted), like=bent)
-    best = Poser(_best_of(new, bent), like=new)
-    return min((new.model, _errors(new)), (best.model, _errors(best)), (carried, broken), key=itemgetter(1))[
-        0
-    ]
+    new = Poser(_author_anew(model, fitted), like=bent)
+    best = Poser(_best_tables(new, bent), like=new)
+    return min(
+        (new.model, _count_errors(new)),
+        (best.model, _count_errors(best)),
+        (carried, broken),
+        key=itemgetter(1),
+    )[0]
 
 
-def _best_of(first: Poser, second: Poser) -> FaceModel:
-    """The first model's tables, but the second's for every FAP that they serve better."""
+def _best_tables(first: Poser, second: Poser) -> FaceModel:
+    """The first model with the second's tables for every FAP where these break fewer rules."""
     chosen = {table.fap: table for table in first.model.tables}
     for table in second.model.tables:
         number = table.fap
-        if number not in chosen or _errors(second, number) < _errors(first, number):
+        if number not in chosen or _count_errors(second, number) < _count_errors(first, number):
             chosen[number] = table
     lost = {number: why for number, why in first.model.lost.items() if number not in chosen}
     return first.model.with_tables(tuple(chosen.values()), lost)
 
 
-def _authored(model: FaceModel, fitted: FaceModel) -> FaceModel:
+def _author_anew(model: FaceModel, fitted: FaceModel) -> FaceModel:
     from fba.face.authoring import author
 
     made = author(
@@ -264,18 +276,18 @@ def _authored(model: FaceModel, fitted: FaceModel) -> FaceModel:
         fit=model.fit,
         notes=fitted.notes,
     )
-    served: tuple[FaceDefTables, ...] = tuple(one for one in made.tables if one.fap not in model.lost)
-    return made.with_tables(served, {**made.lost, **model.lost})
+    tables: tuple[FaceDefTables, ...] = tuple(one for one in made.tables if one.fap not in model.lost)
+    return made.with_tables(tables, {**made.lost, **model.lost})
 
 
-def _errors(poser: Poser, fap: int | None = None) -> int:
+def _count_errors(poser: Poser, fap: int | None = None) -> int:
     from fba.face.checks.fap_checks import check_posed
 
     findings = check_posed(poser, range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1) if fap is None else [fap])
     return sum(finding.severity == "error" for finding in findings)
 
 
-def _told(aligned: Alignment, known: Bool, added: tuple[str, ...]) -> str:
+def _fit_note(aligned: Alignment, known: Bool, added: tuple[str, ...]) -> str:
     text = f"to {int(known.sum())} feature points of a person"
     if aligned.unit:
         text += f" in {aligned.unit}"

@@ -10,8 +10,8 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Floating
 from fba.face.calibration._align import known_rows
-from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lids_on
-from fba.face.calibration._field import Field, bumps
+from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lay_lids_on
+from fba.face.calibration._field import Field, bump_field
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
 from fba.face.feature_points import names, row_of
 from fba.mesh.meshes import vertex_normals
@@ -29,9 +29,9 @@ ON_LIDS = ("lash", "brow", "hair", "other")
 """Kinds of parts that are carried by the skin under them."""
 LIPS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")
 SNAP = 2e-5
-"""Metres that no eye sees."""
+"""Metres: vertices this close to a target are moved onto it; too little to be seen."""
 BESIDE = 0.005
-"""Metres sideways within which teeth are behind a point of the lips."""
+"""Metres in x and y within which teeth count as behind a point of the lips."""
 TONGUE_WIDTH = 0.012
 """Metres within which the tongue follows a given point of it."""
 
@@ -40,18 +40,18 @@ TONGUE_WIDTH = 0.012
 class Shape:
     """Vertices of every part by name, the feature points (84, 3), and what became of the eyes.
 
-    turns: (V, 3, 3), by how much the surroundings of each vertex were turned, for parts that are not rigid.
+    rotations: (V, 3, 3), rotation of the surroundings of each vertex, for parts that are not rigid.
     """
 
     vertices: Mapping[str, Float64]
     points: Float64
     eyes: Mapping[str, FittedEye]
-    turns: Mapping[str, Float64]
+    rotations: Mapping[str, Float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Similar:
-    """A scale and a shift, that leave a rigid body what it is: called with places (N, 3)."""
+class Similarity:
+    """A uniform scale and a shift: call it with points (N, 3)."""
 
     origin: Float64
     target: Float64
@@ -63,14 +63,15 @@ class Similar:
 
 
 def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: tuple[float, float]) -> Shape:
-    """All parts and points of a model after a deformation.
+    """All parts and feature points of a model after a deformation.
 
-    targets: (84, 3), where the feature points must come to stand, NaN where only the field says. given:
-    (84,), those that the person's data say for sure. iris: its diameter before and after.
+    targets: (84, 3), required positions of the feature points in metres, NaN where the field decides. given:
+    (84,), mask of the points that the person's data give reliably. iris: its diameter before and after,
+    metres.
     """
     row = row_of()
     vertices = {part.name: field(part.vertices) for part in model.parts}
-    fixed = _fixed(model, targets)
+    fixed = _surface_points(model, targets)
     eyes: dict[str, FittedEye] = {}
     lids = {side: [row[name] for name in pair if given[row[name]]] for side, pair in LID_POINTS.items()}
     skin = [part for part in model.parts if part.kind in ("skin", "mouth")]
@@ -83,7 +84,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
             pupil = eye.centre + np.array([0.0, 0.0, eye.radius])
         wanted = targets[row[PUPIL_POINT[side]]]
         wanted = field(pupil[None])[0] if np.isnan(wanted).any() else wanted
-        around = similar(model.part(eye.part).vertices, vertices[eye.part]).size
+        around = fit_similarity(model.part(eye.part).vertices, vertices[eye.part]).size
         eyes[side] = fit_eye(
             eye,
             joined,
@@ -94,7 +95,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
             iris=iris,
             given=(model.points[lids[side]], targets[lids[side]]),
         )
-        moved = lids_on(eyes[side], joined, moved, *fixed)
+        moved = lay_lids_on(eyes[side], joined, moved, *fixed)
     start = 0
     for part in skin:
         vertices[part.name] = moved[start : start + len(part.vertices)]
@@ -106,23 +107,23 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
             vertices[part.name] = nearest(part.vertices)
     for part in model.parts:
         if part.kind in ON_LIDS and eyes and len(joined):
-            vertices[part.name] += _carried(part.vertices, joined, moved - plain, eyes)
-    _snap(model, vertices, targets)
-    teeth, tongue = _mouth(model, field, targets, given)
+            vertices[part.name] += _lid_shift_at(part.vertices, joined, moved - plain, eyes)
+    _snap_to_points(model, vertices, targets)
+    teeth, tongue = _fit_teeth_and_tongue(model, field, targets, given)
     for part in model.of_kind("teeth"):
         vertices[part.name] = teeth[_jaw(model, part)](part.vertices)
     for part in model.of_kind("tongue"):
         vertices[part.name] = tongue(part.vertices)
     points = _points(model, vertices, field, targets, teeth, tongue)
     soft = [part for part in model.parts if part.kind not in ("eye", "teeth", "tongue")]
-    turns = {part.name: field.turns(part.vertices) for part in soft} if model.tables else {}
-    return Shape(vertices, points, eyes, turns)
+    rotations = {part.name: field.rotations(part.vertices) for part in soft} if model.tables else {}
+    return Shape(vertices, points, eyes, rotations)
 
 
-def _snap(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> None:
-    """Vertices of feature points put exactly where they are within a hair's breadth already.
+def _snap_to_points(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> None:
+    """Move vertices of feature points that are within SNAP of their target exactly onto it, in place.
 
-    Points that nearly coincide, such as those of two lips, go through one place of the deformation.
+    Points that nearly coincide, such as those of two lips, share one source point of the deformation.
     """
     for row in np.flatnonzero(known_rows(targets) & (model.bound >= 0)):
         for part in model.parts:
@@ -133,31 +134,31 @@ def _snap(model: FaceModel, vertices: dict[str, Float64], targets: Float64) -> N
                 vertices[part.name][own] = targets[row]
 
 
-def _fixed(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
-    """Where points of the surface were, and where they must be."""
+def _surface_points(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
+    """((K, 3), (K, 3)): positions of the known points on the surface before, and their targets."""
     outer = np.array([name not in INNER for name in names()])
     known = known_rows(targets, model.points) & outer
     return model.points[known], targets[known]
 
 
-def similar(before: Floating, after: Float64) -> Similar:
-    """The scale and shift that come nearest to a deformation of some vertices."""
+def fit_similarity(before: Floating, after: Float64) -> Similarity:
+    """The scale and shift closest, in least squares, to the deformation of vertices (N, 3) into after."""
     places = np.asarray(before, dtype=np.float64)
     a, b = places - places.mean(axis=0), after - after.mean(axis=0)
     squares = float((a**2).sum())
     size = float((a * b).sum()) / squares if squares > 0 else 1.0
-    return Similar(places.mean(axis=0), after.mean(axis=0), size)
+    return Similarity(places.mean(axis=0), after.mean(axis=0), size)
 
 
-def _mouth(
+def _fit_teeth_and_tongue(
     model: FaceModel, field: Field, targets: Float64, given: Bool
-) -> tuple[dict[str, Similar], _Tongue]:
-    """What becomes of each row of teeth, and of the tongue."""
+) -> tuple[dict[str, Similarity], _Tongue]:
+    """(teeth by jaw, tongue): the maps that move each row of teeth and the tongue."""
     row = row_of()
     teeth = [part.vertices for part in model.of_kind("teeth")]
     inside = teeth or [part.vertices for part in model.of_kind("tongue")] or [model.vertices]
     places = np.concatenate(inside).astype(np.float64)
-    both = similar(places, field(places))
+    both = fit_similarity(places, field(places))
     both = _behind_lips(model, field, both) if teeth else both
     jaws = {}
     for jaw, (edge, gum) in TEETH.items():
@@ -168,37 +169,37 @@ def _mouth(
             if given[row[gum]] and np.isfinite(here).all() and np.isfinite(there).all():
                 tall = float(np.linalg.norm(there[1] - there[0]) / np.linalg.norm(here[1] - here[0]))
                 size = tall if 0.7 * both.size < tall < 1.4 * both.size else size
-            jaws[jaw] = Similar(here[0], there[0], size)
+            jaws[jaw] = Similarity(here[0], there[0], size)
     wanted = [row[name] for name in TONGUE if given[row[name]] and np.isfinite(model.points[row[name]]).all()]
     return jaws, _Tongue(jaws["lower"], model.points[wanted], targets[wanted])
 
 
-def _behind_lips(model: FaceModel, field: Field, teeth: Similar) -> Similar:
-    """Teeth moved back until they are as far behind the inner contour of the lips as they were."""
+def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarity:
+    """The map of the teeth, shifted back until they are as far behind the inner lips as before."""
     known = [row for row in (row_of()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
     places = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
     lips, moved = field(model.points[known]), teeth(places)
     back = 0.0
     for before, after in zip(model.points[known], lips, strict=True):
-        room = before[2] - _foremost(places, before)
+        room = before[2] - _foremost_z(places, before)
         wanted = after[2] - teeth.size * room
         if np.isfinite(room):
-            back = max(back, _foremost(moved, after) - wanted)
-    return Similar(teeth.origin, teeth.target - (0.0, 0.0, max(back, 0.0)), teeth.size)
+            back = max(back, _foremost_z(moved, after) - wanted)
+    return Similarity(teeth.origin, teeth.target - (0.0, 0.0, max(back, 0.0)), teeth.size)
 
 
-def _foremost(places: Float64, point: Float64) -> float:
-    """The greatest z of places right behind or before a point, -inf where there are none."""
+def _foremost_z(places: Float64, point: Float64) -> float:
+    """The greatest z of points (N, 3) right behind or before a point, -inf where there are none."""
     near = np.hypot(places[:, 0] - point[0], places[:, 1] - point[1]) < BESIDE
     return float(places[near, 2].max()) if near.any() else -np.inf
 
 
 class _Tongue:
-    """The tongue goes with the lower teeth, and through points of it that are given."""
+    """The map of the tongue: it follows the lower teeth and passes through its given points."""
 
-    def __init__(self, base: Similar, here: Float64, there: Float64) -> None:
+    def __init__(self, base: Similarity, here: Float64, there: Float64) -> None:
         self._base = base
-        self._rest = bumps(here, there - base(here), TONGUE_WIDTH) if len(here) else None
+        self._rest = bump_field(here, there - base(here), TONGUE_WIDTH) if len(here) else None
 
     def __call__(self, places: Floating) -> Float64:
         moved = self._base(places)
@@ -206,15 +207,17 @@ class _Tongue:
 
 
 def _jaw(model: FaceModel, part: Part) -> str:
-    """The jaw that a part of the teeth belongs to: by its height against the line where they meet."""
+    """The jaw of a part of the teeth, "upper" or "lower", by its height against the line where they meet."""
     edges = model.points[[row_of()["9.10"], row_of()["9.11"]], 1]
     heights = [float(one.vertices[:, 1].mean()) for one in model.of_kind("teeth")]
     boundary = float(edges.mean()) if np.isfinite(edges).all() else float(np.mean(heights))
     return "upper" if float(part.vertices[:, 1].mean()) >= boundary else "lower"
 
 
-def _carried(vertices: Floating, skin: Float64, shift: Float64, eyes: Mapping[str, FittedEye]) -> Float64:
-    """What laying the skin on the eyeballs did to it, for parts that stand on it: (V, 3)."""
+def _lid_shift_at(
+    vertices: Floating, skin: Float64, shift: Float64, eyes: Mapping[str, FittedEye]
+) -> Float64:
+    """(V, 3) shift of the nearby skin by `lay_lids_on`, for parts that stand on the skin."""
     from scipy.spatial import cKDTree
 
     near = np.zeros(len(skin), dtype=bool)
@@ -222,10 +225,10 @@ def _carried(vertices: Floating, skin: Float64, shift: Float64, eyes: Mapping[st
         near |= np.linalg.norm(skin - eye.was.centre, axis=1) < 1.2 * REACH * eye.was.radius
     if near.sum() < 4:
         return np.zeros(np.shape(vertices))
-    distance, found = cKDTree(skin[near]).query(vertices, k=4)
+    distance, nearest = cKDTree(skin[near]).query(vertices, k=4)
     weight = 1.0 / np.maximum(distance, 1e-6)
     weight /= weight.sum(axis=1, keepdims=True)
-    mean: Float64 = (shift[near][found] * weight[..., None]).sum(axis=1)
+    mean: Float64 = (shift[near][nearest] * weight[..., None]).sum(axis=1)
     return mean
 
 
@@ -234,7 +237,7 @@ def _points(
     vertices: Mapping[str, Float64],
     field: Field,
     targets: Float64,
-    teeth: Mapping[str, Similar],
+    teeth: Mapping[str, Similarity],
     tongue: _Tongue,
 ) -> Float64:
     """Feature points after the deformation: bound ones on their vertices, free ones as given or carried."""
@@ -256,14 +259,14 @@ def _points(
     return points
 
 
-def rebuilt(part: Part, vertices: Float64) -> Part:
-    """The part with other vertices; normals turned as the surface was, so that seams stay unseen."""
+def rebuild_part(part: Part, vertices: Float64) -> Part:
+    """The part with other vertices and its normals rotated with the surface, so that seams stay invisible."""
     before = vertex_normals(part.vertices, part.triangles).astype(np.float64)
     after = vertex_normals(vertices, part.triangles).astype(np.float64)
     normals = np.asarray(part.normals, dtype=np.float64)
     axis = np.cross(before, after)
     cosine = (before * after).sum(axis=1, keepdims=True)
-    # Rodrigues' formula for the smallest turn that takes one unit vector to another
+    # Rodrigues' formula for the smallest rotation that takes one unit vector to another
     turned = (
         normals * cosine
         + np.cross(axis, normals)

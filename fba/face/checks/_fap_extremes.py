@@ -1,4 +1,4 @@
-"""Do triangles turn over or tear where a FAP goes to the limits of its range?"""
+"""Checks that no triangle turns over or tears at the limits of a FAP's range."""
 
 from __future__ import annotations
 
@@ -14,26 +14,28 @@ from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_RO
 from fba.parameters import faps
 
 TURNING = {OPEN_JAW, 19, 20, 21, 22, TONGUE_ROLL}
-"""Where these move the skin, it turns: a triangle has turned over when it faces away from its neighbours."""
+"""FAPs that rotate the skin: there a triangle has turned over when it faces away from its neighbours."""
 HAIR = ("lash", "hair")
-"""Has two sides: it cannot turn over."""
+"""Kinds of parts that are two-sided: their triangles cannot turn over."""
 LIDS = {19, 20, 21, 22}
 EYE_CORNERS = ("3.7", "3.11", "3.8", "3.12")
 CORNER = 0.12
-"""Share of the eye's width about its corners that is not looked at."""
+"""Share of the eye's width about its corners that is not checked."""
 RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 LONGEST = 8.0
-"""Edges may get this many times as long..."""
+"""Edges may grow to this many times their length..."""
 SHORT = 0.3
-"""... where they are not shorter than this share of the typical edge of their part."""
+"""... or, if shorter than this share of the typical edge, to this many times that share."""
 SPECK = 0.003
 """Share of the moving surface that may turn over where skin closes on itself: in the corners of eyes."""
 DEGENERATE = 1e-5
+"""Triangles smaller than this share of the median area are ignored."""
 FACING = -0.3
+"""Cosine between a triangle's normal and its neighbours' below which it has turned over."""
 
 
 def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
-    """Findings at both ends of the range of a FAP."""
+    """Yields a finding per part whose triangles turn over or tear at either end of a FAP's range."""
     entry = faps()[fap - 1]
     if fap in RIGID or entry.i_limits is None:
         return
@@ -45,9 +47,11 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
         for part in poser.model.parts:
             own = slice(poser.model.starts[part.name], poser.model.starts[part.name] + len(part.vertices))
             before, after = poser.neutral[own], moved[own]
-            if np.abs(after - before).max(initial=0.0) < 1e-9 or _rigid(before, after):
+            if np.abs(after - before).max(initial=0.0) < 1e-9 or _moved_rigidly(before, after):
                 continue
-            over, torn, share = damage(before, after, _counted(poser, part, fap), turning=fap in TURNING)
+            over, torn, share = count_damage(
+                before, after, _checked_triangles(poser, part, fap), turning=fap in TURNING
+            )
             if part.kind in HAIR:
                 over = 0
             if over and not (fap in TURNING and share <= SPECK):
@@ -66,11 +70,11 @@ def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:
                 )
 
 
-def _counted(poser: Poser, part: Part, fap: int) -> Integer:
-    """Triangles of a part, without those about the corners of the eyes where lids close on themselves."""
+def _checked_triangles(poser: Poser, part: Part, fap: int) -> Integer:
+    """(M, 3) triangles of a part; for lid FAPs without those at the eyes' corners, where skin folds."""
     if fap not in LIDS:
         return part.triangles
-    corners = np.array([poser.place(name) for name in EYE_CORNERS])
+    corners = np.array([poser.point(name) for name in EYE_CORNERS])
     wide = np.linalg.norm(corners[0] - corners[1]), np.linalg.norm(corners[2] - corners[3])
     away = np.linalg.norm(part.vertices[:, None] - corners, axis=2)
     within = (np.nan_to_num(away, nan=np.inf) < CORNER * np.nan_to_num(np.repeat(wide, 2))).any(axis=1)
@@ -78,23 +82,28 @@ def _counted(poser: Poser, part: Part, fap: int) -> Integer:
     return counted
 
 
-def damage(before: Float64, after: Float64, triangles: Integer, *, turning: bool) -> tuple[int, int, float]:
+def count_damage(
+    before: Float64, after: Float64, triangles: Integer, *, turning: bool
+) -> tuple[int, int, float]:
     """(triangles turned over, edges torn, share of the moving area turned over)."""
     moving = (np.abs(after - before).max(axis=1) > 1e-9)[triangles].any(axis=1)
-    chosen = triangles[moving]
+    moved_triangles = triangles[moving]
     sides = [
-        (before[chosen[:, k]] - before[chosen[:, k - 1]], after[chosen[:, k]] - after[chosen[:, k - 1]])
+        (
+            before[moved_triangles[:, k]] - before[moved_triangles[:, k - 1]],
+            after[moved_triangles[:, k]] - after[moved_triangles[:, k - 1]],
+        )
         for k in range(3)
     ]
     normals = [np.cross(sides[0][which], sides[1][which]) for which in (0, 1)]
     areas = np.linalg.norm(normals[0], axis=1)
-    whole = areas > DEGENERATE * np.median(areas) if len(areas) else areas > 0
+    not_degenerate = areas > DEGENERATE * np.median(areas) if len(areas) else areas > 0
     if turning:
-        facing = [_facing(normal, chosen, len(before)) for normal in normals]
+        facing = [_facing(normal, moved_triangles, len(before)) for normal in normals]
         over = (facing[0] > 0) & (facing[1] < FACING)
     else:
         over = (normals[0] * normals[1]).sum(axis=1) <= 0
-    over &= whole
+    over &= not_degenerate
     lengths = np.array([[np.linalg.norm(side[which], axis=1) for side in sides] for which in (0, 1)])
     typical = float(np.median(lengths[0])) if lengths.size else 0.0
     torn = lengths[1] > LONGEST * np.maximum(lengths[0], SHORT * typical)
@@ -113,8 +122,8 @@ def _facing(normals: Float64, triangles: Integer, count: int) -> Float64:
     return result
 
 
-def _rigid(before: Float64, after: Float64) -> bool:
-    """Whether a part moved as a whole, which harms no triangle."""
+def _moved_rigidly(before: Float64, after: Float64) -> bool:
+    """Whether the vertices moved as a rigid body, which harms no triangle."""
     a, b = before - before.mean(axis=0), after - after.mean(axis=0)
     left, _, right = np.linalg.svd(a.T @ b)
     flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])

@@ -1,4 +1,4 @@
-"""Does each FAP move its own feature point, that far, in that direction, and leave its mate alone?"""
+"""Checks that each FAP moves its own feature point by the right way, and leaves its mate alone."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ SMALL = 10.0
 SMALL_ANGLE = 5000.0
 """The same for FAPs that count in 1e-5 rad."""
 ACCURACY = 0.05
+"""Largest error of a feature point, as a share of its way."""
 MATE = 0.01
-"""How much of its mate's way a feature point may make."""
+"""Share of the moved point's way that its mate may make."""
 ARC = {OPEN_JAW, 19, 20, 21, 22}
 """FAPs whose points follow an arc: only the way along the direction is prescribed."""
 THRUST_EYE = {27: "3.5", 28: "3.6"}
@@ -38,21 +39,21 @@ HEAD_AXIS = {HEAD_PITCH: (1.0, 0.0, 0.0), HEAD_YAW: (0.0, 1.0, 0.0), HEAD_ROLL: 
 
 
 def check_point(poser: Poser, fap: int) -> Iterator[Finding]:
-    """What is wrong with how a FAP moves its feature point."""
+    """Yields findings about how a FAP moves its feature point."""
     if fap in HEAD_AXIS:
-        yield from _head(poser, fap)
+        yield from _check_head(poser, fap)
     elif fap in (*YAW_EYE, *PITCH_EYE):
-        yield from _gaze(poser, fap)
+        yield from _check_gaze(poser, fap)
     elif fap in DILATE_PUPIL:
-        yield from _pupil(poser, fap)
+        yield from _check_pupil(poser, fap)
     elif fap == TONGUE_ROLL:
-        yield from _roll(poser, fap)
+        yield from _check_roll(poser, fap)
     else:
-        yield from _shift(poser, fap)
+        yield from _check_shift(poser, fap)
 
 
 def point_error(poser: Poser, fap: int, value: float) -> float:
-    """How far off a shifted feature point is, as a share of the way it should make; nan where unknown.
+    """Error of a shifted feature point, as a share of the way it should make; nan where it is free.
 
     Of points on arcs, only the way along the standard's direction counts.
     """
@@ -67,7 +68,7 @@ def point_error(poser: Poser, fap: int, value: float) -> float:
     return float(np.linalg.norm(off) / abs(wanted))
 
 
-def _shift(poser: Poser, fap: int) -> Iterator[Finding]:
+def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     point = EYE_POINT.get(fap) or entry.feature_points[0]
     if not poser.has(point):
@@ -101,7 +102,7 @@ def _shift(poser: Poser, fap: int) -> Iterator[Finding]:
             )
 
 
-def _head(poser: Poser, fap: int) -> Iterator[Finding]:
+def _check_head(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     turns = [t for t in poser.model.table_of[fap].transforms if t.part == HEAD and t.kind == "rotation"]
     total = np.sum([t.amount for t in turns], axis=0) if turns else np.zeros(3)
@@ -113,7 +114,7 @@ def _head(poser: Poser, fap: int) -> Iterator[Finding]:
             f"axis times rate {_vector(total)}",
             _vector(axis),
         )
-    centre = poser.place("7.1")
+    centre = poser.point("7.1")
     for turn in turns:
         away = np.linalg.norm(np.array(turn.centre) - centre)
         if np.isfinite(away) and away > 1e-3:
@@ -126,7 +127,7 @@ def _head(poser: Poser, fap: int) -> Iterator[Finding]:
             )
 
 
-def _gaze(poser: Poser, fap: int) -> Iterator[Finding]:
+def _check_gaze(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     side = "left" if EYE_POINT[fap] == "3.5" else "right"
     eye = poser.eyes[side]
@@ -149,7 +150,7 @@ def _gaze(poser: Poser, fap: int) -> Iterator[Finding]:
         yield Finding(entry.label, "the other eyeball stays", "it moves", "no motion")
 
 
-def _pupil(poser: Poser, fap: int) -> Iterator[Finding]:
+def _check_pupil(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     side = "left" if EYE_POINT[fap] == "3.5" else "right"
     eye, unit = poser.eyes[side], poser.model.fapu.IRISD
@@ -185,7 +186,7 @@ def _pupil(poser: Poser, fap: int) -> Iterator[Finding]:
             )
 
 
-def _roll(poser: Poser, fap: int) -> Iterator[Finding]:
+def _check_roll(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     if not poser.has("6.2", "6.3", "6.4"):
         yield Finding(entry.label, "6.2, 6.3 and 6.4 stand on vertices", "one is free", "vertices")
@@ -215,7 +216,7 @@ def _eye_vertices(poser: Poser, side: str) -> Intp:
 
 
 def _rotation(before: Float64, after: Float64) -> Float64:
-    """The rotation vector that takes points (N, 3) about the origin to others best."""
+    """(3,) rotation vector, radians, that best takes points (N, 3) about the origin to others."""
     from scipy.spatial.transform import Rotation
 
     if len(before) < 3:

@@ -1,4 +1,4 @@
-"""What a check of a face model found."""
+"""The findings of checks of a face model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing about a model that is not as the standard wants it.
+    """One deviation of a model from the standard.
 
     subject: what it is about ("FAP 19 close_t_l_eyelid", "feature point 2.2"). rule: the rule that is
     broken, in a few words. found, expected: the measured and the wanted value, with units.

@@ -1,4 +1,4 @@
-"""Do lids meet when they should, without cutting the eyeball?"""
+"""Checks that closed lids meet and do not cut the eyeball."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ SIDES = {"left": (19, 21), "right": (20, 22)}
 """FAPs of the upper and the lower lid."""
 CLOSED = 1024
 SPLITS = (1024, 896, 768, 640, 512, 424)
-"""How much of the way the upper lid makes; the lower one makes the rest."""
+"""Values of the upper lid's FAP that are tried; the lower lid makes the rest of the way to 1024."""
 GAP = 0.02
 """The widest gap left, as a share of IRISD0."""
 CORNER = 0.04
-"""Share of the opening's width at each end that is corner, not lid."""
+"""Share of the opening's width at each end that is left out as corner."""
 CUT = 0.01
-"""How deep a lid may lie in the eyeball, as a share of its radius, beyond where it is when open."""
+"""Depth that a closed lid may be in the eyeball beyond the open one, as a share of its radius."""
 OUTSIDE = 0.97
-"""What is this far out, in radii of the eyeball, must stay outside."""
+"""Vertices of the open lid this far out, in radii of the eyeball, must stay outside."""
 
 
 def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
-    """Findings about the lids of one side."""
+    """Yields findings about the lids of one side, "left" or "right"."""
     upper, lower = SIDES[side]
     gaps = {split: lid_gap(poser, side, split) for split in SPLITS}
     worst = max(gaps, key=lambda split: gaps[split])
@@ -63,19 +63,19 @@ def lid_gap(poser: Poser, side: str, split: float) -> float:
     widest = 0.0
     for line, other in (lines, lines[::-1]):
         between = (line[:, 0] > ends[0] + hem) & (line[:, 0] < ends[1] - hem)
-        widest = max(widest, float(_to_line(line[between], other).max(initial=0.0)))
+        widest = max(widest, float(_distances_to_line(line[between], other).max(initial=0.0)))
     return widest / (poser.model.fapu.IRISD * 1024)
 
 
 def lid_cut(poser: Poser, side: str, split: float) -> float:
-    """How deep the closing lids go into the eyeball, as a share of its radius, beyond the open ones."""
+    """Greatest depth of closed lids in the eyeball beyond the open ones, as a share of its radius."""
     upper, lower = SIDES[side]
     eye = poser.eyes[side]
     surface = poser.marks.surface
     before = surface.vertices
     after = poser.surface(poser.pose({upper: split, lower: CLOSED - split}))
     moving = np.abs(after - before).max(axis=1) > 1e-6
-    profile = _Front(poser, side)
+    profile = _EyeballProfile(poser, side)
     # a lid's inner side may run into the eyeball where nobody sees it
     outside = profile.depth(before) < (1 - OUTSIDE) * eye.radius
     triangles = surface.triangles[
@@ -90,8 +90,8 @@ def lid_cut(poser: Poser, side: str, split: float) -> float:
     return deepest / eye.radius
 
 
-class _Front:
-    """How far out the eyeball reaches at each angle from its gaze."""
+class _EyeballProfile:
+    """Distance of the eyeball's surface from its centre at each angle from its gaze."""
 
     def __init__(self, poser: Poser, side: str) -> None:
         self._eye = poser.eyes[side]
@@ -116,7 +116,7 @@ class _Front:
         return np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1)), reach
 
 
-def _to_line(points: Float64, line: Float64) -> Float64:
+def _distances_to_line(points: Float64, line: Float64) -> Float64:
     """(N,) distances of points from a polyline (M, 3)."""
     start, along = line[:-1], np.diff(line, axis=0)
     length = np.maximum((along**2).sum(axis=1), 1e-30)

@@ -1,4 +1,4 @@
-"""Where feature points may stand on a neutral face: the standard's rules and what anatomy demands.
+"""Checks the positions of feature points on a neutral face, by the standard's rules and by anatomy.
 
 `locations.csv` lists them for the left half and the midline; the right half mirrors them. share is the
 slack, as a share of the distance between the pupils.
@@ -36,8 +36,8 @@ class Rule:
     severity: Literal["error", "warning"]
     sign: float = 1.0
 
-    def break_of(self, points: Float64, unit: float) -> tuple[str, str] | None:
-        """(found, expected) where the points break it; None where they keep it or are not known."""
+    def violation(self, points: Float64, unit: float) -> tuple[str, str] | None:
+        """(found, expected) where points (84, 3) break the rule; None where they keep it or are unknown."""
         others = [name for name in (self.first, self.second) if name]
         column = AXES[self.axis]
         value, *limits = (float(points[row_of()[name], column]) for name in (self.point, *others))
@@ -64,7 +64,7 @@ class Rule:
 
 @cache
 def rules() -> tuple[Rule, ...]:
-    """Every rule of the table, and its mirror image where it speaks of one side."""
+    """Every rule of the table, and the mirror image of those for one side."""
     found = []
     with (files(__package__) / "locations.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -82,7 +82,7 @@ def rules() -> tuple[Rule, ...]:
 
 
 def check_locations(points: Float64) -> Iterator[Finding]:
-    """What breaks the rules, for feature points (84, 3) in metres, NaN where unknown."""
+    """Yields a finding per broken rule, for feature points (84, 3) in metres, NaN where unknown."""
     unit = float(points[row_of()["3.5"], 0] - points[row_of()["3.6"], 0])
     for left, right in MIRRORED.items():
         pair = points[[row_of()[left], row_of()[right]], 0]
@@ -95,7 +95,7 @@ def check_locations(points: Float64) -> Iterator[Finding]:
                 "error",
             )
     for rule in rules():
-        broken = rule.break_of(points, unit)
+        broken = rule.violation(points, unit)
         if broken is not None:
             yield Finding(f"feature point {rule.point}", f"location: {rule.rule}", *broken, rule.severity)
 

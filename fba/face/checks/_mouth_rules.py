@@ -1,4 +1,4 @@
-"""Do lips stay in touch when they should, and do jaws, teeth and tongue keep apart?"""
+"""Checks that lips stay in touch when moved together, and that an opening jaw parts teeth and lips."""
 
 from __future__ import annotations
 
@@ -15,24 +15,26 @@ PAIRS = ((4, 5), (8, 10), (9, 11))
 """Inner lip FAPs one above the other."""
 OUTER_PAIRS = ((51, 52), (55, 57), (56, 58))
 TOGETHER = 150.0
+"""Value by which all lips are moved together, up and down."""
 APART = 0.06
 """How much further apart lips that move together may get, as a share of MNS0."""
 OPEN = 400.0
+"""Value of open_jaw that is checked."""
 STILL = 0.03
-"""Share of the chin's way that what stays may move."""
+"""Share of the chin's way that points may move which should stay."""
 
 
 def check_mouth(poser: Poser) -> Iterator[Finding]:
-    """Findings about lips, teeth and tongue."""
+    """Yields findings about lips, teeth and tongue."""
     present = set(poser.model.table_of)
     if all(fap in present for pair in PAIRS for fap in pair):
-        yield from _touching(poser)
+        yield from _check_touching_lips(poser)
     if OPEN_JAW in present and poser.has("2.1"):
-        yield from _opening(poser)
+        yield from _check_jaw_opening(poser)
 
 
 def lip_gap(poser: Poser, value: float) -> float:
-    """How much further apart lips get that all move down by the same value, as a share of MNS0."""
+    """Widening of the gap between lips that all move down by the same value, as a share of MNS0."""
     chosen = [*PAIRS, *(pair for pair in OUTER_PAIRS if set(pair) <= set(poser.model.table_of))]
     moved = poser.pose(
         {fap: sign * value for pair in chosen for fap, sign in zip(pair, (1, -1), strict=True)}
@@ -43,7 +45,7 @@ def lip_gap(poser: Poser, value: float) -> float:
     return float(np.abs(now - before).max() / (poser.model.fapu.MNS * 1024))
 
 
-def _touching(poser: Poser) -> Iterator[Finding]:
+def _check_touching_lips(poser: Poser) -> Iterator[Finding]:
     for value in (TOGETHER, -TOGETHER):
         gap = lip_gap(poser, value)
         if gap > APART:
@@ -66,7 +68,7 @@ def _lip_distances(poser: Poser, moved: Float64) -> Float64:
     return result
 
 
-def _opening(poser: Poser) -> Iterator[Finding]:
+def _check_jaw_opening(poser: Poser) -> Iterator[Finding]:
     moved = poser.pose({OPEN_JAW: OPEN})
     shift = moved - poser.neutral
     chin = float(np.linalg.norm(shift[poser.vertex("2.1")]))

@@ -1,4 +1,4 @@
-"""Is a model's rest position the standard's neutral face?
+"""Checks that a model's rest position is the standard's neutral face.
 
 Gaze along +z, lids tangent to the iris, the pupil a third of it, lips touching on a line through the
 corners of the mouth, teeth touching, the tongue flat with its tip where they meet; feature points where
@@ -44,27 +44,27 @@ TEETH: Limits = (0.02, 0.06)
 TONGUE: Limits = (0.08, 0.25)
 """Shares of the width of the mouth."""
 SYMMETRY = 0.04
-"""Of the distance between the pupils: mean deviation from the mirror image that is worth a word."""
+"""Of the distance between the pupils: mean deviation from the mirror image above which there is a warning."""
 
 
 def check_neutral(model: FaceModel) -> list[Finding]:
-    """Whatever about the model's rest position is not as the standard's neutral face; [] for a good one.
+    """Deviations of the model's rest position from the standard's neutral face; [] where there are none.
 
     "error" where FAPs would play wrongly, "warning" where it merely looks odd or cannot be checked.
     """
     return [
-        *_missing(model),
+        *_check_missing(model),
         *check_locations(model.points),
-        *_eyes(model),
-        *_mouth(model),
-        *_teeth(model),
-        *_tongue(model),
-        *_symmetry(model.points),
+        *_check_eyes(model),
+        *_check_lips(model),
+        *_check_teeth(model),
+        *_check_tongue(model),
+        *_check_symmetry(model.points),
         *check_sizes(model.points),
     ]
 
 
-def _missing(model: FaceModel) -> Iterator[Finding]:
+def _check_missing(model: FaceModel) -> Iterator[Finding]:
     if model.missing:
         count = len(model.missing)
         yield Finding(
@@ -76,18 +76,18 @@ def _missing(model: FaceModel) -> Iterator[Finding]:
         )
 
 
-def _eyes(model: FaceModel) -> Iterator[Finding]:
+def _check_eyes(model: FaceModel) -> Iterator[Finding]:
     found = eyeballs(model)
     for side in PUPIL_POINT:
         if side not in found:
             yield Finding(f"{side} eye", "eyeball", "no part of kind eye", "one on each side", "warning")
             continue
-        yield from _eye(model, found[side])
+        yield from _check_eye(model, found[side])
     for side, (upper, lower) in LID_POINTS.items():
-        yield from _lids(model, side, upper, lower)
+        yield from _check_lids(model, side, upper, lower)
 
 
-def _eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
+def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
     subject = f"{eye.side} eye"
     if eye.error > ROUND * eye.radius:
         yield Finding(
@@ -128,7 +128,7 @@ def _eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
             )
 
 
-def _lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
+def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
     """The iris, as big as IRISD0 and centred on the pupil, touches both lid margins."""
     iris = model.fapu.IRISD * PER_DISTANCE
     pupil = _point(model, PUPIL_POINT[side])
@@ -145,7 +145,7 @@ def _lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Findi
             )
 
 
-def _mouth(model: FaceModel) -> Iterator[Finding]:
+def _check_lips(model: FaceModel) -> Iterator[Finding]:
     width = model.fapu.MW * PER_DISTANCE
     for upper, lower in (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9")):
         gap = float(_point(model, upper)[1] - _point(model, lower)[1])
@@ -172,7 +172,7 @@ def _mouth(model: FaceModel) -> Iterator[Finding]:
             )
 
 
-def _teeth(model: FaceModel) -> Iterator[Finding]:
+def _check_teeth(model: FaceModel) -> Iterator[Finding]:
     width = model.fapu.MW * PER_DISTANCE
     gap = float(_point(model, "9.10")[1] - _point(model, "9.11")[1])
     severity = _severity(abs(gap) / width, TEETH)
@@ -215,7 +215,7 @@ def _jaws(parts: tuple[Part, ...]) -> tuple[Part, Part] | None:
     return (ordered[-1], ordered[0]) if len(ordered) > 1 else None
 
 
-def _tongue(model: FaceModel) -> Iterator[Finding]:
+def _check_tongue(model: FaceModel) -> Iterator[Finding]:
     width = model.fapu.MW * PER_DISTANCE
     tip = _point(model, "6.1")
     for name in ("6.2", "6.3", "6.4"):
@@ -251,7 +251,7 @@ def _tongue(model: FaceModel) -> Iterator[Finding]:
         )
 
 
-def _symmetry(points: Float64) -> Iterator[Finding]:
+def _check_symmetry(points: Float64) -> Iterator[Finding]:
     rows = np.array([(row_of()[left], row_of()[right]) for left, right in MIRRORED.items()])
     left, right = points[rows[:, 0]], points[rows[:, 1]] * (-1.0, 1.0, 1.0)
     known = np.isfinite(left).all(axis=1) & np.isfinite(right).all(axis=1)

@@ -1,4 +1,4 @@
-"""Are the sizes of a face those of a human being? `human.csv` lists the limits, in millimetres.
+"""Checks that the sizes of a face are human. `human.csv` lists the limits, in millimetres.
 
 They reach from children of three to the biggest adults: published norms of both, four standard deviations
 beyond the outermost mean, rounded outwards.
@@ -52,7 +52,7 @@ def human_sizes() -> tuple[Size, ...]:
 
 
 def check_sizes(points: Float64) -> Iterator[Finding]:
-    """Sizes outside the limits, for feature points (84, 3) in metres; unknown ones are not checked."""
+    """Yields a finding per size outside its limits. points: (84, 3), metres, NaN where unknown."""
     for size in human_sizes():
         ends = points[[row_of()[size.first], row_of()[size.second]], AXES[size.axis]]
         found = abs(float(ends[0] - ends[1])) * 1000

@@ -28,9 +28,9 @@ SHARE = 0.03
 
 
 def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Finding]:
-    """What is wrong with the motions of a face; an empty list where nothing is.
+    """Deviations of a face's motions from the standard; an empty list where there are none.
 
-    faps: numbers of the FAPs to look at (3..68), all by default; those in `model.lost` are left out. For
+    faps: numbers of the FAPs to check (3..68), all by default; those in `model.lost` are left out. For
     each: its feature point moves by value x FAPU in the standard's direction (within 5 % at small values;
     on arcs, along the direction), its mate stays, nothing outside its region moves, and no triangle turns
     over or tears at the limits of its range. For all together: lids meet where their values add up to
@@ -49,16 +49,16 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
 
 
 def check_posed(poser: Poser, wanted: Iterable[int]) -> list[Finding]:
-    """The same for FAPs of 3..68, of a model under measurement: for who asks more than once."""
+    """`check_faps` for a model that already has a `Poser`, to check it several times at less cost."""
     wanted = list(wanted)
     found: list[Finding] = []
     for fap in wanted:
-        found += _one(poser, fap)
-    found += _together(poser, set(wanted))
+        found += _check_one(poser, fap)
+    found += _check_combinations(poser, set(wanted))
     return found
 
 
-def _one(poser: Poser, fap: int) -> Iterator[Finding]:
+def _check_one(poser: Poser, fap: int) -> Iterator[Finding]:
     from fba.face.checks._fap_extremes import check_extremes
     from fba.face.checks._fap_points import check_point
 
@@ -72,7 +72,7 @@ def _one(poser: Poser, fap: int) -> Iterator[Finding]:
     yield from check_extremes(poser, fap)
 
 
-def _together(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
+def _check_combinations(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
     from fba.face.checks._lid_rules import SIDES, check_lids
     from fba.face.checks._mouth_rules import OUTER_PAIRS, PAIRS, check_mouth
     from fba.face.points import OPEN_JAW

@@ -1,4 +1,4 @@
-"""A face model posed by its tables in plain NumPy, to be measured: a second opinion on the deformer."""
+"""Poses a face model by its tables in plain NumPy, for measuring, independently of the deformer."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64, Intp
-from fba.face.authoring.regions.eyes import Eye, eyes
+from fba.face.authoring.regions.eyes import Eye, find_eyes
 from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
 from fba.face.authoring.surface.surface import Surface
 from fba.face.feature_points import row_of
@@ -18,13 +18,13 @@ from fba.face.tables import HEAD
 from fba.parameters import faps
 
 KIND_ORDER = ("scale", "rotation", "translation")
-"""In which order the transforms of a part act, as in a Transform node."""
+"""Order in which the transforms of a part act, as in a Transform node."""
 
 
 class Poser:
-    """A model under measurement.
+    """Poses a model and measures it.
 
-    like: another one; where its model has the same neutral face, what was found on that is taken from there.
+    like: another Poser; if its model has the same neutral face, its surface, landmarks and eyes are reused.
     """
 
     def __init__(self, model: FaceModel, like: Poser | None = None) -> None:
@@ -34,7 +34,7 @@ class Poser:
             self.__dict__.update(_surface=like._surface, marks=like.marks, eyes=like.eyes)
 
     def pose(self, values: Mapping[int, float]) -> Float64:
-        """(V, 3): all vertices under some FAPs, head turns left out."""
+        """(V, 3) float64, metres: all vertices under FAP values by number, without the head's rotation."""
         moved = self.neutral.copy()
         tables = [
             (self.model.table_of[fap], value) for fap, value in values.items() if fap in self.model.table_of
@@ -54,13 +54,13 @@ class Poser:
             start = self.model.starts[part.name]
             own = slice(start, start + len(part.vertices))
             for transform, amount in sorted(turns, key=lambda turn: KIND_ORDER.index(turn[0].kind)):
-                moved[own] = transformed(
+                moved[own] = apply_transform(
                     moved[own], transform.kind, amount * np.array(transform.amount), transform.centre
                 )
         return moved
 
     def shift(self, values: Mapping[int, float]) -> Float64:
-        """(V, 3): how far each vertex moves."""
+        """(V, 3) float64, metres: displacement of each vertex from the neutral face."""
         return self.pose(values) - self.neutral
 
     def vertex(self, point: str) -> int:
@@ -71,7 +71,7 @@ class Poser:
         """Whether all these feature points stand on vertices."""
         return all(self.vertex(point) >= 0 for point in points)
 
-    def place(self, point: str) -> Float64:
+    def point(self, point: str) -> Float64:
         """(3,) a neutral feature point."""
         place: Float64 = self.model.points[row_of()[point]]
         return place
@@ -87,13 +87,13 @@ class Poser:
 
     @cached_property
     def marks(self) -> Landmarks:
-        """Contours and points on the skin."""
+        """Feature points and contours on the skin."""
         return landmarks(self._surface[0], self.model.points, self.model.bound, self.pool)
 
     @cached_property
     def eyes(self) -> dict[str, Eye]:
-        """The eyeballs by side."""
-        return eyes(self.marks, self.model.parts)
+        """The eyes by side, "left" and "right"."""
+        return find_eyes(self.marks, self.model.parts)
 
     def surface(self, moved: Float64) -> Float64:
         """(N, 3): posed vertices (V, 3) of the model as vertices of `marks.surface`."""
@@ -116,8 +116,8 @@ def _same_face(one: FaceModel, other: FaceModel) -> bool:
     )
 
 
-def transformed(points: Float64, kind: str, amount: Float64, centre: npt.ArrayLike) -> Float64:
-    """Points (N, 3) turned, scaled or shifted by an amount (3,)."""
+def apply_transform(points: Float64, kind: str, amount: Float64, centre: npt.ArrayLike) -> Float64:
+    """Points (N, 3) after a "rotation" (vector, radians), "scale" (1 + amount) or "translation" by (3,)."""
     from scipy.spatial.transform import Rotation
 
     if kind == "translation":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fba.face.authoring.shapes.shape_names import arkit_names, arkit_of, canonical, fap_of
+from fba.face.authoring.shapes.shape_names import arkit_names, arkit_of, canonical_names, fap_of
 
 
 def test_there_are_52_and_each_knows_itself() -> None:
@@ -43,4 +43,4 @@ def test_faps_by_name() -> None:
 
 
 def test_the_first_of_several_counts() -> None:
-    assert canonical(["x", "eyeBlink_L", "blink_L"]) == {"eyeBlinkLeft": "eyeBlink_L"}
+    assert canonical_names(["x", "eyeBlink_L", "blink_L"]) == {"eyeBlinkLeft": "eyeBlink_L"}

@@ -14,8 +14,8 @@ import pytest
 from fba.errors import FbaWarning, ModelError
 from fba.face.calibration import UNITS, fit, points_of_distances
 from fba.face.calibration._align import align
-from fba.face.calibration._carry import stretches
-from fba.face.calibration._field import turned_over
+from fba.face.calibration._carry import surface_stretches
+from fba.face.calibration._field import turned_over_triangles
 from fba.face.checks._findings import Finding
 from fba.face.eyeball import eyeballs
 from fba.face.fapu import Fapu
@@ -407,7 +407,7 @@ def test_stretches_of_a_linear_map() -> None:
     triangles = np.array([t for c in cells for t in ((c, c + 1, c + 6), (c, c + 6, c + 5))])
     part = Part("plate", "skin", flat, triangles)
     turn = rotation(3)
-    found = stretches(part, flat @ turn.T * 1.5)
+    found = surface_stretches(part, flat @ turn.T * 1.5)
     np.testing.assert_allclose(found, np.broadcast_to(1.5 * turn, (25, 3, 3)), atol=1e-5)
 
 
@@ -416,10 +416,10 @@ def test_turned_over_counts_flipped_triangles_only() -> None:
     flat = np.column_stack([x.ravel(), y.ravel(), np.zeros(36)])
     cells = [6 * j + i for j in range(5) for i in range(5)]
     triangles = np.array([t for c in cells for t in ((c, c + 1, c + 7), (c, c + 7, c + 6))])
-    assert len(turned_over(flat, flat @ rotation(1).T, triangles)[0]) == 0
+    assert len(turned_over_triangles(flat, flat @ rotation(1).T, triangles)[0]) == 0
     bent = flat.copy()
     bent[14] += (1.4, 0.0, 0.0)  # over its right neighbour
-    wrong, share = turned_over(flat, bent, triangles)
+    wrong, share = turned_over_triangles(flat, bent, triangles)
     corners = bent[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
     assert sorted(wrong) == sorted(np.flatnonzero(area < 0))

@@ -8,15 +8,15 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.easing import smoothstep
+from fba.face.authoring.regions.eye_opening import CLOSED
 from fba.face.authoring.regions.eyes import Eye
-from fba.face.authoring.regions.mouth_opening import CLOSED
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import Surface
 from fba.face.model import Part
 
 CLEARANCE = 0.012
 """Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
-FREED = 0.3
+FULL_CLEARANCE = 0.3
 """Share of the way after which a lid has its full clearance."""
 BULGE = np.radians(12.0)
 """The cornea bulges by this much beyond where it is now: the eye may look elsewhere."""
@@ -100,15 +100,15 @@ def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
     return float(np.percentile(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1), 80)) if len(edges) else 0.0
 
 
-def freed(profile: Profile, points: Float64, shifts: Float64, values: Float64) -> Float64:
+def push_vertices_outside(profile: Profile, points: Float64, shifts: Float64, values: Float64) -> Float64:
     """Shifts (K, N, 3) corrected so that no vertex cuts the eyeball, increasingly along the way."""
     result = shifts.copy()
-    for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FREED)):
+    for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FULL_CLEARANCE)):
         result[k] += profile.lift(points, shifts[k]) * share
     return result
 
 
-def bridged(
+def push_edges_outside(
     profile: Profile, surface: Surface, vertices: Intp, shifts: Float64, margins: Bool, values: Float64
 ) -> Float64:
     """Shifts (K, N, 3) with vertices brought forwards where the edges from them would cut the eyeball."""
@@ -121,7 +121,7 @@ def bridged(
     free = ~margins[edges]
     local, points = place[edges], surface.vertices[vertices]
     result = shifts.copy()
-    for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FREED)):
+    for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FULL_CLEARANCE)):
         for _ in range(BRIDGINGS):
             middles = points[local].mean(axis=1)
             push = profile.lift(middles, result[k][local].mean(axis=1), edges=False)[:, 2]

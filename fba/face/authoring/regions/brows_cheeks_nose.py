@@ -17,8 +17,14 @@ from fba.arrays import Bool, Float64
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
-from fba.face.authoring.surface.motion_limits import linear
-from fba.face.authoring.surface.weights import region, smoothed, spread, through, without_hem
+from fba.face.authoring.surface.motion_limits import eased_linear_motion
+from fba.face.authoring.surface.weights import (
+    average_with_neighbours,
+    carry_through,
+    reachable_region,
+    solve_smooth_field,
+    trim_small,
+)
 from fba.face.feature_points import MIRRORED
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
@@ -92,7 +98,7 @@ def handles() -> tuple[Handle, ...]:
     return tuple(found)
 
 
-def spot_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
+def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
     """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
     found: dict[int, Motion] = {}
     lost: dict[int, str] = {}
@@ -116,32 +122,34 @@ def spot_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion],
 def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64, Bool]:
     surface, es = marks.surface, marks.fapu.ES * 1024
     points = [name for name in area.points if marks.has(name)]
-    held = np.unique(np.concatenate([np.zeros(0, np.intp), *(marks.contour(name) for name in area.contours)]))
+    contour_vertices = np.unique(
+        np.concatenate([np.zeros(0, np.intp), *(marks.contour(name) for name in area.contours)])
+    )
     pulled = np.array([marks.vertex[name] for name in points])
     still = [marks.vertex[name] for name in area.still if marks.has(name)]
-    stays = np.setdiff1d(np.union1d(held, np.array(still, dtype=np.intp)), pulled)
+    stays = np.setdiff1d(np.union1d(contour_vertices, np.array(still, dtype=np.intp)), pulled)
     reach = area.reach * es
     near = surface.distances(pulled, reach)
     far = surface.distances(stays, 4 * reach)
-    free = region(near, far, reach, area.share) & ~marks.inside_mouth
+    free = reachable_region(near, far, reach, area.share) & ~marks.inside_mouth
     pulled, first = np.unique(pulled, return_index=True)
     given = np.array([[handle.values.get(points[k], 0.0) for handle in own] for k in first])
     fixed = np.concatenate([pulled, stays])
     values = np.concatenate([given, np.zeros((len(stays), len(own)))])
     pinned = np.zeros(len(surface), dtype=bool)
     pinned[fixed] = True
-    solved = spread(surface, free, fixed, values, slack=area.slack * es)
+    solved = solve_smooth_field(surface, free, fixed, values, slack=area.slack * es)
     if area.through:
         behind = surface.distances(pulled, 1.6 * reach) < np.inf
         behind &= marks.inside_mouth if area.behind == "mouth" else ~marks.lips & ~marks.on_inner_lips
         behind[stays] = False
         for k, handle in enumerate(own):
             targets = np.setdiff1d(np.flatnonzero(behind), marks.vertex[_point(handle.fap)])
-            lifted = through(surface, solved[:, k], targets, area.through * es)
+            lifted = carry_through(surface, solved[:, k], targets, area.through * es)
             for _ in range(SMOOTHINGS):
-                lifted[targets] = smoothed(surface, lifted, 1)[targets]
+                lifted[targets] = average_with_neighbours(surface, lifted, 1)[targets]
             solved[:, k] = lifted
-    return without_hem(solved, HEM), pinned
+    return trim_small(solved, HEM), pinned
 
 
 def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:
@@ -151,7 +159,7 @@ def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, 
     direction = np.array(DIRECTIONS[fap.positive])
     swell = handle.bulge * np.clip(weight * (1 - weight), 0, None) * marks.surface.normals[vertices]
     field = (weight * direction + swell) * marks.fapu[fap.unit]
-    return linear(marks.surface, limiter, vertices, field, handle.fap, pinned)
+    return eased_linear_motion(marks.surface, limiter, vertices, field, handle.fap, pinned)
 
 
 def _point(fap: int) -> str:

@@ -11,8 +11,8 @@ from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
-from fba.face.authoring.surface.motion_limits import linear
-from fba.face.authoring.surface.weights import smoothed, without_hem
+from fba.face.authoring.surface.motion_limits import eased_linear_motion
+from fba.face.authoring.surface.weights import average_with_neighbours, trim_small
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
@@ -48,7 +48,7 @@ def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
         pinned = np.zeros(len(marks.surface), dtype=bool)
         pinned[marks.vertex[point]] = True
         field = share[vertices][:, None] * step
-        found[fap] = linear(marks.surface, limiter, vertices, field, fap, pinned)
+        found[fap] = eased_linear_motion(marks.surface, limiter, vertices, field, fap, pinned)
     return found, lost
 
 
@@ -56,13 +56,13 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
     """(N,) how much each vertex goes with the ear."""
     names = EARS[side]
     surface = marks.surface
-    top, back, lobe, below, above = (marks.guess(name) for name in names.values())
+    top, back, lobe, below, above = (marks.point_or_average(name) for name in names.values())
     root = (below + above) / 2
     width = float(np.linalg.norm(back - root))
     rim = _rim(marks, names)
     away = surface.distances(rim, 1.5 * width) / width
     share = 1 - smoothstep((np.nan_to_num(away, posinf=9.0) - WHOLE) / (ROOT - WHOLE))
-    share = smoothed(surface, share, SMOOTHINGS)
+    share = average_with_neighbours(surface, share, SMOOTHINGS)
     centre = ((top + lobe) / 2 + (back + root) / 2) / 2
     half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * WIDER])
     beside = np.linalg.norm((surface.vertices - centre) / half, axis=1)
@@ -72,7 +72,7 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
         far = 1 - ((surface.vertices - back) @ out) / (out @ out)
         share = share * (LEAST_PULL + (1 - LEAST_PULL) * np.clip(far, 0.0, 1.2))
     own = marks.vertex[names["back" if pull else "top"]]
-    return without_hem(share / max(share[own], 1e-9), HEM)
+    return trim_small(share / max(share[own], 1e-9), HEM)
 
 
 def _rim(marks: Landmarks, names: dict[str, str]) -> Intp:

@@ -10,8 +10,8 @@ import numpy as np
 from fba.arrays import Float64
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
-from fba.face.authoring.surface.motion import Motion, limits
-from fba.face.authoring.surface.motion_limits import guarded
+from fba.face.authoring.surface.motion import Motion, fap_limits
+from fba.face.authoring.surface.motion_limits import stop_at_folds
 from fba.face.eyeball import sphere
 from fba.face.model import Part
 from fba.face.points import EYEBALL_PER_IRIS
@@ -46,10 +46,10 @@ class Eye:
         return result
 
 
-def eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
+def find_eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
     """Both eyes; without an eyeball, the sphere that lids need is estimated from the feature points."""
     iris = marks.fapu.IRISD * 1024
-    pupils = {side: marks.guess(name) for side, name in (("left", "3.5"), ("right", "3.6"))}
+    pupils = {side: marks.point_or_average(name) for side, name in (("left", "3.5"), ("right", "3.6"))}
     middle = float((pupils["left"][0] + pupils["right"][0]) / 2)
     found = {}
     for side, pupil in pupils.items():
@@ -92,7 +92,7 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
     unit = marks.fapu.IRISD
     iris = unit * 1024 / 2
     pupil = iris * PUPIL_OF_IRIS
-    low, high = limits(fap)
+    low, high = fap_limits(fap)
     smallest, largest = SMALLEST_PUPIL * pupil, LARGEST_PUPIL * iris
     # the diameter grows by value x IRISD
     bends = np.array([(smallest - pupil) * 2 / unit, (largest - pupil) * 2 / unit])
@@ -117,7 +117,7 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
         ] * eye.gaze
         shifts[values == 0] = 0.0
         motion = Motion(values, moving, shifts)
-        found[part.name] = guarded(Limiter(points, part.triangles.astype(np.intp)), motion)
+        found[part.name] = stop_at_folds(Limiter(points, part.triangles.astype(np.intp)), motion)
     return found
 
 

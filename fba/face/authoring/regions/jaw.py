@@ -9,8 +9,8 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
 from fba.face.authoring.surface.landmarks import Landmarks
-from fba.face.authoring.surface.motion import limits
-from fba.face.authoring.surface.weights import region, spread, without_hem
+from fba.face.authoring.surface.motion import fap_limits
+from fba.face.authoring.surface.weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.model import Part
 from fba.face.points import OPEN_JAW
 
@@ -74,24 +74,24 @@ class Jaw:
     size: float
 
 
-def jaw(marks: Landmarks) -> Jaw | str:
+def find_jaw(marks: Landmarks) -> Jaw | str:
     """The jaw of a face, or why it has none."""
     if not marks.has("2.1"):
         return "feature point 2.1 is not on the skin"
-    ears = np.array([marks.guess(name) for name in EARS])
+    ears = np.array([marks.point_or_average(name) for name in EARS])
     hinge = ears.mean(axis=0)[1:]
-    chin = marks.place("2.1")
+    chin = marks.point("2.1")
     if chin[2] - hinge[1] <= 0 or chin[1] >= hinge[0]:
         return "the chin (2.1) is not below and before the ears"
     share = _share(marks, hinge)
     return Jaw(share, _with_lip(marks, share), hinge, chin, marks.fapu.ES * 1024)
 
 
-def opening(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
+def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
     """(values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
-    low, high = limits(OPEN_JAW)
+    low, high = fap_limits(OPEN_JAW)
     fine = np.linspace(0, WIDEST, 400)
-    sunk = -turned(jaw.chin[None], jaw, fine)[:, 0, 1]
+    sunk = -opening_shifts(jaw.chin[None], jaw, fine)[:, 0, 1]
     fine = fine[: int(sunk.argmax()) + 1]
     sunk = np.maximum.accumulate(sunk[: len(fine)])
     deepest = min(float(sunk[-1]) / unit, high)
@@ -104,7 +104,7 @@ def opening(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
     return np.append([min(low, -1.0)], values), np.append([0.0], angles)
 
 
-def turned(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
+def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
     """(K, N, 3) shifts of points (N, 3) when the jaw opens by each angle (K,).
 
     It turns about the hinge, +z down, while the hinge itself slides forwards and a little down, as the
@@ -117,25 +117,25 @@ def turned(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
     return np.stack([zero, y * cos - z * sin - y - down, y * sin + z * cos - z + forward], axis=-1)
 
 
-def bite(marks: Landmarks) -> float:
+def bite_height(marks: Landmarks) -> float:
     """Height at which upper and lower teeth meet."""
-    heights = [marks.place(name)[1] for name in ("9.10", "9.11")]
+    heights = [marks.point(name)[1] for name in ("9.10", "9.11")]
     known = [h for h in heights if np.isfinite(h)]
-    lips = [marks.place(name)[1] for name in ("2.2", "2.3")]
-    return float(np.mean(known or [h for h in lips if np.isfinite(h)] or [marks.guess("9.10")[1]]))
+    lips = [marks.point(name)[1] for name in ("2.2", "2.3")]
+    return float(np.mean(known or [h for h in lips if np.isfinite(h)] or [marks.point_or_average("9.10")[1]]))
 
 
 def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
     """(N,) metres below the plane through the hinge and the teeth's edge."""
-    front = marks.guess("9.10")
+    front = marks.point_or_average("9.10")
     reach = max(front[2] - hinge[1], 1e-6)
     ahead = np.clip((points[:, 2] - hinge[1]) / reach, 0.2, None)
-    plane = hinge[0] + (bite(marks) - hinge[0]) * ahead
+    plane = hinge[0] + (bite_height(marks) - hinge[0]) * ahead
     result: Float64 = plane - points[:, 1]
     return result
 
 
-def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
+def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
     """(V,) how much each vertex of a part inside the mouth turns with the jaw.
 
     Each connected piece that lies on one side of the teeth's edge goes as one: a tooth does not bend.
@@ -156,8 +156,8 @@ def share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
             return np.full(len(part.vertices), float(each.mean() > 0.5))
         count = np.bincount(shape.component)
         mean = np.bincount(shape.component, each) / count
-        whole = np.abs(mean - 0.5) > MIXED
-        each = np.where(whole[shape.component], (mean > 0.5)[shape.component], each)
+        in_one_jaw = np.abs(mean - 0.5) > MIXED
+        each = np.where(in_one_jaw[shape.component], (mean > 0.5)[shape.component], each)
     result: Float64 = each[shape.number]
     return result
 
@@ -166,7 +166,7 @@ def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
     """1 for the lower teeth, 0 for the upper, where the feature points of only one row are on a part."""
     close = {}
     for row, names in ((0.0, ("9.8", "9.10")), (1.0, ("9.9", "9.11"))):
-        known = [place for name in names if np.isfinite(place := marks.place(name)).all()]
+        known = [place for name in names if np.isfinite(place := marks.point(name)).all()]
         if not known:
             return None
         away = [float(np.linalg.norm(part.vertices - place, axis=1).min()) for place in known]
@@ -191,13 +191,13 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
         | marks.lips
     )
     # below, the neck ends at a body that stays
-    end = surface.open_edge & (surface.vertices[:, 1] < marks.place("2.1")[1] - NECK * es)
+    end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK * es)
     still = np.unique(
         [*np.flatnonzero(lips | end), *(marks.vertex[name] for name in STILL if marks.has(name))]
     )
     inside = marks.inside_mouth
     near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
-    free = region(near, far, REACH * es) & ~inside & ~lips
+    free = reachable_region(near, far, REACH * es) & ~inside & ~lips
     fixed = np.concatenate([source, np.flatnonzero(lips)])
     given = np.concatenate([[values[int(v)] for v in source], np.zeros(int(lips.sum()))])
     if inside.any():
@@ -209,8 +209,8 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
         given = np.concatenate([given, (below[jaws] > 0).astype(np.float64)])
         free |= inside
     order = np.unique(fixed, return_index=True)[1]
-    field = spread(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
-    return without_hem(np.clip(field[:, 0], 0.0, 1.0), HEM)
+    field = solve_smooth_field(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
+    return trim_small(np.clip(field[:, 0], 0.0, 1.0), HEM)
 
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
@@ -242,13 +242,13 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     given[np.flatnonzero(lower)] = LIP_RIDE * along
     near_jaw = close & (share > 0.9)
     fixed = np.union1d(fixed, np.flatnonzero(near_jaw))
-    field = spread(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
-    return without_hem(np.clip(field, 0.0, 1.0), HEM)
+    field = solve_smooth_field(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
+    return trim_small(np.clip(field, 0.0, 1.0), HEM)
 
 
 def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:
     """(M,) 0 about the corners of the mouth, where the lips touch, 1 in its middle."""
     x = marks.surface.vertices[vertices, 0]
-    left, right = marks.guess("2.4")[0], marks.guess("2.5")[0]
+    left, right = marks.point_or_average("2.4")[0], marks.point_or_average("2.5")[0]
     across = (x - right) / (left - right)
     return smoothstep(3.5 * np.minimum(across, 1 - across) - 0.5)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64
+from fba.face.authoring.regions.eye_opening import CLOSED, LIDS, measure_opening, slide_lid
 from fba.face.authoring.regions.eyes import Eye
-from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, measure, slid
-from fba.face.authoring.surface.attached_parts import roots
+from fba.face.authoring.surface.attached_parts import hair_roots
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.surface import Surface
@@ -17,7 +17,7 @@ from fba.face.model import Part
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -> Motion:
     """Lashes turn with the margin that they grow on, each vertex as its root does."""
     side, name = LIDS[fap]
-    opening = measure(marks, eye)
+    opening = measure_opening(marks, eye)
     assert opening is not None  # the lid moves, so there is one
     shape = Surface([part])
     reach = [
@@ -33,12 +33,12 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -
     middle = float((opening.upper[:, 0] + opening.lower[:, 0]).mean()) / 2 + eye.centre[1]
     upper = np.where(np.abs(closest[0] - closest[1]) < 0.1 * wide, mean > middle, closest[0] < closest[1])
     grows = (upper == (name == "upper")) & (np.minimum(*closest) < 0.25 * wide)
-    root = roots(shape, reach[0 if name == "upper" else 1])
+    root = hair_roots(shape, reach[0 if name == "upper" else 1])
     moving = np.flatnonzero(grows[pieces][shape.number])
     points = part.vertices[moving].astype(np.float64)
     columns = shape.vertices[root[shape.number[moving]], 0]
     ways = np.clip(lid.values, *_sound_range(lid)) / CLOSED
-    turns = slid(points, np.ones(len(points)), opening, eye, name, ways, columns=columns)
+    turns = slide_lid(points, np.ones(len(points)), opening, eye, name, ways, columns=columns)
     return Motion(lid.values, moving, turns)
 
 

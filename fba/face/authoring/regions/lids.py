@@ -12,15 +12,20 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
-from fba.face.authoring.regions._lid_clearance import Profile, bridged, edge_length, freed
+from fba.face.authoring.regions._lid_clearance import (
+    Profile,
+    edge_length,
+    push_edges_outside,
+    push_vertices_outside,
+)
+from fba.face.authoring.regions.eye_opening import CLOSED, LIDS, Opening, measure_opening, slide_lid
 from fba.face.authoring.regions.eyes import Eye
-from fba.face.authoring.regions.mouth_opening import CLOSED, LIDS, Opening, measure, slid
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
-from fba.face.authoring.surface.motion import Motion, limits
-from fba.face.authoring.surface.motion_limits import guarded
-from fba.face.authoring.surface.unfold import relaxed
-from fba.face.authoring.surface.weights import smoothed, without_hem
+from fba.face.authoring.surface.motion import Motion, fap_limits
+from fba.face.authoring.surface.motion_limits import stop_at_folds
+from fba.face.authoring.surface.unfold import unfold
+from fba.face.authoring.surface.weights import average_with_neighbours, trim_small
 from fba.face.model import Part
 
 STEP = 128
@@ -64,34 +69,34 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
     if not len(own) or not len(other):
         return f"the margin of the {side} {lid if not len(own) else _other(lid)} lid is not on the skin"
-    opening = measure(marks, eye)
+    opening = measure_opening(marks, eye)
     if opening is None:
         return f"the lids of the {side} eye are not one above the other"
     share = _share(marks, opening, eye, lid, own, other)
     vertices = np.flatnonzero(share > 0)
     points = marks.surface.vertices[vertices]
     values = lid_values(fap)
-    shifts = slid(points, share[vertices], opening, eye, lid, values / CLOSED)
+    shifts = slide_lid(points, share[vertices], opening, eye, lid, values / CLOSED)
     profile = Profile(eye, parts, edge_length(marks, own, other))
-    shifts = freed(profile, points, shifts, values)
+    shifts = push_vertices_outside(profile, points, shifts, values)
     pinned = np.zeros(len(marks.surface), dtype=bool)
     pinned[own] = pinned[other] = True
-    motion = relaxed(marks.surface, limiter, Motion(values, vertices, shifts), pinned, True)
+    motion = unfold(marks.surface, limiter, Motion(values, vertices, shifts), pinned, True)
     points = marks.surface.vertices[motion.vertices]
-    shifts = freed(profile, points, motion.shifts, values)
-    shifts = bridged(profile, marks.surface, motion.vertices, shifts, pinned, values)
+    shifts = push_vertices_outside(profile, points, motion.shifts, values)
+    shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
     motion = Motion(values, motion.vertices, shifts)
     # in the corners skin closes on itself
     margins = np.concatenate([own, other])
     ends = marks.surface.vertices[own[[0, -1]]]
     near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)
     corners = margins[near < CORNER * np.linalg.norm(ends[1] - ends[0])]
-    return guarded(limiter.without(corners), motion, turning=True)
+    return stop_at_folds(limiter.without(corners), motion, turning=True)
 
 
 def lid_values(fap: int) -> Float64:
     """Borders: the range of the FAP, and in any case all of the way to the other lid."""
-    low, high = limits(fap)
+    low, high = fap_limits(fap)
     high = max(high, float(CLOSED))
     between = np.arange(np.ceil(low / STEP) * STEP, high + 1, STEP)
     return np.unique(np.concatenate([[low, 0.0, high], between[(between > low) & (between < high)]]))
@@ -131,8 +136,8 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     pinned[own] = pinned[stays] = True
     share[own] = 1.0
     share[stays] = 0.0
-    share = np.where(pinned, share, smoothed(surface, share, SMOOTHINGS))
-    return without_hem(share, HEM)
+    share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHINGS))
+    return trim_small(share, HEM)
 
 
 def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:

@@ -16,18 +16,18 @@ from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
-from fba.face.authoring.surface.motion import Motion, limits
+from fba.face.authoring.surface.motion import Motion, fap_limits
 from fba.face.authoring.surface.motion_limits import (
-    caps,
-    goals,
-    guarded,
-    held_back,
+    eased_linear_motion,
+    human_range,
     knots,
-    linear,
+    soft_limit,
+    stop_at_folds,
     values_between,
+    values_to_reach,
 )
-from fba.face.authoring.surface.unfold import eased_field
-from fba.face.authoring.surface.weights import region, spread, without_hem
+from fba.face.authoring.surface.unfold import ease_field
+from fba.face.authoring.surface.weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
@@ -79,7 +79,7 @@ class _Lips:
 def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
     """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
     numbers = [fap.number for fap in faps() if fap.group in (2, 8) and fap.number not in (3, 14, 15, 18)]
-    lost = {number: reason for number in numbers if (reason := _why_not(marks, number))}
+    lost = {number: reason for number in numbers if (reason := _missing_reason(marks, number))}
     if len(lost) == len(numbers):
         return {}, lost
     lips = _fields(marks)
@@ -88,22 +88,24 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
         mate = faps()[number - 1].lip_mate
         if number in lost or number in found:
             continue
-        whole = _direction(marks, number)[None] * _whole(lips, number)[:, None]
+        full_field = _direction(marks, number)[None] * _fap_field(lips, number)[:, None]
         if number in PUSH:
             share = lips.inward + OUTER_PUSH * (1 - lips.inward)
-            found[number] = _linear(marks, limiter, whole * share[:, None], number)
+            found[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
         elif mate is None or mate in lost:
             share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
-            found[number] = _linear(marks, limiter, whole * share[:, None], number)
+            found[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
         elif number < mate:
-            whole = eased_field(marks.surface, limiter, whole, goals(number), marks.on_contours(*LINES))
+            full_field = ease_field(
+                marks.surface, limiter, full_field, values_to_reach(number), marks.on_contours(*LINES)
+            )
             inward = lips.inward[:, None]
-            pair = _coupled(limiter, whole * inward, whole * (1 - inward), number)
+            pair = _coupled_motions(limiter, full_field * inward, full_field * (1 - inward), number)
             found[number], found[mate] = pair
     return found, lost
 
 
-def _why_not(marks: Landmarks, number: int) -> str:
+def _missing_reason(marks: Landmarks, number: int) -> str:
     point = faps()[number - 1].feature_points[0]
     if not marks.has(point):
         return f"feature point {point} is not on the skin"
@@ -127,7 +129,7 @@ def _direction(marks: Landmarks, number: int) -> Float64:
     return np.array(DIRECTIONS[fap.positive]) * marks.fapu[fap.unit]
 
 
-def _whole(lips: _Lips, number: int) -> Float64:
+def _fap_field(lips: _Lips, number: int) -> Float64:
     along = ALONG.get(number) or ALONG.get(faps()[number - 1].lip_mate or 0)
     point = faps()[number - 1].feature_points[0]
     own = next(name for name, pair in HANDLES.items() if point in pair)
@@ -160,10 +162,10 @@ def _fields(marks: Landmarks) -> _Lips:
     near = marks.surface.distances(fixed, limit=2 * REACH * es)
     still = [marks.vertex[name] for name in STILL if marks.has(name)]
     far = marks.surface.distances(still, limit=4 * REACH * es)
-    free = region(near, far, REACH * es)
+    free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
-    solved = spread(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
-    field = {name: without_hem(solved[:, k], HEM) for k, name in enumerate(names)}
+    solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
+    field = {name: trim_small(solved[:, k], HEM) for k, name in enumerate(names)}
     return _Lips(field, _inward(marks))
 
 
@@ -179,28 +181,30 @@ def _inward(marks: Landmarks) -> Float64:
     if not inner.any():
         return np.zeros(len(marks.surface))
     fixed = np.flatnonzero(inner | outer)
-    field = spread(
+    field = solve_smooth_field(
         marks.surface, marks.lips, fixed, inner[fixed][:, None].astype(np.float64), slack=1.0, harmonic=True
     )
     return smoothstep(field[:, 0])
 
 
-def _linear(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:
+def _motion_along(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:
     vertices = np.flatnonzero(np.abs(field).max(axis=1) > 0)
-    return linear(marks.surface, limiter, vertices, field[vertices], fap, marks.on_contours(*LINES))
+    return eased_linear_motion(
+        marks.surface, limiter, vertices, field[vertices], fap, marks.on_contours(*LINES)
+    )
 
 
-def _coupled(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:
+def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:
     """Motions of an inner and an outer FAP whose sum stays straight although each alone has its limit.
 
     Where one contour has come as close to the other as the skin between them can take, it stops, and
     from there on the other one, moving away, takes it along.
     """
-    low, high = limits(fap)
+    low, high = fap_limits(fap)
     vertices = np.flatnonzero((np.abs(inner) + np.abs(outer)).max(axis=1) > 0)
-    triangles = limiter.touched(vertices)
+    triangles = limiter.triangles_touching(vertices)
     most = {}
-    for sign, end, cap in zip((-1.0, 1.0), (low, high), caps(fap), strict=True):
+    for sign, end, cap in zip((-1.0, 1.0), (low, high), human_range(fap), strict=True):
         reach = [
             float(limiter.reach(sign * f, triangles).min(initial=np.inf))
             for f in (inner, outer, inner + outer)
@@ -216,13 +220,13 @@ def _coupled(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tupl
     moves: list[list[Float64]] = [[], []]
     for value in values:
         together, apart, inner_stops = most[1.0 if value > 0 else -1.0]
-        joint = held_back(value, together)
-        ahead = held_back(joint, apart)
+        joint = soft_limit(value, together)
+        ahead = soft_limit(joint, apart)
         stops, goes = (inner, outer) if inner_stops else (outer, inner)
         alone, taking = ahead * stops, joint * goes + (joint - ahead) * stops
         for place, shift in zip(moves, (alone, taking) if inner_stops else (taking, alone), strict=True):
             place.append(shift[vertices])
-    motions = [guarded(limiter, Motion(values, vertices, np.array(shifts))) for shifts in moves]
+    motions = [stop_at_folds(limiter, Motion(values, vertices, np.array(shifts))) for shifts in moves]
     return motions[0], motions[1]
 
 

@@ -8,8 +8,8 @@ from fba.arrays import Float64
 from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
-from fba.face.authoring.surface.motion import Motion, limits
-from fba.face.authoring.surface.motion_limits import caps, guarded, straight
+from fba.face.authoring.surface.motion import Motion, fap_limits
+from fba.face.authoring.surface.motion_limits import human_range, linear_motion, stop_at_folds
 from fba.face.model import Part
 from fba.face.points import DIRECTIONS, TONGUE_ROLL
 from fba.parameters import faps
@@ -23,20 +23,20 @@ ROLL_STEPS = 8
 
 def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
     """The motion of the tongue's part, or why there is none."""
-    missing = [name for name in POINTS[fap] if np.isnan(marks.place(name)).any()]
+    missing = [name for name in POINTS[fap] if np.isnan(marks.point(name)).any()]
     if missing:
         return f"feature point {missing[0]} is unknown"
     points = part.vertices.astype(np.float64)
     limiter = Limiter(points, part.triangles.astype(np.intp))
     if fap == TONGUE_ROLL:
-        return guarded(limiter, _roll(marks, points))
-    tip = marks.place("6.1")
+        return stop_at_folds(limiter, _roll(marks, points))
+    tip = marks.point("6.1")
     root = float(points[:, 2].min())
     if tip[2] - root <= 0:
         return "the tongue's tip (6.1) is not before its root"
     length = np.clip((points[:, 2] - root) / (tip[2] - root), 0.0, 1.0)
     if fap == 46:
-        middle = (marks.place("6.2")[2] - root) / (tip[2] - root)
+        middle = (marks.point("6.2")[2] - root) / (tip[2] - root)
         if not 0 < middle < 1:
             return "the tongue's body (6.2) is not between its root and its tip"
         share = np.where(
@@ -48,14 +48,16 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
         share = length**TIP_BEND
     entry = faps()[fap - 1]
     direction = np.array(DIRECTIONS[entry.positive]) * marks.fapu[entry.unit]
-    return straight(limiter, np.arange(len(points)), share[:, None] * direction, *limits(fap), caps(fap))
+    return linear_motion(
+        limiter, np.arange(len(points)), share[:, None] * direction, *fap_limits(fap), human_range(fap)
+    )
 
 
 def _roll(marks: Landmarks, points: Float64) -> Motion:
     """Sides turned up about the middle line, the more the further out: the section becomes a U."""
-    middle, left, right = (marks.place(name) for name in ("6.2", "6.3", "6.4"))
+    middle, left, right = (marks.point(name) for name in ("6.2", "6.3", "6.4"))
     unit = marks.fapu.AU
-    low, high = limits(TONGUE_ROLL)
+    low, high = fap_limits(TONGUE_ROLL)
     steps = np.append(np.linspace(low, 0.0, 3), np.linspace(0.0, high, ROLL_STEPS + 1))
     values: Float64 = np.unique(np.round(steps)).astype(np.float64)
     half = (left[0] - right[0]) / 2

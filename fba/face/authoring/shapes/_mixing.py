@@ -8,10 +8,10 @@ from fba.arrays import Bool, Float64
 from fba.easing import smoothstep
 from fba.face.authoring.shapes._shapes import Shapes
 from fba.face.authoring.surface.fold_limits import Limiter
-from fba.face.authoring.surface.motion import Motion, by_part, limits, tables
-from fba.face.authoring.surface.motion_limits import EASE, MODERATE, straight
+from fba.face.authoring.surface.motion import Motion, build_tables, fap_limits, split_by_part
+from fba.face.authoring.surface.motion_limits import EASE, MODERATE, linear_motion
 from fba.face.authoring.surface.surface import Surface
-from fba.face.authoring.surface.unfold import eased_field
+from fba.face.authoring.surface.unfold import ease_field
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.points import DIRECTIONS
@@ -82,10 +82,12 @@ class Mixer:
         details: dict[float, Float64] = {}
         used: set[str] = set()
         for sign in (-1.0, 1.0) if group else ():
-            solved = self._solved(group, sign)
+            solved = self._solve_weights(group, sign)
             if solved is not None:
-                step = self._put_right(group, self.shapes.mixed(solved))
-                plain = sum(first_steps(self.base, fap, sign) for fap in self._together(group).values())
+                step = self._correct_at_points(group, self.shapes.mix(solved))
+                plain = sum(
+                    first_steps(self.base, fap, sign) for fap in self._points_moved_together(group).values()
+                )
                 details[sign] = step - plain
                 halves = zip(self.shapes.halves, solved, strict=True)
                 used |= {half.shape for half, weight in halves if weight * self._value(group[0]) > 0.02}
@@ -102,12 +104,12 @@ class Mixer:
                 first_steps(self.base, fap, sign) + (share * details[sign] if sign in details else 0.0)
                 for sign in (-1.0, 1.0)
             )
-            table = guarded_tables(self.base, fap, down, up)
+            table = fold_limited_tables(self.base, fap, down, up)
             if table is not None:
                 made[fap] = table
         return made, used
 
-    def _together(self, group: tuple[int, ...]) -> dict[str, int]:
+    def _points_moved_together(self, group: tuple[int, ...]) -> dict[str, int]:
         """Points that shapes move at once, and their FAPs: those of a group and of the inner lip's."""
         found = {faps()[fap - 1].feature_points[0]: fap for fap in group}
         for fap in group:
@@ -127,11 +129,11 @@ class Mixer:
         """(P, 3): where one step of all FAPs of a group, and of their inner mates, brings each point."""
         wanted = np.zeros((len(self.points), 3))
         names = list(self.points)
-        for name, fap in self._together(group).items():
+        for name, fap in self._points_moved_together(group).items():
             wanted[names.index(name)] = np.array(DIRECTIONS[faps()[fap - 1].positive]) * self.unit[fap]
         return wanted
 
-    def _solved(self, group: tuple[int, ...], sign: float) -> Float64 | None:
+    def _solve_weights(self, group: tuple[int, ...], sign: float) -> Float64 | None:
         """(H,) weights of the halves that bring the points of a group one step in its direction."""
         from scipy.optimize import lsq_linear
 
@@ -157,7 +159,7 @@ class Mixer:
             return None
         return np.asarray(solution / (shares.mean() * value) * sign)
 
-    def _put_right(self, group: tuple[int, ...], step: Float64) -> Float64:
+    def _correct_at_points(self, group: tuple[int, ...], step: Float64) -> Float64:
         """(V, 3) for one step of a group: faded out of its region, and exact at all feature points."""
         region = next(region for region in REGIONS if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
@@ -165,20 +167,20 @@ class Mixer:
         rest, *_ = np.linalg.lstsq(self.coupling, self._steps(group) - step[self.vertices], rcond=1e-6)
         return np.asarray(step + self.weights @ rest)
 
-    def standing_in(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
+    def replacement_tables(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
         """A FAP that the mesh alone cannot serve, straight along shapes, in one direction."""
         entry = faps()[fap - 1]
         name = entry.feature_points[0]
         vertex = int(self.base.bound[row_of()[name]])
         if vertex < 0 or entry.positive not in DIRECTIONS:
             return None
-        field = np.sum([self.shapes.whole(shape) for shape in shapes], axis=0)
+        field = np.sum([self.shapes.displacements(shape) for shape in shapes], axis=0)
         way = np.array(DIRECTIONS[entry.positive])
         along = float(field[vertex] @ way)
         if not along > 0:
             return None
         step = field * self.unit[fap] / along
-        return guarded_tables(self.base, fap, step, step)
+        return fold_limited_tables(self.base, fap, step, step)
 
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
@@ -192,7 +194,7 @@ def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
     return field
 
 
-def guarded_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
+def fold_limited_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
     """Tables of a FAP that moves vertices by `down` (V, 3) a step below 0 and by `up` above, metres, up
     to where the skin would fold; None where nothing moves."""
     skins = [part for part in model.parts if part.kind in SKIN_KINDS]
@@ -203,9 +205,9 @@ def guarded_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> Fa
     pinned = np.zeros(len(surface), dtype=bool)
     place = np.full(len(model.vertices), -1)
     place[pool] = surface.number
-    held = model.bound[model.bound >= 0]
-    pinned[place[held][place[held] >= 0]] = True
-    low, high = limits(fap)
+    bound_vertices = model.bound[model.bound >= 0]
+    pinned[place[bound_vertices][place[bound_vertices] >= 0]] = True
+    low, high = fap_limits(fap)
     below = _side(surface, surface_field(surface, down[pool]), low, pinned)
     above = _side(surface, surface_field(surface, up[pool]), high, pinned)
     values = np.array([*below.values[below.values < 0], 0.0, *above.values[above.values > 0]])
@@ -217,7 +219,7 @@ def guarded_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> Fa
         side = below if value < 0 else above
         shifts[k, side.vertices] = side.shifts_at(value)
         share[k] = _progress(side, value)
-    motions = by_part(surface, Motion(values, moving, shifts[:, moving]))
+    motions = split_by_part(surface, Motion(values, moving, shifts[:, moving]))
     for part in model.parts:
         if part.kind in SKIN_KINDS:
             continue
@@ -226,7 +228,7 @@ def guarded_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> Fa
         if len(which):
             steps = np.where((share < 0)[:, None, None], down[own][which], up[own][which])
             motions[part.name] = Motion(values, which, steps * share[:, None, None])
-    made = tables(fap, model.fapu[faps()[fap - 1].unit], motions)
+    made = build_tables(fap, model.fapu[faps()[fap - 1].unit], motions)
     return made if made.meshes else None
 
 
@@ -243,9 +245,9 @@ def _side(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
     if not field.any() or not end:
         return Motion(np.array(sorted((0.0, end or 1.0))), np.zeros(0, dtype=np.intp), np.zeros((2, 0, 3)))
     goal = float(np.sign(end)) * min(MODERATE / EASE[0], abs(end))
-    eased = eased_field(surface, limiter, field, [goal], pinned)
+    eased = ease_field(surface, limiter, field, [goal], pinned)
     vertices = np.flatnonzero(eased.any(axis=1))
-    return straight(limiter, vertices, eased[vertices], min(end, 0.0), max(end, 0.0))
+    return linear_motion(limiter, vertices, eased[vertices], min(end, 0.0), max(end, 0.0))
 
 
 def _progress(side: Motion, value: float) -> float:

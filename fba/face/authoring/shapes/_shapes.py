@@ -38,7 +38,9 @@ class Shapes:
 
     def __init__(self, model: FaceModel, morphs: Morphs) -> None:
         self.model = model
-        self.morphs = {shape: checked(model.parts, shape, moved) for shape, moved in morphs.items()}
+        self.morphs = {
+            shape: check_displacements(model.parts, shape, moved) for shape, moved in morphs.items()
+        }
         middle = float(np.nanmean(model.points[:, 0]))
         width = max(2 * BLEND * model.fapu.ES * 1024, 1e-9)
         self._left = smoothstep((model.vertices[:, 0].astype(np.float64) - middle) / width + 0.5)
@@ -46,11 +48,11 @@ class Shapes:
 
     def field(self, half: Half) -> Float64:
         """(V, 3): what half a shape does to all vertices of the model."""
-        field = self.whole(half.shape)
+        field = self.displacements(half.shape)
         field *= (self._left if half.side > 0 else 1.0 - self._left)[:, None]
         return field
 
-    def whole(self, shape: str) -> Float64:
+    def displacements(self, shape: str) -> Float64:
         """(V, 3): what a shape does to all vertices of the model."""
         field = np.zeros((len(self.model.vertices), 3))
         for part, moved in self.morphs[shape].items():
@@ -58,7 +60,7 @@ class Shapes:
             field[start : start + len(moved)] = moved
         return field
 
-    def mixed(self, weights: npt.ArrayLike) -> Float64:
+    def mix(self, weights: npt.ArrayLike) -> Float64:
         """(V, 3): all halves together, each with its weight."""
         field = np.zeros((len(self.model.vertices), 3))
         for half, weight in zip(self.halves, np.asarray(weights, dtype=np.float64), strict=True):
@@ -75,7 +77,7 @@ class Shapes:
         return found
 
     def _halves(self, shape: str) -> list[Half]:
-        sizes = np.linalg.norm(self.whole(shape), axis=1)
+        sizes = np.linalg.norm(self.displacements(shape), axis=1)
         most = float(sizes.max(initial=0.0))
         if not most > 0:
             return []
@@ -86,7 +88,9 @@ class Shapes:
         ]
 
 
-def checked(parts: Sequence[Part], shape: str, moved: Mapping[str, Floating]) -> dict[str, Float32]:
+def check_displacements(
+    parts: Sequence[Part], shape: str, moved: Mapping[str, Floating]
+) -> dict[str, Float32]:
     """The displacements of one shape, checked against the parts."""
     counts = {part.name: len(part.vertices) for part in parts}
     result = {}

@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from fba.errors import FbaWarning
 from fba.face.authoring.author import author
-from fba.face.authoring.shapes._mixing import GROUPS, Mixer, guarded_tables
+from fba.face.authoring.shapes._mixing import GROUPS, Mixer, fold_limited_tables
 from fba.face.authoring.shapes._shapes import Morphs, Shapes
-from fba.face.authoring.shapes.shape_names import canonical, fap_of
+from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.expressions import Definitions
 from fba.face.model import FaceModel, Part
 from fba.face.tables import FaceDefTables
@@ -34,7 +34,7 @@ FEWEST_FAPS = 5
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
 """FAPs whose points move on arcs, or as bodies: jaw, lids, eyeballs, tongue, head. A shape is straight;
 it serves them only where the mesh alone cannot."""
-STANDING_IN = {
+REPLACEMENT_SHAPES = {
     3: ("jawOpen", "mouthClose"),
     19: ("eyeBlinkLeft",),
     20: ("eyeBlinkRight",),
@@ -67,7 +67,7 @@ def from_morphs(
     by_fap = {number: shape for shape in morphs if (number := fap_of(shape)) is not None}
     if len(by_fap) >= FEWEST_FAPS:
         return _from_faps(base, Shapes(base, {shape: morphs[shape] for shape in by_fap.values()}), by_fap)
-    known = canonical(morphs)
+    known = canonical_names(morphs)
     shapes = Shapes(base, {shape: morphs[written] for shape, written in known.items()})
     if not shapes.halves:
         if morphs:
@@ -90,18 +90,18 @@ def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
         tables |= made
         used |= names
     lost = dict(base.lost)
-    for fap, wanted in STANDING_IN.items():
+    for fap, wanted in REPLACEMENT_SHAPES.items():
         if fap in lost and wanted[0] in shapes.morphs:
-            table = mixer.standing_in(fap, [shape for shape in wanted if shape in shapes.morphs])
+            table = mixer.replacement_tables(fap, [shape for shape in wanted if shape in shapes.morphs])
             if table is not None:
                 tables[fap] = table
                 used |= set(wanted) & set(shapes.morphs)
                 del lost[fap]
-    said = {
+    notes_with_shapes = {
         **base.notes,
         "shapes": f"of {len(shapes.morphs)} ARKit shapes used: {', '.join(sorted(used)) or 'none'}",
     }
-    return replace(base, tables=tuple(tables.values()), lost=lost, notes=said)
+    return replace(base, tables=tuple(tables.values()), lost=lost, notes=notes_with_shapes)
 
 
 def _from_faps(base: FaceModel, shapes: Shapes, by_fap: Mapping[int, str]) -> FaceModel:
@@ -113,13 +113,13 @@ def _from_faps(base: FaceModel, shapes: Shapes, by_fap: Mapping[int, str]) -> Fa
     for fap, shape in by_fap.items():
         if fap in ARCS and fap in tables:
             continue
-        step = shapes.whole(shape) / morph_values()[fap]
-        made = guarded_tables(base, fap, step, step)
+        step = shapes.displacements(shape) / morph_values()[fap]
+        made = fold_limited_tables(base, fap, step, step)
         if made is not None:
             tables[fap] = made
             lost.pop(fap, None)
-    said = {
+    notes_with_shapes = {
         **base.notes,
         "shapes": f"{len(by_fap)} shapes named after FAPs, such as {faps()[min(by_fap) - 1].name}",
     }
-    return replace(base, tables=tuple(tables.values()), lost=lost, notes=said)
+    return replace(base, tables=tuple(tables.values()), lost=lost, notes=notes_with_shapes)

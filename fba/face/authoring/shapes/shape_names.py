@@ -36,7 +36,7 @@ def arkit_of(name: str) -> str | None:
     return known.get(_words(name)) or known.get(_words(re.split(r"[.:|/]", name)[-1]))
 
 
-def canonical(names: Iterable[str]) -> dict[str, str]:
+def canonical_names(names: Iterable[str]) -> dict[str, str]:
     """ARKit's name -> the name that a file uses for it; the first of several."""
     found: dict[str, str] = {}
     for name in names:

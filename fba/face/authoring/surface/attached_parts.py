@@ -1,4 +1,4 @@
-"""Small parts on the skin, such as brows and lashes, carried along by it."""
+"""Motions of small parts attached to the skin, such as brows and lashes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from fba.face.authoring.surface.surface import Surface
 from fba.face.model import Part
 
 NEIGHBOURS = 8
+"""Candidate triangles for the nearest point on the skin."""
 ROOT = 0.3
-"""Vertices of a hair this much further from the skin than its nearest one are roots too, in edge lengths."""
+"""Vertices of a hair up to this much further from the skin than its nearest are roots, in edge lengths."""
 LARGEST = 1.2
-"""Parts of no special kind are carried where they are smaller than this, in ES0: a mole, not a shirt."""
+"""Parts of kind "other" are attached if smaller than this, in ES0: a mole, not a shirt."""
 NEAR = 0.1
-"""Parts with most of their vertices this close to the skin, in ES0, are carried by it."""
+"""Parts with most of their vertices this close to the skin, in ES0, are attached to it."""
 
 
 class Anchors:
@@ -31,15 +32,17 @@ class Anchors:
         corners = surface.vertices[surface.triangles]
         tree = cKDTree(corners.mean(axis=1))
         _, near = tree.query(shape.vertices, k=min(NEIGHBOURS, len(corners)))
-        best, shares, away = _closest(corners, near.reshape(len(shape.vertices), -1), shape.vertices)
-        root = roots(shape, away) if part.kind == "lash" else np.arange(len(shape.vertices))
+        best, shares, away = _closest_triangles(
+            corners, near.reshape(len(shape.vertices), -1), shape.vertices
+        )
+        root = hair_roots(shape, away) if part.kind == "lash" else np.arange(len(shape.vertices))
         self.distance: Float64 = away[shape.number]
         self._best: Intp = best[root][shape.number]
         self._shares: Float64 = shares[root][shape.number]
 
-    def carried(self, motion: Motion) -> Motion:
+    def carry(self, motion: Motion) -> Motion:
         """The motion of the part for a motion of the surface: vertices move and turn with their triangles."""
-        whole = np.zeros_like(self._neutral)
+        skin = np.zeros_like(self._neutral)
         place = np.full(len(self._neutral), -1)
         place[motion.vertices] = np.arange(len(motion.vertices))
         moving = np.flatnonzero((place[self._triangles[self._best]] >= 0).any(axis=1))
@@ -52,18 +55,18 @@ class Anchors:
         local = np.einsum("nij,ni->nj", frame, arm)
         shifts = np.zeros((len(motion.values), len(moving), 3))
         for k in range(len(motion.values)):
-            whole[motion.vertices] = motion.shifts[k]
-            after = before + whole[triangles]
+            skin[motion.vertices] = motion.shifts[k]
+            after = before + skin[triangles]
             foot_after = (after * shares[:, :, None]).sum(axis=1)
             shifts[k] = foot_after + np.einsum("nij,nj->ni", _frames(after), local) - self._points[moving]
         shifts[motion.values == 0] = 0.0
         return Motion(motion.values, moving, shifts)
 
 
-def roots(shape: Surface, away: Float64) -> Intp:
-    """(N,) for each vertex of hairs the one that they grow from, along the hair.
+def hair_roots(shape: Surface, away: Float64) -> Intp:
+    """(N,) for each vertex of hairs the root vertex that it grows from, along the hair.
 
-    away: (N,) distances from the skin; roots are where a connected piece is as near as anywhere.
+    away: (N,) distances from the skin; roots are the nearest vertices of each connected piece.
     """
     from scipy.sparse.csgraph import dijkstra
 
@@ -76,7 +79,7 @@ def roots(shape: Surface, away: Float64) -> Intp:
     return result
 
 
-def _closest(corners: Float64, near: Intp, points: Float64) -> tuple[Intp, Float64, Float64]:
+def _closest_triangles(corners: Float64, near: Intp, points: Float64) -> tuple[Intp, Float64, Float64]:
     """(triangle, barycentric shares, distance) of the nearest of some candidate triangles (N, K)."""
     best = near[:, 0].copy()
     shares = np.full((len(points), 3), 1 / 3)

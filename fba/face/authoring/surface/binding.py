@@ -1,4 +1,4 @@
-"""Which vertex each feature point stands on."""
+"""Binds feature points to the vertices that they stand on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fba.face.feature_points import names, row_of
 from fba.face.model import Part
 
 FREE_POINTS = ("7.1", "11.5")
-"""Points that lie inside the head or above the skin."""
+"""Points bound to no vertex: they lie inside the head or above the skin."""
 KINDS_OF_GROUP = {6: ("tongue",)}
 KINDS_OF_POINT = {
     **dict.fromkeys(("3.5", "3.6"), ("eye",)),
@@ -27,7 +27,7 @@ SURFACE_KINDS = ("skin", "mouth")
 TOLERANCE = 0.15
 """A point may lie this far from its part, as a share of the face's size."""
 LIP_SLACK = 0.02
-"""Between lips that touch the right one may be this much further away, as a share of the face's size."""
+"""The right one of two touching lips may be this much further away, as a share of the face's size."""
 JAW_OF_TEETH = {"9.8": 1, "9.10": 1, "9.9": -1, "9.11": -1}
 UPPER_LIP, LOWER_LIP = ("2.2", "2.6", "2.7"), ("2.3", "2.8", "2.9")
 
@@ -44,7 +44,7 @@ class Binding:
 
 
 def face_size(points: Float64) -> float:
-    """The size of the face: the spread of its known feature points."""
+    """Size of the face, metres: half the diagonal of the box around its known feature points."""
     known = points[np.isfinite(points).all(axis=1)]
     if len(known) < 2:
         raise ModelError(
@@ -54,7 +54,7 @@ def face_size(points: Float64) -> float:
 
 
 def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | None) -> Binding:
-    """Bind feature points to the nearest vertices of the parts that they belong to.
+    """Feature points (84, 3) bound to the nearest vertices of the parts that they belong to.
 
     bound: vertices chosen by the caller, -1 where the nearest is to be taken. Raises ModelError where
     most points are nowhere near the mesh, or a chosen vertex does not exist.
@@ -72,17 +72,17 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
     vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
     found = given.astype(np.int32)
     far: dict[str, float] = {}
-    pieces = cache(lambda: _pieces(parts, KINDS_OF_POINT["9.8"]))
+    pieces = cache(lambda: _connected_pieces(parts, KINDS_OF_POINT["9.8"]))
     sought = [name for name in names() if found[row_of()[name]] < 0 and name not in FREE_POINTS]
     for name in sought:
         row = row_of()[name]
-        pool = pool_of(parts, kinds_of(name))
+        pool = vertices_of_kinds(parts, kinds_for_point(name))
         if np.isnan(points[row]).any() or not len(pool):
             continue
         away = np.linalg.norm(vertices[pool] - points[row], axis=1)
         nearest = int(away.argmin())
         if name in JAW_OF_TEETH:
-            nearest = _in_jaw(vertices[pool], pieces(), away, JAW_OF_TEETH[name], LIP_SLACK * size)
+            nearest = _nearest_in_jaw(vertices[pool], pieces(), away, JAW_OF_TEETH[name], LIP_SLACK * size)
         if away[nearest] > TOLERANCE * size:
             far[name] = float(away[nearest])
         else:
@@ -95,23 +95,24 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
             "do points and mesh have the same unit and axes?"
         )
     placed = points.copy()
-    held = found >= 0
-    placed[held] = vertices[found[held]]
+    is_bound = found >= 0
+    placed[is_bound] = vertices[found[is_bound]]
     return Binding(placed, found, far)
 
 
-def part_lips(
+def separate_lips(
     surface: Surface, parts: Sequence[Part], points: Float64, binding: Binding, size: float
 ) -> Binding:
-    """The binding, with points released that were bound to the other lip.
+    """The binding with points that were bound to the wrong lip moved to the right one.
 
-    Lips touch, so the nearest vertex may be on the wrong one; walking tells them apart.
+    Lips touch, so the nearest vertex may be on the wrong one; the distance along the surface to the outer
+    lip points (8.1, 8.2) tells them apart.
     """
     found, row = binding.bound.copy(), row_of()
     outer = [int(found[row[name]]) for name in ("8.1", "8.2")]
     if min(outer) < 0:
         return binding
-    pool = pool_of(parts, SURFACE_KINDS)
+    pool = vertices_of_kinds(parts, SURFACE_KINDS)
     number = np.full(len(found) if not len(pool) else int(pool.max()) + 1, -1, dtype=np.intp)
     number[pool] = surface.number
     walk = [surface.distances([number[vertex]], limit=2 * size) for vertex in outer]
@@ -130,13 +131,13 @@ def part_lips(
                 found[row[name]] = pool[nearest]
     vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
     placed = binding.points.copy()
-    held = found >= 0
-    placed[held] = vertices[found[held]]
+    is_bound = found >= 0
+    placed[is_bound] = vertices[found[is_bound]]
     return Binding(placed, found, binding.far)
 
 
-def _pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
-    """Connected piece of each vertex of the parts of some kinds."""
+def _connected_pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
+    """(V,) number of the connected piece of each vertex of the parts of some kinds."""
     found, count = [np.zeros(0, dtype=np.intp)], 0
     for part in parts:
         if part.kind in kinds:
@@ -146,8 +147,8 @@ def _pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
     return np.concatenate(found)
 
 
-def _in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, slack: float) -> int:
-    """Of the vertices that are nearest within some slack, the nearest of the highest or lowest piece.
+def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, slack: float) -> int:
+    """The nearest vertex in one jaw, among those at most `slack` metres further than the nearest of all.
 
     Teeth touch, so the nearest vertex may be in the wrong jaw. jaw: 1 upper, -1 lower.
     """
@@ -158,13 +159,13 @@ def _in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, slack: floa
 
 
 def lip_sides(surface: Surface, parts: Sequence[Part], points: Float64, bound: Int32) -> Intp | None:
-    """(V,) of the skin's vertices: 1 for those of the upper lip, 2 of the lower, 0 elsewhere.
+    """(V,) for the skin's vertices: 1 on the upper edge of the mouth, 2 on the lower, 0 elsewhere, or None.
 
-    None but where the mouth is a slit whose two edges lie on each other, so that they were taken for a
-    seam and joined.
+    None unless the mouth is a slit whose two edges coincide, so that they were taken for a seam and
+    joined.
     """
     row = row_of()
-    pool = pool_of(parts, SURFACE_KINDS)
+    pool = vertices_of_kinds(parts, SURFACE_KINDS)
     number = np.full(int(pool.max(initial=-1)) + 1, -1, dtype=np.intp)
     number[pool] = surface.number
     line = [int(bound[row[name]]) for name in ("2.4", "2.2", "2.5")]
@@ -189,15 +190,15 @@ def lip_sides(surface: Surface, parts: Sequence[Part], points: Float64, bound: I
     return np.where(np.isin(surface.number, both), np.where(above, 1, 2), 0).astype(np.intp)
 
 
-def kinds_of(name: str) -> tuple[str, ...]:
+def kinds_for_point(name: str) -> tuple[str, ...]:
     """Kinds of parts that a feature point can stand on."""
     if name in KINDS_OF_POINT:
         return KINDS_OF_POINT[name]
     return KINDS_OF_GROUP.get(int(name.split(".", maxsplit=1)[0]), SURFACE_KINDS)
 
 
-def pool_of(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
-    """Vertices of the parts of some kinds, counted through all parts."""
+def vertices_of_kinds(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
+    """(N,) vertices of the parts of some kinds, counted through all parts."""
     start, found = 0, [np.zeros(0, dtype=np.intp)]
     for part in parts:
         if part.kind in kinds:

@@ -1,4 +1,4 @@
-"""The extent of a motion up to which triangles neither fold over nor tear."""
+"""Measures how far a motion can go before triangles fold over or tear."""
 
 from __future__ import annotations
 
@@ -14,18 +14,22 @@ LEAST_AREA = 0.12
 MOST_STRETCH = 5.0
 """No edge gets longer than this many times its neutral length..."""
 TINY_EDGE = 0.25
-"""... or, where edges are short, of this share of the typical edge of what moves."""
+"""... or, for short edges, of this share of the typical edge length of what moves."""
 FOLDED = -0.3
 """A triangle whose normal has this cosine with that of its neighbours lies folded on them."""
 SPECK = 0.0015
 """Share of the moving surface that may lie folded where skin closes on itself."""
-FEW = 0.1
+FEW_VERTICES = 0.1
+"""Up to this share of all vertices, their triangles are looked up one vertex at a time."""
 DEGENERATE = 1e-5
 """Triangles of less than this share of the typical area have no front to turn."""
 
 
 class Limiter:
-    """Measures motions of a mesh. vertices: (N, 3) neutral. triangles: (F, 3)."""
+    """Measures how far motions of a mesh can go.
+
+    vertices: (N, 3), neutral, metres. triangles: (F, 3).
+    """
 
     def __init__(self, vertices: Float64, triangles: Intp) -> None:
         self._vertices = vertices
@@ -51,11 +55,11 @@ class Limiter:
         count = np.bincount(self._triangles.ravel(), minlength=len(self._vertices))
         return np.concatenate([[0], np.cumsum(count)]), order // 3
 
-    def touched(self, vertices: Intp) -> Intp:
+    def triangles_touching(self, vertices: Intp) -> Intp:
         """(M, 3) triangles with a vertex among those given."""
         starts, fans = self._fans
         touched: Intp
-        if len(vertices) > FEW * len(self._vertices):
+        if len(vertices) > FEW_VERTICES * len(self._vertices):
             moving = np.zeros(len(self._vertices), dtype=bool)
             moving[vertices] = True
             touched = self._triangles[moving[self._triangles].any(axis=1)]
@@ -66,7 +70,7 @@ class Limiter:
         return touched
 
     def reach(self, field: Float64, triangles: Intp) -> Float64:
-        """(M,) for each triangle the largest s up to which vertices + s * field (N, 3) keeps it sound."""
+        """(M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it unfolded."""
         p, d = self._vertices, field
         e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
         d1, d2 = (d[triangles[:, k]] - d[triangles[:, 0]] for k in (1, 2))
@@ -84,10 +88,10 @@ class Limiter:
             result = np.minimum(result, stretch)
         return result
 
-    def sound(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> bool:
-        """Whether vertices + shifts (N, 3) keeps all these triangles sound.
+    def is_sound(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> bool:
+        """Whether no triangle folds or tears at vertices + shifts (N, 3).
 
-        turning: as in `soundness`; then specks that fold in the corners of the eye or mouth may be.
+        turning: as in `soundness`; then tiny folds (`SPECK`) in the corners of eyes and mouth are allowed.
         """
         fine = self.soundness(shifts, triangles, turning=turning)
         if not turning or fine.all():
@@ -97,10 +101,10 @@ class Limiter:
         return float(areas[~fine].sum()) <= SPECK * float(areas.sum())
 
     def soundness(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> Bool:
-        """(M,) which triangles stay sound under shifts.
+        """(M,) which triangles neither fold nor tear under shifts (N, 3).
 
-        turning: what moves may turn, as a lid does about the eyeball; then a triangle has folded where it
-        faces away from its neighbours, not where it faces away from its neutral place.
+        turning: the skin may rotate, as a lid does about the eyeball; then a triangle has folded where it
+        faces away from its neighbours, not where it faces away from its neutral direction.
         """
         p = self._vertices[triangles]
         q = p + shifts[triangles]

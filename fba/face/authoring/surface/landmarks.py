@@ -1,4 +1,4 @@
-"""The feature points and contours of a face on its surface."""
+"""Feature points and contours of a face on its surface."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Intp
-from fba.face.authoring.surface.binding import SURFACE_KINDS, lip_sides, pool_of
+from fba.face.authoring.surface.binding import SURFACE_KINDS, lip_sides, vertices_of_kinds
 from fba.face.authoring.surface.surface import Surface
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, neutral_points, row_of
@@ -29,7 +29,7 @@ CONTOURS = {
 }
 """Lines on the face by the feature points that they run through."""
 OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
-"""Those about an opening, which in many meshes is a hole."""
+"""Contours about an opening, which in many meshes is a hole."""
 
 
 @dataclass(eq=False)
@@ -46,8 +46,8 @@ class Landmarks:
     fapu: Fapu
     _contours: dict[str, Intp] = field(default_factory=dict)
 
-    def place(self, name: str) -> Float64:
-        """Where a feature point is, NaN where unknown."""
+    def point(self, name: str) -> Float64:
+        """(3,) position of a feature point, metres; NaN where unknown."""
         place: Float64 = self.points[row_of()[name]]
         return place
 
@@ -76,19 +76,19 @@ class Landmarks:
 
     @cached_property
     def inside_mouth(self) -> Bool:
-        """(N,) vertices behind the inner lips: what the inner lips cut off from the nose."""
+        """(N,) mask of the vertices behind the inner lips, which these separate from the outer face."""
         return self._cut_off(("upper inner lip", "lower inner lip"))
 
     @cached_property
     def lips(self) -> Bool:
-        """(N,) vertices between the outer contour and the inner one, both excluded."""
+        """(N,) mask of the lips' vertices between outer and inner contour, both excluded."""
         return (
             self._cut_off(("upper outer lip", "lower outer lip")) & ~self.inside_mouth & ~self.on_inner_lips
         )
 
     @cached_property
     def on_inner_lips(self) -> Bool:
-        """(N,) vertices of the inner contour."""
+        """(N,) mask of the vertices on the inner contour."""
         return self.on_contours("upper inner lip", "lower inner lip")
 
     def on_contours(self, *contours: str) -> Bool:
@@ -99,6 +99,7 @@ class Landmarks:
         return mask
 
     def _cut_off(self, contours: tuple[str, ...]) -> Bool:
+        """(N,) mask of vertices that contours separate from the outer face; none if one is missing."""
         nothing = np.zeros(len(self.surface), dtype=bool)
         loop = np.unique(np.concatenate([self.contour(name) for name in contours]))
         if any(not len(self.contour(name)) for name in contours):
@@ -113,8 +114,8 @@ class Landmarks:
         return np.asarray(main & (pieces >= 0) & ~np.isin(pieces, pieces[outside]))
 
     @cached_property
-    def guessed(self) -> Float64:
-        """(84, 3): every feature point; unknown ones as on an average adult head.
+    def points_or_average(self) -> Float64:
+        """(84, 3) every feature point, metres; unknown ones as on an average adult head.
 
         The average is stretched along each axis and moved to fit the known points.
         """
@@ -129,14 +130,18 @@ class Landmarks:
             result[~known, axis] = guess[~known]
         return result
 
-    def guess(self, name: str) -> Float64:
-        """Position of a point; if unknown, as on an average head."""
-        place: Float64 = self.guessed[row_of()[name]]
+    def point_or_average(self, name: str) -> Float64:
+        """(3,) position of a feature point; if unknown, as on an average adult head."""
+        place: Float64 = self.points_or_average[row_of()[name]]
         return place
 
 
 def landmarks(surface: Surface, points: Float64, bound: Int32, pool: Intp) -> Landmarks:
-    """pool: for each vertex that the surface was made of, its number counted through all parts."""
+    """Landmarks of a surface.
+
+    points: (84, 3), metres. bound: (84,), vertices counted through all parts, -1 where free. pool: for each
+    vertex that the surface was made of, its number counted through all parts.
+    """
     number = np.full(int(max(pool.max(initial=-1), bound.max(initial=-1))) + 1, -1, dtype=np.intp)
     number[pool] = surface.number
     vertex = {
@@ -153,7 +158,7 @@ def surface_of(parts: Sequence[Part], points: Float64, bound: Int32) -> tuple[Su
     A mouth that is a slit, its edges on each other, stays open.
     """
     skins = [part for part in parts if part.kind in SURFACE_KINDS]
-    pool = pool_of(parts, SURFACE_KINDS)
+    pool = vertices_of_kinds(parts, SURFACE_KINDS)
     surface = Surface(skins)
     sides = lip_sides(surface, parts, points, bound)
     return (surface if sides is None else Surface(skins, sides)), pool

@@ -1,4 +1,4 @@
-"""The displacements of one FAP, in metres at chosen values; the last step before FaceDefMesh."""
+"""Displacements of one FAP, in metres at chosen values, and their conversion to FaceDefTables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Motion:
     shifts: Float64
 
     def shifts_at(self, value: float) -> Float64:
-        """(N, 3): shifts at a value; beyond the outermost values nothing moves any more."""
+        """(N, 3) shifts at a value, metres; constant beyond the outermost values."""
         x = float(np.clip(value, self.values[0], self.values[-1]))
         k = int(np.clip(np.searchsorted(self.values, x) - 1, 0, len(self.values) - 2))
         share = (x - self.values[k]) / (self.values[k + 1] - self.values[k])
@@ -37,7 +37,7 @@ class Motion:
         return result
 
 
-def limits(fap: int) -> tuple[float, float]:
+def fap_limits(fap: int) -> tuple[float, float]:
     """Smallest and largest value that a stream can carry with the finest quantiser step."""
     entry = faps()[fap - 1]
     assert entry.i_limits is not None
@@ -45,8 +45,8 @@ def limits(fap: int) -> tuple[float, float]:
     return float(low * entry.step), float(high * entry.step)
 
 
-def by_part(surface: Surface, motion: Motion) -> dict[str, Motion]:
-    """A motion of the surface as motions of the parts that it was made of."""
+def split_by_part(surface: Surface, motion: Motion) -> dict[str, Motion]:
+    """A motion of the surface as motions of its parts, by name of the part."""
     place = np.full(len(surface), -1)
     place[motion.vertices] = np.arange(len(motion.vertices))
     result = {}
@@ -57,7 +57,7 @@ def by_part(surface: Surface, motion: Motion) -> dict[str, Motion]:
     return result
 
 
-def tables(
+def build_tables(
     fap: int, unit: float, motions: Mapping[str, Motion], transforms: Iterable[FaceDefTransform] = ()
 ) -> FaceDefTables:
     """FaceDefTables of one FAP. unit: metres a step. motions: by name of the part."""
@@ -71,7 +71,7 @@ def _mesh(part: str, motion: Motion, unit: float) -> FaceDefMesh | None:
         return None
     borders = np.round(motion.values).astype(np.int64)
     slopes = np.diff(motion.shifts[:, moving], axis=0) / np.diff(borders)[:, None, None] / unit
-    # past the outermost value nothing moves any more, whatever a stream asks for
+    # constant beyond the outermost values, whatever a stream asks for
     flat = np.zeros((1, *slopes.shape[1:]))
     borders = np.concatenate([[borders[0] - 1], borders, [borders[-1] + 1]])
     slopes = np.concatenate([flat, slopes, flat])

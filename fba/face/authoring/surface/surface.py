@@ -16,7 +16,7 @@ from fba.mesh.meshes import vertex_normals
 WELD = 1e-6
 """Vertices on open edges this close together, as a share of the surface's extent, are one: a seam."""
 RIM = 0.4
-"""What a step along an open edge counts of its length."""
+"""Share of its length that a step along an open edge costs."""
 SMALLEST_COTANGENT = 0.02
 """Obtuse triangles would give negative weights, and with them folds."""
 
@@ -24,8 +24,8 @@ SMALLEST_COTANGENT = 0.02
 class Surface:
     """Several parts (skin, inner mouth) as one surface, vertices at seams joined.
 
-    vertices: (N, 3). triangles: (F, 3). members: for each part its name and, for each of its vertices,
-    the vertex of the surface.
+    vertices: (N, 3), metres. triangles: (F, 3). number: (V,), for each vertex counted through the parts,
+    the vertex of the surface. members: for each part its name and its slice of number.
     """
 
     def __init__(self, parts: Sequence[Part], sides: Intp | None = None) -> None:
@@ -35,12 +35,12 @@ class Surface:
         triangles = np.concatenate(
             [part.triangles.astype(np.intp) + start for part, start in zip(parts, starts, strict=False)]
         )
-        joined = _welded(vertices, triangles, sides)
+        joined = _weld(vertices, triangles, sides)
         first, number = np.unique(joined, return_inverse=True)
         self.vertices: Float64 = vertices[first]
-        whole = number[triangles]
-        a, b, c = whole.T
-        self.triangles: Intp = whole[(a != b) & (b != c) & (c != a)]
+        joined_triangles = number[triangles]
+        a, b, c = joined_triangles.T
+        self.triangles: Intp = joined_triangles[(a != b) & (b != c) & (c != a)]
         self.members = [
             (part.name, number[start : start + len(part.vertices)])
             for part, start in zip(parts, starts, strict=False)
@@ -51,13 +51,13 @@ class Surface:
         return len(self.vertices)
 
     @cached_property
-    def _counted(self) -> tuple[Intp, Intp]:
+    def _edge_counts(self) -> tuple[Intp, Intp]:
         return _edges(self.triangles)
 
     @property
     def edges(self) -> Intp:
         """(E, 2) each edge once."""
-        return self._counted[0]
+        return self._edge_counts[0]
 
     @cached_property
     def graph(self) -> Any:
@@ -71,10 +71,10 @@ class Surface:
 
     @cached_property
     def rim_graph(self) -> Any:
-        """(N, N) the same with edges on the rim counted as shorter: walks keep to it."""
+        """(N, N) sparse matrix of edge lengths, open edges shortened so that paths keep to the rim."""
         from scipy.sparse import csr_array
 
-        edges, count = self._counted
+        edges, count = self._edge_counts
         a, b = edges.T
         length = np.maximum(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1), 1e-12)
         length[count == 1] *= RIM
@@ -95,14 +95,14 @@ class Surface:
 
     @cached_property
     def open_edge(self) -> Bool:
-        """(N,) vertices on the rim of the surface."""
-        edges, count = self._counted
+        """(N,) mask of the vertices on open edges, the rim of the surface."""
+        edges, count = self._edge_counts
         rim = np.zeros(len(self), dtype=bool)
         rim[edges[count == 1]] = True
         return rim
 
     def distances(self, sources: npt.ArrayLike, limit: float = np.inf) -> Float64:
-        """(N,) how far it is to walk along edges from the nearest source; inf beyond the limit."""
+        """(N,) distance along edges from the nearest source, metres; inf beyond the limit."""
         from scipy.sparse.csgraph import dijkstra
 
         start = np.unique(np.asarray(sources, dtype=np.intp))
@@ -112,9 +112,9 @@ class Surface:
         return found
 
     def path(self, start: int, end: int, *, rim: bool = False) -> Intp:
-        """The vertices of the shortest walk along edges, both ends included; empty where there is none.
+        """The vertices of the shortest path along edges, both ends included; empty where there is none.
 
-        rim: keep to open edges where there are such: of a mouth that is a slit, of eyes that are holes.
+        rim: prefer open edges, as of a mouth that is a slit or eyes that are holes.
         """
         from scipy.sparse.csgraph import dijkstra
 
@@ -137,12 +137,10 @@ class Surface:
         return np.array(walk[::-1], dtype=np.intp)
 
     def pieces_without(self, removed: Intp) -> Intp:
-        """(N,) connected pieces of what remains without some vertices; -1 for those."""
+        """(N,) number of the connected piece of each vertex once some are removed; -1 for those."""
         from scipy.sparse.csgraph import connected_components
 
-        kept = np.ones(len(self), dtype=bool)
-        kept[removed] = False
-        rest = np.flatnonzero(kept)
+        rest = np.setdiff1d(np.arange(len(self)), removed)
         labels = np.full(len(self), -1, dtype=np.intp)
         labels[rest] = connected_components(self.graph[rest][:, rest], directed=False)[1]
         return labels
@@ -175,7 +173,7 @@ class Surface:
 
 
 def _edges(triangles: Intp) -> tuple[Intp, Intp]:
-    """(E, 2) each edge once, the lower vertex first, in rising order; (E,) how many triangles have it."""
+    """((E, 2) each edge once, lower vertex first, in rising order; (E,) how many triangles share it)."""
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     size = int(sides.max(initial=0)) + 1
     # One number an edge: rows of two numbers take np.unique thirty times as long.
@@ -183,8 +181,8 @@ def _edges(triangles: Intp) -> tuple[Intp, Intp]:
     return np.stack(np.divmod(keys, size), axis=1).astype(np.intp), count
 
 
-def _welded(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
-    """(N,) for each vertex the first of those at the same place that it is joined with."""
+def _weld(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
+    """(N,) for each vertex the lowest number of those that it is joined with."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree

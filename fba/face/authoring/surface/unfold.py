@@ -1,4 +1,4 @@
-"""Motions that fold a few triangles, eased there so that they do not."""
+"""Eases motions around triangles that would fold."""
 
 from __future__ import annotations
 
@@ -12,48 +12,52 @@ from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.surface import Surface
 
 RINGS = 3
-"""So many edges around folded triangles may be eased."""
+"""Vertices up to this many edges away from folded triangles may be eased."""
 STAGES = (0.4, 0.7, 1.0)
-"""Nearer goals are seen to first: what folds there is most in the way."""
-KEPT = 0.88
-"""Easing the way to one goal may not cost more than this of the way to another."""
+"""Shares of a goal, in the order in which they are tried: early folds are the worst."""
+LEAST_RETAINED = 0.88
+"""Easing towards one goal must leave at least this share of what another reached."""
 ROUNDS = 2
-"""Easing one place may fold its neighbours; so many times this is looked after."""
+"""Easing one spot may fold its neighbours: number of passes."""
 
 
-def relaxed(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
-    """The same motion with the surroundings of folded triangles stretched evenly.
+def unfold(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
+    """The motion with the surroundings of folded triangles stretched evenly.
 
-    pinned: (N,) vertices that must go where they go. turning: as in `Limiter.soundness`. Where nothing
-    helps, the folds stay.
+    pinned: (N,) mask of vertices whose shifts must not change. turning: as in `Limiter.soundness`. Folds
+    remain where this does not help.
     """
-    whole = np.zeros((len(motion.values), len(surface), 3))
-    whole[:, motion.vertices] = motion.shifts
+    shifts_of_all = np.zeros((len(motion.values), len(surface), 3))
+    shifts_of_all[:, motion.vertices] = motion.shifts
     moved = np.zeros(len(surface), dtype=bool)
     moved[motion.vertices] = True
     zero = int(np.flatnonzero(motion.values == 0)[0])
-    for side in (range(zero + 1, len(whole)), range(zero - 1, -1, -1)):
+    for side in (range(zero + 1, len(shifts_of_all)), range(zero - 1, -1, -1)):
         for k in side:
             for _ in range(ROUNDS):
-                triangles = limiter.touched(np.flatnonzero(moved))
-                bad = triangles[~limiter.soundness(whole[k], triangles, turning=turning)]
-                for cluster in _clusters(bad):
-                    whole[k] = _eased(surface, limiter, whole[k], cluster, pinned, turning)
+                triangles = limiter.triangles_touching(np.flatnonzero(moved))
+                bad = triangles[~limiter.soundness(shifts_of_all[k], triangles, turning=turning)]
+                for cluster in _connected_groups(bad):
+                    shifts_of_all[k] = _ease_around(
+                        surface, limiter, shifts_of_all[k], cluster, pinned, turning
+                    )
                 if not len(bad):
                     break
-                moved |= whole[k].any(axis=1)
-            if not limiter.sound(whole[k], limiter.touched(np.flatnonzero(moved)), turning=turning):
+                moved |= shifts_of_all[k].any(axis=1)
+            if not limiter.is_sound(
+                shifts_of_all[k], limiter.triangles_touching(np.flatnonzero(moved)), turning=turning
+            ):
                 break  # further out it only gets worse, and there the motion will stop
     vertices = np.flatnonzero(moved)
-    return Motion(motion.values, vertices, whole[:, vertices])
+    return Motion(motion.values, vertices, shifts_of_all[:, vertices])
 
 
-def eased_field(
+def ease_field(
     surface: Surface, limiter: Limiter, field: Float64, goals: Sequence[float], pinned: Bool
 ) -> Float64:
-    """A straight motion (N, 3) per step, eased so that some values can be reached without folds."""
+    """A linear motion (N, 3) per unit of value, eased to reach the goals without folds if possible."""
     result = field
-    reached = [_reached(limiter, field, goal) for goal in goals]
+    reached = [_reachable_share(limiter, field, goal) for goal in goals]
     for share in STAGES:
         for k, goal in enumerate(goals):
             if reached[k] >= share:
@@ -61,23 +65,25 @@ def eased_field(
             moving = np.flatnonzero(result.any(axis=1))
             moves = result[moving] * goal * share
             motion = Motion(np.array([0.0, 1.0]), moving, np.stack([0 * moves, moves]))
-            again = relaxed(surface, limiter, motion, pinned, False)
+            unfolded = unfold(surface, limiter, motion, pinned, False)
             trial = np.zeros_like(field)
-            trial[again.vertices] = again.shifts[1] / (goal * share)
-            now = [_reached(limiter, trial, each) for each in goals]
-            if now[k] > reached[k] and all(new >= KEPT * old for new, old in zip(now, reached, strict=True)):
+            trial[unfolded.vertices] = unfolded.shifts[1] / (goal * share)
+            now = [_reachable_share(limiter, trial, each) for each in goals]
+            if now[k] > reached[k] and all(
+                new >= LEAST_RETAINED * old for new, old in zip(now, reached, strict=True)
+            ):
                 result, reached = trial, now
     return result
 
 
-def _reached(limiter: Limiter, field: Float64, goal: float) -> float:
-    """Which share of a value a straight motion reaches without folds, at most 1."""
-    triangles = limiter.touched(np.flatnonzero(field.any(axis=1)))
+def _reachable_share(limiter: Limiter, field: Float64, goal: float) -> float:
+    """Share of a value that a linear motion reaches without folds, at most 1."""
+    triangles = limiter.triangles_touching(np.flatnonzero(field.any(axis=1)))
     return min(float(limiter.reach(field * goal, triangles).min(initial=np.inf)), 1.0)
 
 
-def _clusters(bad: Intp) -> list[Intp]:
-    """Triangles (M, 3) in groups that hang together."""
+def _connected_groups(bad: Intp) -> list[Intp]:
+    """Triangles (M, 3) in connected groups."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -91,13 +97,13 @@ def _clusters(bad: Intp) -> list[Intp]:
     return [bad[labels == k] for k in range(int(labels.max()) + 1)]
 
 
-def _eased(
+def _ease_around(
     surface: Surface, limiter: Limiter, shifts: Float64, bad: Intp, pinned: Bool, turning: bool
 ) -> Float64:
-    """Shifts (N, 3) after easing around some triangles as little as is enough, or as helps most."""
+    """Shifts (N, 3) eased around some triangles in the smallest region that unfolds most of them."""
     best, fewest = shifts, len(bad)
     core = np.unique(bad)
-    # as one with what must not be touched, where there is such among them
+    # second start: the triangles move as one, with their pinned vertices if there are any
     held = core[pinned[core]]
     core = core[~pinned[core]]
     as_one = shifts.copy()
@@ -106,10 +112,10 @@ def _eased(
     region = core
     for _ in range(RINGS):
         region = np.unique(surface.graph[region].indices) if len(region) else region
-        touched = limiter.touched(region)
+        touched = limiter.triangles_touching(region)
         free_region = region[~pinned[region]]
         for start, free in ((shifts, free_region), (as_one, np.setdiff1d(free_region, core))):
-            trial = _harmonic(surface, start, free)
+            trial = _solve_harmonic(surface, start, free)
             left = int((~limiter.soundness(trial, touched, turning=turning)).sum())
             if left < fewest:
                 best, fewest = trial, left
@@ -118,8 +124,8 @@ def _eased(
     return best
 
 
-def _harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
-    """Shifts with those of some vertices replaced by what a stretched cloth would do."""
+def _solve_harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
+    """Shifts (N, 3) with those of `free` vertices replaced by the harmonic interpolation of the others."""
     from scipy.sparse.linalg import splu
 
     result = shifts.copy()
@@ -129,6 +135,6 @@ def _harmonic(surface: Surface, shifts: Float64, free: Intp) -> Float64:
         known[free] = 0.0
         try:
             result[free] = np.nan_to_num(splu(rows[:, free].tocsc()).solve(-(rows @ known)))
-        except RuntimeError:  # a piece that hangs on nothing
+        except RuntimeError:  # a piece without fixed vertices
             return shifts
     return result

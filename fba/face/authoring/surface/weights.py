@@ -9,15 +9,16 @@ from fba.errors import ModelError
 from fba.face.authoring.surface.surface import Surface
 
 
-def spread(
+def solve_smooth_field(
     surface: Surface, free: Bool, fixed: Intp, values: Float64, *, slack: float, harmonic: bool = False
 ) -> Float64:
-    """Fields that are as smooth as a bent plate between what is given: (N, K).
+    """(N, K) fields that interpolate given values as smoothly as a bent plate.
 
-    free: (N,) vertices whose value is sought; all others that are not fixed keep 0, and the field runs
-    out towards them without a kink. fixed: (M,) vertices with given values (M, K). slack: metres; over
-    distances longer than this the plate behaves like a stretched cloth, which does not overshoot.
-    harmonic: a cloth throughout, between the smallest and the largest given value everywhere.
+    free: (N,) mask of vertices whose value is sought; all others that are not fixed keep 0, and the field
+    fades towards them without a kink. fixed: (M,) vertices with given values (M, K). slack: metres; over
+    longer distances the plate behaves like a stretched cloth, which does not overshoot. harmonic: a
+    cloth throughout, so that no value exceeds the given ones. Raises ModelError where the system has no
+    solution.
     """
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
@@ -51,23 +52,23 @@ def spread(
     return field
 
 
-def region(near: Float64, far: Float64, reach: float, share: float = 0.8) -> Bool:
-    """(N,) vertices walked to within `reach` that are not most of the way to what must stay.
+def reachable_region(near: Float64, far: Float64, reach: float, share: float = 0.8) -> Bool:
+    """(N,) mask of vertices within `reach` and at most `share` of the way to vertices that must stay.
 
-    near: distances from what moves. far: distances from what stays.
+    near, far: (N,) distances from moved and from fixed vertices, metres.
     """
     with np.errstate(invalid="ignore"):
         return (near < reach) & (near < share * (near + far))
 
 
-def without_hem(field: Float64, hem: float) -> Float64:
-    """A field with what is below `hem` taken off, 1 staying 1: far vertices that barely move rest."""
+def trim_small(field: Float64, hem: float) -> Float64:
+    """A field with values below `hem` set to 0 and 1 staying 1, so that vertices that barely move rest."""
     result: Float64 = np.sign(field) * np.maximum(np.abs(field) - hem, 0.0) / (1 - hem)
     return result
 
 
-def smoothed(surface: Surface, field: Float64, rounds: int) -> Float64:
-    """A field averaged with that of the neighbours, some rounds."""
+def average_with_neighbours(surface: Surface, field: Float64, rounds: int) -> Float64:
+    """A field (N,) averaged half and half with its neighbours', `rounds` times."""
     graph = surface.graph.astype(bool).astype(np.float64)
     count = np.maximum(graph.sum(axis=1), 1)
     result = field
@@ -76,10 +77,10 @@ def smoothed(surface: Surface, field: Float64, rounds: int) -> Float64:
     return result
 
 
-def through(surface: Surface, field: Float64, targets: Intp, length: float) -> Float64:
-    """A field (N,) that some vertices share with skin near them as the crow flies, up to `length` metres.
+def carry_through(surface: Surface, field: Float64, targets: Intp, length: float) -> Float64:
+    """A field (N,) that target vertices take over from skin up to `length` metres away in a straight line.
 
-    What lies behind moving skin, such as the inside of a nostril, goes along with it.
+    Surfaces behind moving skin, such as the inside of a nostril, move with it.
     """
     from scipy.spatial import cKDTree
 

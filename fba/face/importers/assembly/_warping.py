@@ -24,7 +24,7 @@ def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float6
     from scipy.interpolate import RBFInterpolator
     from scipy.spatial import cKDTree
 
-    from fba.face.authoring.surface.binding import kinds_of
+    from fba.face.authoring.surface.binding import kinds_for_point
 
     row, adult = row_of(), neutral_points()
     known = dict(found)
@@ -48,9 +48,9 @@ def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float6
         if name in FREE:
             continue
         # what was found is a vertex, or lies on the profile between some
-        pool = (*kinds_of(name), ROWS.get(name, ""), str(name in known))
+        pool = (*kinds_for_point(name), ROWS.get(name, ""), str(name in known))
         if pool not in trees:
-            fit = [piece for piece in pieces if piece.part.kind in kinds_of(name)]
+            fit = [piece for piece in pieces if piece.part.kind in kinds_for_point(name)]
             fit = [piece for piece in fit if piece.part.name == ROWS.get(name, piece.part.name)]
             chosen = [
                 piece.part.vertices.astype(np.float64) if name in known else _outside(piece, centre)

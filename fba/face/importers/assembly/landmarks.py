@@ -14,7 +14,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.errors import ModelError, Remedy
-from fba.face.authoring.shapes.shape_names import canonical, fap_of
+from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.eyeball import sphere
 from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warp_points
@@ -76,7 +76,7 @@ class _Shapes:
         self.vertices: Float64 = skin.part.vertices.astype(np.float64)
         assert skin.part.normals is not None
         self.normals: Float64 = skin.part.normals.astype(np.float64)
-        self.arkit = {shape: skin.morphs[name] for shape, name in canonical(skin.morphs).items()}
+        self.arkit = {shape: skin.morphs[name] for shape, name in canonical_names(skin.morphs).items()}
         self.by_fap = {fap_of(name): morph for name, morph in skin.morphs.items() if fap_of(name)}
         self.faps = len(self.by_fap)
 

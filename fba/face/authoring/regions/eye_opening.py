@@ -26,7 +26,7 @@ class Opening:
     lower: Float64
 
 
-def measure(marks: Landmarks, eye: Eye) -> Opening | None:
+def measure_opening(marks: Landmarks, eye: Eye) -> Opening | None:
     """The columns of an eye's opening, or None where its lids are not one above the other."""
     lines = []
     for lid in ("upper", "lower"):
@@ -49,7 +49,7 @@ def measure(marks: Landmarks, eye: Eye) -> Opening | None:
     return Opening(x, *margins)
 
 
-def slid(
+def slide_lid(
     points: Float64,
     share: Float64,
     opening: Opening,
