@@ -1,8 +1,8 @@
-"""Body definition parameters: the joint centres of the body that a sender's BAPs are meant for.
+"""Body definition parameters: the joint centres of the body that a sender's BAPs are for.
 
 Three behaviours of a decoder (digest faces-and-emotions.md, 1.4): "simple" ignores the definition and moves
 its own generic body; "calibration" scales the generic body's segments to the joint centres that were sent;
-and "predictable" takes the sent model in its place, whole.
+and "predictable" replaces it with the body that was sent.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ PROFILES = ("simple", "calibration", "predictable")
 
 @dataclass(frozen=True)
 class BodyDefinition:
-    """Joints as they were sent. centres: name -> metres, default posture, origin on the ground.
+    """Joints of a sender's body.
 
-    parents: name -> parent, None for the root; empty where only centres were sent. Raises ModelError where a
-    centre is not three finite numbers.
+    centres: name -> (3,) metres, default posture, origin on the ground. parents: name -> parent, None for the
+    root; empty where only centres were sent. Raises ModelError where a centre is not three finite numbers.
     """
 
     centres: Mapping[str, Sequence[float]]
@@ -50,10 +50,11 @@ class BodyDefinition:
 
     @classmethod
     def load(cls, path: Path) -> BodyDefinition:
-        """From JSON: {"joints": {"l_hip": {"centre": [x, y, z], "parent": "sacroiliac"}, ...}}.
+        """A definition from a JSON file: {"joints": {"l_hip": {"centre": [x, y, z], "parent": "sacroiliac"},
+        ...}}.
 
-        "parent" may be left out, by all. FormatError where the file cannot be read, ModelError for another
-        content.
+        "parent" may be left out of all joints. Raises FormatError where the file cannot be read, ModelError
+        where its content is different.
         """
         file = os.fspath(path) if isinstance(path, str | os.PathLike) else "the file"
         try:
@@ -73,9 +74,9 @@ class BodyDefinition:
         return cls({name: joint["centre"] for name, joint in joints.items()}, parents)
 
     def skeleton(self, profile: str = "calibration", generic: Skeleton | None = None) -> Skeleton:
-        """The skeleton that a decoder of this profile moves; generic: its own body, the default one where
-        None.
+        """The skeleton that a decoder of this profile moves.
 
+        profile: one of `PROFILES`. generic: the decoder's own body, the default one where None. Raises
         ModelError where "predictable" lacks parents, or they contradict each other.
         """
         if profile not in PROFILES:
@@ -84,7 +85,7 @@ class BodyDefinition:
         if profile == "simple":
             return generic
         if profile == "calibration":
-            return calibrated(generic, self.centres)
+            return calibrate(generic, self.centres)
         missing = [name for name in self.centres if name not in self.parents]
         if missing or not self.centres:
             raise ModelError(
@@ -97,11 +98,12 @@ class BodyDefinition:
         return Skeleton.from_parents(self.parents, self.centres)
 
 
-def calibrated(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Skeleton:
-    """A skeleton with its segments scaled such that joints stand at given centres; others follow.
+def calibrate(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Skeleton:
+    """The skeleton with its segments scaled so that joints are at the given centres (metres).
 
-    A joint between two given ones keeps its place along the line between them; one beyond the last given
-    joint keeps its direction from it, at that joint's scale. Joints that the skeleton lacks have no effect.
+    A joint between two given ones keeps its relative position along the line between them; one beyond the
+    last given joint keeps its direction from it, at that joint's scale. Joints that the skeleton lacks have
+    no effect.
     """
     given = {generic.number(name): np.array(place, dtype=np.float64) for name, place in centres.items()
              if name in generic}  # fmt: skip
@@ -109,32 +111,36 @@ def calibrated(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Ske
         return generic
     old, parents = generic.centres, generic.parents
     first_below = _first_given_below(parents, given)
-    whole = _size(np.array([given[n] for n in given])) / max(_size(old[list(given)]), 1e-12) or 1.0
-    places = np.zeros_like(old)
-    scales = np.full(len(generic), whole)
+    scale_of_body = (
+        _extent(np.array([given[n] for n in given])) / max(_extent(old[list(given)]), 1e-12) or 1.0
+    )
+    positions = np.zeros_like(old)
+    scales = np.full(len(generic), scale_of_body)
     for number in range(len(generic)):
         parent, below = int(parents[number]), first_below[number]
         if parent < 0:
             rooted = number in given
-            places[number] = given[number] if rooted else given[below] + whole * (old[number] - old[below])
+            positions[number] = (
+                given[number] if rooted else given[below] + scale_of_body * (old[number] - old[below])
+            )
             continue
         if number in given:
-            places[number] = given[number]
+            positions[number] = given[number]
         elif below < 0:
-            places[number] = places[parent] + scales[parent] * (old[number] - old[parent])
+            positions[number] = positions[parent] + scales[parent] * (old[number] - old[parent])
         else:
-            share = _share(old, parents, parent, number, below)
-            line = given[below] - places[parent]
-            turned = _aside(old[number] - old[parent], old[below] - old[parent], line)
-            places[number] = places[parent] + share * line + turned
+            share = _share_along(old, parents, parent, number, below)
+            line = given[below] - positions[parent]
+            turned = _component_across(old[number] - old[parent], old[below] - old[parent], line)
+            positions[number] = positions[parent] + share * line + turned
         before = float(np.linalg.norm(old[number] - old[parent]))
-        after = float(np.linalg.norm(places[number] - places[parent]))
+        after = float(np.linalg.norm(positions[number] - positions[parent]))
         scales[number] = after / before if before > 1e-6 else scales[parent]
-    return Skeleton(generic.names, parents, places)
+    return Skeleton(generic.names, parents, positions)
 
 
 def _first_given_below(parents: Int64, given: Mapping[int, Float64]) -> list[int]:
-    """For each joint the closest given joint on the way down, -1 for none; of several ways, the first."""
+    """For each joint the closest given joint among itself and its descendants, -1 for none."""
     result = [-1] * len(parents)
     depth = [0] * len(parents)
     for number in range(len(parents) - 1, -1, -1):
@@ -147,14 +153,14 @@ def _first_given_below(parents: Int64, given: Mapping[int, Float64]) -> list[int
     return result
 
 
-def _share(old: Float64, parents: Int64, parent: int, number: int, below: int) -> float:
-    """How far along the line from a parent to a given joint below, in the generic body, a joint stands."""
+def _share_along(old: Float64, parents: Int64, parent: int, number: int, below: int) -> float:
+    """Position of a joint along the line from its parent to a given joint below: 0 to 1, generic body."""
     line = old[below] - old[parent]
     length = float(line @ line)
     return float((old[number] - old[parent]) @ line) / length if length > 1e-12 else 1.0
 
 
-def _aside(offset: Float64, line: Float64, new_line: Float64) -> Float64:
+def _component_across(offset: Float64, line: Float64, new_line: Float64) -> Float64:
     """The component of an offset across the line, at the scale of the new line."""
     length = float(line @ line)
     if length <= 1e-12:
@@ -165,11 +171,11 @@ def _aside(offset: Float64, line: Float64, new_line: Float64) -> Float64:
     return result
 
 
-def _size(places: Float64) -> float:
+def _extent(positions: Float64) -> float:
     """The extent of joints: the diagonal of their box, or the height of a single one."""
-    if len(places) == 1:
-        return abs(float(places[0, 1]))
-    return float(np.linalg.norm(np.ptp(places, axis=0)))
+    if len(positions) == 1:
+        return abs(float(positions[0, 1]))
+    return float(np.linalg.norm(np.ptp(positions, axis=0)))
 
 
 def _finite(value: object) -> bool:

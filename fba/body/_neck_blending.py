@@ -13,66 +13,66 @@ from fba.cache import kept, key_of
 from fba.easing import smoothstep
 
 NEAR, FAR = 0.010, 0.030
-"""Metres from the body's neck: up to the first a vertex moves as the neck there, beyond the second with the
+"""Metres from the body's neck: up to the first a vertex moves with the neck, beyond the second with the
 skull alone."""
 NEIGHBOURS = 4
 SAME, ALMOST, ROUNDS = 1e-5, 0.01, 20
-"""Metres: vertices so near are the same; those of one mesh may at first be so far apart. How often a face is
-moved by what its vertices are off."""
+"""Metres within which vertices are the same; metres within which they are paired at first; most rounds in
+which a face is moved by the median offset of its pairs."""
 RIM = 0.3
 """The share of a neck's width that its lower rim has at least."""
 SEAM = 0.002
 """A face whose vertices come this close (m) to those of the body's neck brings its own neck."""
 
 LARGE = 4000
-"""What faces of so many vertices and more gave is kept on disk."""
-MAKING = 1
-"""Counts up with every change of what is found: what was kept before is then made anew."""
+"""Results for faces of this many vertices or more are cached on disk."""
+CACHE_VERSION = 1
+"""Version of cached results; increment when results change."""
 
 
-class Carried(NamedTuple):
+class NeckBlend(NamedTuple):
     """Weights, offset and hidden vertices of a face on a body's neck."""
 
     offset: Float64
-    """(3,) metres that the face is to be moved by, so that both necks are in one place."""
+    """(3,) metres by which the face must be moved for both necks to coincide."""
     joints: Int32
-    """(F, 4) of the free vertices."""
+    """(F, 4) joints of the free vertices."""
     weights: Float32
-    """(F, 4)"""
+    """(F, 4) weights of those joints."""
     hidden: Bool
-    """(V,) vertices beyond the lower edge of the body's neck."""
+    """(V,) mask of vertices beyond the lower edge of the body's neck."""
     brings_neck: bool
-    """Whether the face has a neck that meets the body."""
+    """Whether the face has a neck of its own that meets the body."""
 
 
-def carried_by_neck(neck: list[BodyPart], joints: int, skull: int, placed: Float64, free: Bool) -> Carried:
-    """How a body's neck carries a face's vertices placed (V, 3), metres.
+def blend_with_neck(neck: list[BodyPart], joints: int, skull: int, placed: Float64, free: Bool) -> NeckBlend:
+    """Joints and weights with which a body's neck moves a face's vertices `placed` (V, 3), metres.
 
     neck: the body's parts of that kind, with vertices. joints: how many the body has. skull: the joint that
     carries the head. free: (V,) vertices that the neck may bend.
     """
 
     def make() -> list[Array]:
-        found = _carried(neck, joints, skull, placed, free)
-        return [*found[:4], np.array([found.brings_neck])]
+        result = _compute_blend(neck, joints, skull, placed, free)
+        return [*result[:4], np.array([result.brings_neck])]
 
     if len(placed) < LARGE:
         arrays = make()
     else:
         of_neck = [array for p in neck for array in (p.vertices, p.triangles, p.joints, p.weights)]
-        key = key_of("neck", MAKING, joints, skull, placed, free, *of_neck)
+        key = key_of("neck", CACHE_VERSION, joints, skull, placed, free, *of_neck)
         count = int(free.sum())
         shapes = ((3,), (count, INFLUENCES), (count, INFLUENCES), (len(placed),), (1,))
         arrays = kept(key, shapes, make, [np.float64, np.int32, np.float32, np.bool_, np.bool_])
     offset, which, weights, hidden, brings = arrays
-    return Carried(offset, which, weights, hidden, bool(brings[0]))
+    return NeckBlend(offset, which, weights, hidden, bool(brings[0]))
 
 
-def _carried(neck: list[BodyPart], joints: int, skull: int, placed: Float64, free: Bool) -> Carried:
+def _compute_blend(neck: list[BodyPart], joints: int, skull: int, placed: Float64, free: Bool) -> NeckBlend:
     from scipy.spatial import cKDTree
 
     anchors = np.concatenate([part.vertices for part in neck])
-    offset = _offset(anchors, placed)
+    offset = _measure_offset(anchors, placed)
     placed = placed + offset
     tree = cKDTree(anchors)
     hidden, brings_neck = np.zeros(len(placed), dtype=bool), False
@@ -81,15 +81,15 @@ def _carried(neck: list[BodyPart], joints: int, skull: int, placed: Float64, fre
         low = np.setdiff1d(np.flatnonzero(anchors[:, 1] < anchors[:, 1].mean()), edge)
         away = cKDTree(placed).query(anchors[low])[0] if len(low) else np.full(1, np.inf)
         brings_neck = bool(np.median(away) < SEAM)
-        hidden = _beyond(tree, edge, outward, anchors, placed)
-    which, weights = _nearest(tree, _dense(neck, joints), placed[free], skull, hidden[free])
-    return Carried(offset, which, weights, hidden, brings_neck)
+        hidden = _beyond_edge(tree, edge, outward, anchors, placed)
+    which, weights = _blend_weights(tree, _dense_weights(neck, joints), placed[free], skull, hidden[free])
+    return NeckBlend(offset, which, weights, hidden, brings_neck)
 
 
-def _offset(anchors: Float32, placed: Float64) -> Float64:
-    """(3,) how far a face is off a body whose neck it has, vertex by vertex; 0 where it has another.
+def _measure_offset(anchors: Float32, placed: Float64) -> Float64:
+    """(3,) offset, metres, between a face and a body whose neck it shares vertex by vertex; else 0.
 
-    Where pupils are found differs a little from one reader to another.
+    Needed because readers differ a little in where they find pupils.
     """
     from scipy.spatial import cKDTree
 
@@ -104,11 +104,11 @@ def _offset(anchors: Float32, placed: Float64) -> Float64:
             break
         moved = moved + np.median(placed[rows[near]] - moved[near], axis=0)
     offset: Float64 = anchors[0].astype(np.float64) - moved[0]
-    found = float((tree.query(moved)[0] < SAME).mean()) > 0.5
-    return offset if found and float(np.linalg.norm(offset)) > SAME else none
+    result = float((tree.query(moved)[0] < SAME).mean()) > 0.5
+    return offset if result and float(np.linalg.norm(offset)) > SAME else none
 
 
-def _dense(neck: list[BodyPart], joints: int) -> Float64:
+def _dense_weights(neck: list[BodyPart], joints: int) -> Float64:
     """(A, J) weights of the necks' vertices."""
     rows = sum(len(part.vertices) for part in neck)
     dense = np.zeros((rows, joints))
@@ -119,21 +119,23 @@ def _dense(neck: list[BodyPart], joints: int) -> Float64:
     return dense
 
 
-def _nearest(tree: Any, dense: Float64, places: Float64, skull: int, below: Bool) -> tuple[Int32, Float32]:
-    """Weights of the nearest anchors, handed over to the skull with distance, but for what lies below."""
+def _blend_weights(
+    tree: Any, dense: Float64, places: Float64, skull: int, below: Bool
+) -> tuple[Int32, Float32]:
+    """(joints, weights) of the nearest anchors, fading into the skull with distance except where `below`."""
     away, rows = tree.query(places, k=min(NEIGHBOURS, len(dense)))
     away, rows = away.reshape(len(places), -1), rows.reshape(len(places), -1)
     share = 1 / np.maximum(away, 1e-6) ** 2
     share /= share.sum(axis=1, keepdims=True)
-    found = np.einsum("vk,vkj->vj", share, dense[rows])
+    result = np.einsum("vk,vkj->vj", share, dense[rows])
     alone = np.where(below[:, None], 0.0, smoothstep((away[:, :1] - NEAR) / (FAR - NEAR)))
-    found *= 1 - alone
-    found[:, skull] += alone[:, 0]
-    return strongest_weights(found)
+    result *= 1 - alone
+    result[:, skull] += alone[:, 0]
+    return strongest_weights(result)
 
 
 def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]:
-    """Vertices of the open rims in the lower half of necks, and the ways out over them (N, 3)."""
+    """(vertices (N,) of the open rims in the lower half of necks, (N, 3) outward directions there)."""
     starts = np.cumsum([0, *(len(part.vertices) for part in neck)])
     triangles = np.concatenate([part.triangles + start for part, start in zip(neck, starts, strict=False)])
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
@@ -153,7 +155,7 @@ def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]
 
 
 def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
-    """Vertices of the rims that a neck ends in below: not its chin, nor holes within."""
+    """Vertices of the rims at the lower end of a neck; not those at its chin, nor of holes in it."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -162,15 +164,15 @@ def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
     middle = (anchors[:, 1].min() + anchors[:, 1].max()) / 2
     wide = RIM * np.ptp(anchors[:, 0])
     rims = np.unique(open_sides)
-    found = [np.zeros(0, dtype=np.int64)]
+    result = [np.zeros(0, dtype=np.int64)]
     for number in np.unique(label[rims]):
         rim = rims[label[rims] == number]
         if anchors[rim, 1].mean() < middle and np.ptp(anchors[rim, 0]) > wide:
-            found.append(rim)
-    return np.concatenate(found)
+            result.append(rim)
+    return np.concatenate(result)
 
 
-def _beyond(tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64) -> Bool:
+def _beyond_edge(tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64) -> Bool:
     """(V,) mask of the positions beyond the edge."""
     away, rows = tree.query(places)
     number = np.full(len(anchors), -1)

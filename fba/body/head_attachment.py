@@ -1,4 +1,4 @@
-"""A face on a body: its vertices carried by neck and skull, so that both are one skin."""
+"""A face on a body: neck and skull move its vertices, so that both share one skin."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Bool, Float32, Float64
-from fba.body._neck_blending import carried_by_neck
+from fba.body._neck_blending import blend_with_neck
 from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
 from fba.body.skin.skinning import Skinner
@@ -20,11 +20,11 @@ SAME_SIZE = 0.005
 
 
 class HeadOnBody:
-    """Carries a face with a body's joints.
+    """Moves a face with a body's joints.
 
     body: a model with a place for pupils. vertices: (V, 3), the neutral face, in its own frame and unit.
-    eyes: (2, 3), its pupils, feature points 3.5 and 3.6. skull: (V,), vertices that go with the skull alone
-    wherever they are (eyes, teeth, tongue), none by default.
+    eyes: (2, 3), its pupils, feature points 3.5 and 3.6. skull: (V,), vertices that always move with the
+    skull alone (eyes, teeth, tongue), none by default.
 
     The face is set between the pupils of the body, sized by their distance. Its vertices near the body's
     neck (its part of kind "neck", as modelled) take that neck's weights, others move with the skull.
@@ -44,25 +44,25 @@ class HeadOnBody:
         self.place = placement(body, eyes)
         """float64 (4, 4): the face's frame into the body's, as modelled."""
         self.size = float(self.place[0, 0])
-        """How many times as large the face is on the body."""
+        """Scale of the face on the body."""
         placed = places.astype(np.float64) * self.size + self.place[:3, 3]
         neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
         joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
         weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
         joints[:, 0], weights[:, 0] = self._skull, 1.0
         self.hidden: Bool = np.zeros(len(places), dtype=bool)
-        """(V,): vertices beyond the lower edge of the body's neck, which its clothes hide."""
+        """(V,) mask of vertices beyond the lower edge of the body's neck, which its clothes hide."""
         self.brings_neck = not neck
-        """Whether the face has a neck that meets the body, whose own then is not to be shown."""
+        """Whether the face has a neck that meets the body; the body's own must then not be shown."""
         if neck:
             free = np.ones(len(places), dtype=bool) if skull is None else ~np.asarray(skull)
-            found = carried_by_neck(neck, len(body.skeleton), self._skull, placed, free)
+            found = blend_with_neck(neck, len(body.skeleton), self._skull, placed, free)
             self.place[:3, 3] += found.offset
             placed += found.offset
             joints[free], weights[free] = found.joints, found.weights
             self.hidden, self.brings_neck = found.hidden, found.brings_neck
         self.shift = self.place[:3, 3].astype(np.float32)
-        """float32 (3,): where its origin is put."""
+        """float32 (3,) position of the face's origin on the body, metres."""
         self._from_place = np.linalg.inv(self.place)
         self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(places))
         self._below = _descendants(body, self._skull)
@@ -81,8 +81,8 @@ class HeadOnBody:
     def matrices(self, matrices: npt.ArrayLike, turn: npt.ArrayLike) -> Float64:
         """Joint matrices (J, 4, 4) of the body with the head turned on its skull base.
 
-        turn: (4, 4), as `fba.face.Deformer.head_matrices` gives it, in the face's frame. FAPs turn the head
-        relative to what BAPs do to the skull base.
+        turn: (4, 4), as `fba.face.Deformer.head_matrices` returns it, in the face's frame. FAPs turn the head
+        relative to the pose that BAPs give the skull base.
         """
         turned: Float64 = np.array(matrices, dtype=np.float64)
         within = self.place @ np.asarray(turn, dtype=np.float64) @ self._from_place
@@ -94,7 +94,7 @@ class HeadOnBody:
         return turned
 
     def frame(self, matrices: npt.ArrayLike) -> Float64:
-        """(4, 4): from the face's frame to the world, for whatever moves with the skull alone."""
+        """(4, 4) matrix from the face's frame to the world, for what moves with the skull alone."""
         skull = np.asarray(matrices, dtype=np.float64)[self._skull]
         frame: Float64 = skull @ self._inverse[self._skull] @ self.place
         return frame
@@ -116,11 +116,11 @@ class HeadOnBody:
         returned. upright: float32 (V, 3), normals of the face in its own frame; normals: filled with those
         on the body. method: as of `BodyModel.skin`.
         """
-        from fba.body.skin.loops import sized
+        from fba.body.skin.loops import scale_and_shift
 
         if local.shape != self._placed.shape:
             raise ValueError(f"vertices must have shape {self._placed.shape}, not {local.shape}")
-        sized(local, self.size, self.shift, self._placed)
+        scale_and_shift(local, self.size, self.shift, self._placed)
         return self.skinner.carry(self._placed, upright, matrices, out, normals, method)
 
 

@@ -1,4 +1,4 @@
-"""A body: meshes, the skeleton that carries them, and how far each joint carries each vertex."""
+"""A body: meshes, the skeleton that moves them, and the weight of each joint for each vertex."""
 
 from __future__ import annotations
 
@@ -77,11 +77,11 @@ class BodyModel(Meshes[BodyPart]):
     in the default posture, named as in the standard where BAPs are to move them. bind: float64 (J, 4, 4),
     the joints as the meshes are modelled, each rotation relative to the default posture, as
     `BapSolver.pose` gives them. eyes: float64 (2, 3), where the pupils of a face on this body are as
-    modelled (feature points 3.5 and 3.6), or None where there is no place for one. name, notes: what it
+    modelled (feature points 3.5 and 3.6), or None where it has no place for a face. name, notes: what it
     is, its origin, licence and the like.
 
-    Axes: +x the subject's left, +y up, +z forward; metres. Raises ModelError naming the place of what is
-    wrong.
+    Axes: +x the subject's left, +y up, +z forward; metres. Raises ModelError naming the part or joint
+    that is wrong.
     """
 
     parts: tuple[BodyPart, ...]
@@ -133,10 +133,10 @@ class BodyModel(Meshes[BodyPart]):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> BodyModel:
-        """A body from a glTF 2.0 file with a skin: as `save` writes it, or by others.
+        """A body from a glTF 2.0 file as `save` writes it.
 
-        Raises FormatError where the file cannot be opened, ModelError, which names the place in it, where
-        it is damaged, contradicts itself, or has no skinned mesh.
+        Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
+        damaged, contradicts itself, or lacks the extension FBA_body.
         """
         from fba.body.storage import load
 
@@ -160,7 +160,7 @@ class BodyModel(Meshes[BodyPart]):
     ) -> Float32:
         """The body in a pose: float32 (V, 3) for joint matrices (J, 4, 4), (T, V, 3) for (T, J, 4, 4).
 
-        matrices: as `BapSolver(model.skeleton).pose` gives them: rotations and places. out: written to and
+        matrices: as `BapSolver(model.skeleton).pose` returns them. out: written to and
         returned. normals: filled with the unit normals. Both float32, C-contiguous, of the result's shape.
         method: "dual" blends dual quaternions, which keep a twisted limb's girth; "linear" blends
         matrices, as most viewers do.

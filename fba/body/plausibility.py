@@ -1,4 +1,4 @@
-"""Whether a decoded body moves like a person, and whether the other table of BAP steps fits it better.
+"""Checks whether a decoded body moves like a person, or would under the other table of BAP steps.
 
 Two tables of BAP quantiser steps are in use and no bit of a stream says which (docs/bitstream.md). Under
 the wrong one the root's translation comes out 32 times too large or too small, and joint angles up to 2.7
@@ -18,32 +18,32 @@ import numpy.typing as npt
 from fba.arrays import Bool, Float64, Int64
 from fba.body.skeleton import Skeleton
 from fba.body.solve.conventions import NO_BAP, convention
-from fba.body.solve.limits import DEGREES, WHOLE, widest
+from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
 from fba.body.solve.pose_loops import MILLIMETRE, UNIT
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
 from fba.tracks import BodyTrack
 
 SAMPLES = 32
 RUN = 64
-"""At most so many runs of so many successive frames are looked at, spread evenly: the cost has a bound."""
+"""At most SAMPLES runs of RUN successive frames, spread evenly, are examined, to bound the cost."""
 LEAST = 1.0
 """Seconds that a motion must last to be judged."""
 MARGIN = 20.0
 """Degrees that a joint must be beyond `limits.widest` to count."""
 BEYOND = 0.3
-"""By how much larger a share of the frames must have such a joint than under the other table."""
+"""Difference between the tables in the share of frames with such a joint that counts as a fault."""
 SWAY = 0.08
-"""Metres a second that the root may move over feet that stand."""
+"""Metres a second that the root may sway over standing feet."""
 SLACK = 2.0
-"""How many times as fast as the legs carry it (and sways) the root may go."""
+"""The root may go this many times as fast as legs and sway carry it."""
 FASTEST = 8.0
-"""Metres a second that nobody does on average over a whole motion."""
+"""Metres a second that nobody exceeds on average over a whole motion."""
 STRIDING = 0.2
-"""Metres a second at which the legs certainly carry somebody."""
+"""Metres a second from which the legs certainly walk."""
 STANDS = 0.15
-"""Share of what the legs do below which the root stays where it is."""
+"""Share of the legs' speed below which the root counts as staying where it is."""
 SUNK = -2.0
-"""Metres by which a root is lower than in the default posture when nothing of the person shows any more."""
+"""Height of the root over that of the default posture, metres, at which the whole body is underground."""
 _FEET = ("l_ankle", "r_ankle", "l_metatarsal", "r_metatarsal")
 _ROOT = ("vertical", "lateral", "frontal")
 
@@ -92,12 +92,12 @@ class Doubt:
 
 
 def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str) -> Doubt | None:
-    """Why the body looks wrong under the table `used` and right under the other; None where that is not so.
+    """The reasons why a body looks wrong under the table `used` and right under the other, or None.
 
     index: (T,) numbers of the frames, at rate frames a second. Values must be as decoded: where they are not
-    multiples of the table's steps (bap_quant 0, or resampled), the table has no say, and None is returned;
-    None as well where both tables or neither look wrong. At most 2048 frames are looked at, in 20 ms.
-    ValueError for an unknown table.
+    multiples of the table's steps (bap_quant 0, or resampled), the table has no effect, and None is
+    returned; None as well where both tables or neither look wrong. At most 2048 frames are examined, in
+    20 ms. Raises ValueError for an unknown table.
     """
     steps = bap_steps(used)
     moving = np.flatnonzero(body.mask.any(axis=1))
@@ -113,14 +113,14 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
         changed = (steps != bap_steps(other)) & levels.any(axis=0)
         if other == used or not changed.any():
             continue
-        findings = _compared(now, measure(levels * bap_steps(other), numbers[chosen], rate))
+        findings = _new_faults(now, measure(levels * bap_steps(other), numbers[chosen], rate))
         if findings:
             return Doubt(used, other, findings)
     return None
 
 
 def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
-    """A motion in numbers: BAPs int64 (T, 296) at frame numbers (T,); successive ones are compared."""
+    """Measurements of BAPs int64 (T, 296) at frame numbers (T,), taken between successive frames."""
     pairs = np.flatnonzero(np.diff(index) == 1)
     root = values[:, [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in _ROOT]]
     ways = np.abs(root[pairs + 1] - root[pairs])
@@ -141,7 +141,7 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
     )
 
 
-def _compared(now: Motion, other: Motion) -> tuple[str, ...]:
+def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
     """The faults of `now` that the other reading of the same motion does not have."""
     findings = []
     if now.beyond - other.beyond > BEYOND:
@@ -169,11 +169,11 @@ def _samples(count: int) -> Int64:
 
 
 def _beyond(values: Int64) -> Bool:
-    """bool (T,): whether a joint is beyond all limits by the margin. Whole turns do not count."""
-    turning = np.flatnonzero(widest().any(axis=1))
-    low, high = widest()[turning].T
+    """bool (T,): whether any joint is beyond all limits by more than `MARGIN`, ignoring whole turns."""
+    turning = np.flatnonzero(widest_limits().any(axis=1))
+    low, high = widest_limits()[turning].T
     angles = values[:, turning] * DEGREES
-    angles -= WHOLE * np.rint((angles - (low + high) / 2) / WHOLE)
+    angles -= FULL_TURN * np.rint((angles - (low + high) / 2) / FULL_TURN)
     over: Bool = ((angles < low - MARGIN) | (angles > high + MARGIN)).any(axis=1)
     return over
 
@@ -192,12 +192,12 @@ def _feet(values: Int64) -> Float64:
             point += skeleton.offsets[joint]
             joint = parent
             if skeleton.names[joint] in rules.joints:
-                _turn(point, values, rules.joints.index(skeleton.names[joint]))
+                _rotate_points(point, values, rules.joints.index(skeleton.names[joint]))
         result[:, column] = point
     return result
 
 
-def _turn(point: Float64, values: Int64, row: int) -> None:
+def _rotate_points(point: Float64, values: Int64, row: int) -> None:
     """Turn points (T, 3) in place by the BAPs of a joint, a row of the convention."""
     rules = convention()
     for bap, axis, sign in reversed(list(zip(rules.bap[row], rules.axis[row], rules.sign[row], strict=True))):

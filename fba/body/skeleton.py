@@ -24,8 +24,9 @@ ROOT = "HumanoidRoot"
 class Skeleton:
     """Joints of a body in the default posture.
 
-    names: J joint names, unique, parents before children, the standard's names where BAPs are to move
-        them. parents: int64 (J,), -1 for the one root, which comes first. centres: float64 (J, 3), metres.
+    names: J joint names, unique, parents before children; BAPs move those that are named as in the
+        standard. parents: int64 (J,), -1 for the one root, which comes first. centres: float64 (J, 3),
+        metres.
 
     Raises ModelError where the parts contradict each other: no joints, several roots, cycles, a parent
     after its child, a centre that is not finite.
@@ -85,9 +86,9 @@ class Skeleton:
     def from_parents(
         cls, parents: Mapping[str, str | None], centres: Mapping[str, Sequence[float]]
     ) -> Skeleton:
-        """From names: each joint's parent (None for the root) and centre, in any order.
+        """A skeleton from each joint's parent (None for the root) and centre (metres), by name, in any order.
 
-        ModelError where a parent is unknown, or joints form a cycle.
+        Raises ModelError where a parent is unknown, or joints form a cycle.
         """
         order: list[str] = []
         children: dict[str | None, list[str]] = {}
@@ -122,7 +123,7 @@ class Skeleton:
 
     @property
     def offsets(self) -> Float64:
-        """float64 (J, 3): from the parent's centre to the joint's; the root's own centre for the root."""
+        """float64 (J, 3), metres: vector from the parent's centre to the joint's; for the root its centre."""
         result = self.centres.copy()
         result[1:] -= self.centres[self.parents[1:]]
         return result

@@ -1,8 +1,8 @@
 """Body models in files: skinned glTF 2.0 with the extension FBA_body, described in docs/body-models.md.
 
 The tree of joint nodes is the skeleton: a node's translation is its joint's offset in the default posture,
-its rotation how the mesh was modelled relative to that. With all rotations left out, the file shows the
-default posture.
+its rotation is that of the modelled pose relative to it. Without the rotations, the file shows the default
+posture.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ VERSION = 1
 MAX_PARTS = 1000
 MAX_NOTES = 1000
 LARGEST = 1e6
-"""Metres: no number of a body is larger."""
+"""Metres: largest coordinate of a body."""
 BIND_TOLERANCE = 1e-3
 """Metres and sines by which a file's inverse bind matrices may contradict its nodes."""
 
 
 def save(model: BodyModel, path: Path) -> None:
-    """Write a body as .glb, whole or not at all; loading it gives an equal model again."""
+    """Write a body as .glb, atomically; loading it gives an equal model."""
     if os.fspath(path).lower().endswith(".gltf"):
         raise ModelError(f"{os.fspath(path)}: body models are written in one file; name it .glb")
     build(model).save(path)
 
 
 def build(model: BodyModel) -> Builder:
-    """The whole document of a model, its joints first among the nodes."""
+    """The glTF document of a model, its joints first among the nodes."""
     builder = Builder()
     skeleton = model.skeleton
     builder.root["extensionsUsed"] = [NAME]
@@ -52,7 +52,7 @@ def build(model: BodyModel) -> Builder:
     for joint, parent in enumerate(skeleton.parents.tolist()):
         if parent >= 0:
             children[parent].append(joint)
-    turns = _quaternions(local_turns(model))
+    turns = _quaternions(local_rotations(model))
     for joint, name in enumerate(skeleton.names):
         node: dict[str, Any] = {"name": name, "translation": skeleton.offsets[joint].tolist()}
         if not np.array_equal(turns[joint], (0, 0, 0, 1)):
@@ -94,8 +94,8 @@ def build(model: BodyModel) -> Builder:
     return builder
 
 
-def local_turns(model: BodyModel) -> Float64:
-    """(J, 3, 3) how each joint is turned in its parent's frame, as modelled."""
+def local_rotations(model: BodyModel) -> Float64:
+    """(J, 3, 3) rotation of each joint in its parent's frame, as modelled."""
     turns = model.bind[:, :3, :3].copy()
     parents = model.skeleton.parents
     turns[1:] = np.swapaxes(model.bind[parents[1:], :3, :3], 1, 2) @ turns[1:]
@@ -112,10 +112,10 @@ def _quaternions(turns: Float64) -> Float64:
 
 
 def load(path: Path) -> BodyModel:
-    """Read a body model from a .glb (or .gltf) file, as `save` writes it.
+    """The body model in a .glb (or .gltf) file as `save` writes it.
 
-    Raises FormatError where the file cannot be opened, ModelError, which names the place in it, where it
-    is damaged, contradicts itself, or brings no extension FBA_body. Nothing of a bad file is used.
+    Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
+    damaged, contradicts itself, or lacks the extension FBA_body.
     """
     from fba.gltf.document import open_document
 

@@ -17,7 +17,14 @@ import numpy.typing as npt
 from person import Person, person, proportioned
 
 from fba.body import Skeleton
-from fba.body.solve.bind_pose import FINGERS, bind_matrices, chain, shares, unposed, vertebrae
+from fba.body.solve.bind_pose import (
+    FINGERS,
+    bind_matrices,
+    chain_weights,
+    place_vertebrae,
+    skeleton_in_default_posture,
+    vertebrae_between,
+)
 
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
@@ -52,7 +59,7 @@ def rig() -> tuple[Person, Rig]:
     places = proportioned(given, arm.astype(np.float64))
     bind = bind_matrices(places)
     weights = bending.evened(made, dict(zip(default.names, places, strict=True)), made.blend @ coarse)
-    return made, Rig(default.names, default.parents, unposed(bind).centres, bind, weights)
+    return made, Rig(default.names, default.parents, skeleton_in_default_posture(bind).centres, bind, weights)
 
 
 def _places(data: dict[str, np.ndarray], default: Skeleton) -> Float64:
@@ -73,7 +80,7 @@ def _places(data: dict[str, np.ndarray], default: Skeleton) -> Float64:
     # Vertebrae stand along the figure's spine as they stand along the standard's.
     knots = np.array([source[name] for name in ("Hips", "Spine1", "Spine2", "Chest", "Neck1", "Neck2")])
     knots = np.concatenate([knots, SKULLBASE[None]])
-    vertebrae(places, knots, 4)
+    place_vertebrae(places, knots, 4)
     places[default.number("skullbase")] = SKULLBASE
     return places
 
@@ -95,13 +102,13 @@ def _weights(
             weights[:, default.number(row["joint"].replace("?", side))] += column
     height = surface.vertices[:, 1]
     groups = {
-        "torso": ["sacroiliac", *chain("vl5", "vc7")],
-        "neck": [*chain("vt1", "vc1"), "skullbase"],
+        "torso": ["sacroiliac", *vertebrae_between("vl5", "vc7")],
+        "neck": [*vertebrae_between("vt1", "vc1"), "skullbase"],
     }
     for group, names in (("torso", TORSO), ("neck", NECK)):
         share = given[:, [source.index(name) for name in names]].sum(axis=1)
         numbers = [default.number(name) for name in groups[group]]
-        weights[:, numbers] += share[:, None] * shares(
+        weights[:, numbers] += share[:, None] * chain_weights(
             height, places[numbers, 1], 1 if group == "torso" else 0
         )
     weights[:, default.number("skullbase")] += given[:, [source.index(name) for name in HEAD]].sum(axis=1)

@@ -1,6 +1,6 @@
-"""Walking: made of four characteristic poses, and found again in captured motion.
+"""Walking: synthesis from four characteristic poses, and detection of these in captured motion.
 
-Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `characters` names who can walk,
+Digest faces-and-emotions.md, chapter 2. `walk` makes an `Animation`, `characters` lists the characters,
 `detect` finds cycles and poses in any body animation, `reduce` keeps only these poses.
 """
 

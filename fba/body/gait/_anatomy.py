@@ -16,7 +16,7 @@ HEEL_BEHIND, TOES_AHEAD = 0.054, 0.062
 """Metres from the ankle's centre back to where the heel touches, and from the metatarsal joint to the tip of
 the toes, for the default body."""
 HIP_HEIGHT = 0.9364
-"""Metres of the default body: other bodies are measured against it."""
+"""Height of the default body's hips, metres: the scale of other bodies is relative to it."""
 PALMS = ("middle0", "middle1", "index0", "wrist")
 """Joints by which a palm is placed, the first that a skeleton has."""
 
@@ -25,9 +25,10 @@ PALMS = ("middle0", "middle1", "index0", "wrist")
 class Side:
     """One side of a body; float64 (3,), metres, default posture.
 
-    way: +1 left, -1 right. hip: from the root. leg, arm: their bones. ankle: its centre, above the ground.
-    subtalar: from the ankle. heel, toe: from the subtalar joint to the heel's ground point and to the
-    metatarsal joint. tip: from there to the tip of the toes, on the ground. shoulder: its name.
+    letter: "l" or "r". way: +1 left, -1 right. hip: vector from the root. leg, arm: their bones. ankle: its
+    centre, above the ground. subtalar: vector from the ankle. heel, toe: vectors from the subtalar joint to
+    the heel's ground point and to the metatarsal joint. tip: vector from there to the tip of the toes, on
+    the ground.
     """
 
     letter: str
@@ -44,8 +45,11 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Anatomy:
-    """A skeleton, its sides by letter ("l", "r"), scale: its size against the default body, and pelvis: the
-    centre of the sacroiliac joint from the root."""
+    """Measurements of a skeleton for walking.
+
+    sides: by letter ("l", "r"). scale: size relative to the default body. pelvis: (3,) vector from the root
+    to the sacroiliac joint, metres.
+    """
 
     skeleton: Skeleton
     sides: dict[str, Side]
@@ -54,7 +58,7 @@ class Anatomy:
 
     @classmethod
     def measure(cls, skeleton: Skeleton) -> Anatomy:
-        """Measure a skeleton. ModelError where it lacks legs or arms, or cannot stand on them."""
+        """The anatomy of a skeleton. Raises ModelError where it lacks legs or arms, or cannot stand."""
         wanted = [ROOT, "sacroiliac"]
         for letter in "lr":
             wanted += [f"{letter}_{j}" for j in ("hip", "knee", "ankle", "subtalar", "metatarsal")]

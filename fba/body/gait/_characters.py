@@ -1,8 +1,8 @@
-"""Who walks: the four characteristic poses and the posture of a character, poses.csv and characters.json.
+"""Characters of walkers: four characteristic poses and a posture each, from poses.csv and characters.json.
 
-Digest faces-and-emotions.md, 2.3 and 2.6. A pose is half a cycle's: `stance` is the leg that carries,
-`swing` the other (in the extended pose the rear one, which swings next); the other half of the cycle has the
-sides exchanged. A cell that a character leaves empty is that of `normal`.
+Digest faces-and-emotions.md, 2.3 and 2.6. The poses describe half a cycle: `stance` is the leg that carries,
+`swing` the other (in the extended pose the rear one, which swings next); the other half has the sides
+exchanged. Where a character leaves a cell empty, that of `normal` is used.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from fba.errors import ModelError
 POSES = ("extended", "recoil", "passing", "anticipation")
 LEGS = ("stance", "swing")
 CYCLE = 32
-"""Frames of the cycle in which the digest counts; the poses are 4 apart."""
+"""Frames of the digest's cycle; its poses are 4 frames apart."""
 PHASES = tuple(4 * number / CYCLE for number in range(len(POSES)))
-"""When the poses come, as fractions of the cycle: 0, 12, 25 and 37 % in the digest's rounding."""
+"""Times of the poses, as fractions of the cycle: 0, 12, 25 and 37 % in the digest's rounding."""
 _FIELDS = ("thigh", "knee", "foot", "out", "down", "forward")
 _MAX_DEGREES = 170.0
 
@@ -34,10 +34,10 @@ _MAX_DEGREES = 170.0
 class Pose:
     """One leg in one pose, and the palm on its side. Degrees.
 
-    thigh: forward, against the vertical; only where the leg swings freely, elsewhere the stride says it.
-    knee: bent. foot: toes above (+) or below (-) the level, so that the ankle has what hip and knee leave:
-    0 is the digest's hip + knee = ankle. out, down, forward: where the palm is to be, from the shoulder, in
-    lengths of the arm.
+    thigh: forward angle against the vertical; used only where the leg swings freely, elsewhere the stride
+    determines it. knee: bend. foot: pitch of the sole, toes up (+) or down (-), so that the ankle makes up
+    for hip and knee: 0 is the digest's hip + knee = ankle. out, down, forward: position of the palm from the
+    shoulder, in lengths of the arm.
     """
 
     thigh: float
@@ -50,10 +50,13 @@ class Pose:
 
 @dataclass(frozen=True)
 class Pelvis:
-    """turn: degrees about y that the side of the front leg is ahead, in the extended pose (the digest's Z).
+    """Motion of the pelvis.
+
+    turn: degrees about y that the side of the front leg is ahead, in the extended pose (the digest's Z).
     list: degrees about z by which the swinging side hangs, in the passing pose (the digest's Y).
     tilt: degrees by which the whole body leans forward from the hips.
-    sway: metres to the carrying side. surge: share by which the speed rises and falls twice a cycle."""
+    sway: metres to the carrying side. surge: share by which the speed rises and falls twice a cycle.
+    """
 
     turn: float
     list: float
@@ -64,9 +67,12 @@ class Pelvis:
 
 @dataclass(frozen=True)
 class Spine:
-    """lumbar, thorax, neck, head: degrees bent forward. turn: degrees of the shoulders against the pelvis's
+    """Posture and motion of the spine.
+
+    lumbar, thorax, neck, head: degrees bent forward. turn: degrees of the shoulders against the pelvis's
     turn, at most; the head keeps looking ahead. lean: degrees of the chest to the carrying side. nod: degrees
-    of the head, twice a cycle."""
+    of the head, twice a cycle.
+    """
 
     lumbar: float
     thorax: float
@@ -79,8 +85,11 @@ class Spine:
 
 @dataclass(frozen=True)
 class Arms:
-    """up, forward: degrees of the shoulder girdle. twist: degrees of the upper arm, elbows outward.
-    wrist: degrees. curl: degrees of each finger joint."""
+    """Posture of the arms.
+
+    up, forward: degrees of the shoulder girdle. twist: degrees of the upper arm, elbows outward.
+    wrist: degrees. curl: degrees of each finger joint.
+    """
 
     up: float
     forward: float
@@ -146,7 +155,7 @@ class Character:
         return known[name]
 
     def edited(self, pose: str, leg: str, **changes: float) -> Character:
-        """The same character with other extrema in one pose: `edited("passing", "swing", knee=80)`."""
+        """The character with changed values in one pose: `edited("passing", "swing", knee=80)`."""
         if (pose, leg) not in self.poses:
             raise ModelError(
                 f"no pose {pose!r} of a {leg!r} leg; poses are {', '.join(POSES)}, legs {', '.join(LEGS)}"
@@ -164,7 +173,7 @@ class Character:
 
 
 def characters() -> tuple[str, ...]:
-    """Names of the characters that there are, `normal` first."""
+    """Names of all characters, `normal` first."""
     return tuple(_characters())
 
 

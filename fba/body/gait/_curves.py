@@ -1,4 +1,4 @@
-"""Curves through a few values of a cycle. Phases are fractions of it."""
+"""Curves through a few values of a cycle. Phases are fractions of the cycle."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ Interpolation = Literal["linear", "smooth"]
 """"linear" as in the digest, or cubic."""
 
 
-def checked(interpolation: Interpolation) -> Interpolation:
+def check_interpolation(interpolation: Interpolation) -> Interpolation:
     """The given kind of interpolation; ValueError for an unknown one."""
     if interpolation not in ("linear", "smooth"):
         raise ValueError(f"interpolation must be linear or smooth, not {interpolation!r}")
     return interpolation
 
 
-def cosine(knots: npt.ArrayLike, phase: Float64, interpolation: Interpolation) -> Float64:
-    """A wave that is 1 at phase 0."""
+def cosine_wave(knots: npt.ArrayLike, phase: Float64, interpolation: Interpolation) -> Float64:
+    """A cosine wave at phases (T,), 1 at phase 0; "linear" interpolates it between the knots."""
     if interpolation == "smooth":
         return np.cos(2.0 * np.pi * phase)
-    return periodic(knots, np.cos(2.0 * np.pi * np.asarray(knots)), phase, interpolation)
+    return periodic_curve(knots, np.cos(2.0 * np.pi * np.asarray(knots)), phase, interpolation)
 
 
-def periodic(
+def periodic_curve(
     knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike, interpolation: Interpolation = "smooth"
 ) -> Float64:
-    """A periodic curve that rises and falls only where its values do: flat where two neighbours are equal.
+    """A periodic, monotone curve through values, at phases: flat between equal neighbours.
 
     knots: increasing phases in 0..1, values: one each. Cubic pieces, tangents by Fritsch and Butland (1984).
     """

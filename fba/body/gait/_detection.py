@@ -77,15 +77,17 @@ class Cycle:
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """When the eight poses came, as fractions of the cycle."""
+        """Times of the eight poses, as fractions of the cycle."""
         length = self.end - self.start
         return tuple((frame - self.start) / length for step in self.steps for frame in step.poses)
 
 
 @dataclass(frozen=True)
 class Gait:
-    """What `detect` found: steps in order of time, cycles, which overlap by a step. Frames are positions in
-    the animation, from 0."""
+    """The result of `detect`.
+
+    steps: in order of time. cycles: they overlap by a step. Frames are positions in the animation, from 0.
+    """
 
     rate: Fraction
     frames: int
@@ -106,7 +108,7 @@ class Gait:
         return result
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON. Frames, seconds, metres, degrees."""
+        """The gait as a dict for JSON, in frames, seconds, metres and degrees."""
         return {
             "frames": self.frames,
             "walking": int(self.walking.sum()),
@@ -123,7 +125,7 @@ class Gait:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """For people."""
+        """The gait in lines of text."""
         if not self.steps:
             return ["no steps found: nobody walks here, or less than one step"]
         result = [
@@ -144,9 +146,9 @@ class Gait:
 
 
 def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Gait:
-    """Find the steps, cycles and characteristic poses in which a body walks forward.
+    """The steps, cycles and characteristic poses in which a body walks forward.
 
-    skeleton: whose joints the BAPs turn, the default body where None. axes: a convention's name.
+    skeleton: the one whose joints the BAPs turn, the default body where None. axes: a convention's name.
     A foot that never swings past the other, sideways and backward steps, and the first and last step of a
     walk, whose beginning or end is not there, are not found. ValueError where there is no body track.
     """
@@ -160,7 +162,7 @@ def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "
         return none
     curves = Curves.measure(anatomy, BapSolver(skeleton, axes).pose(animation.body.values), animation.times)
     contacts = {letter: curves.contacts(letter) for letter in "lr"}
-    offs = {letter: curves.offs(letter) for letter in "lr"}
+    offs = {letter: curves.departures(letter) for letter in "lr"}
     order = sorted((frame, letter) for letter, frames in contacts.items() for frame in frames)
     steps = [
         step
@@ -187,7 +189,7 @@ def _step(curves: Curves, side: str, start: int, end: int, offs: list[int]) -> S
     first, last = start + max(1, round(0.2 * length)), end - max(1, round(0.2 * length))
     passing = first + int(np.argmax(curves.knee[other][first : last + 1]))
     early = curves.knee[side][start + 1 : passing]
-    # where the carrying knee does not give way, the pose is where it would be, half way
+    # where the carrying knee does not bend, the pose is taken half way
     recoil = start + 1 + int(np.argmax(early)) if len(early) else start + 1
     if not start + 1 < recoil < passing - 1:
         recoil = (start + passing) // 2
@@ -207,7 +209,7 @@ def _cycle(curves: Curves, one: Step, two: Step) -> Cycle | None:
     if lengths[1] > UNEVEN * lengths[0]:
         return None
     start, end = one.start, two.end
-    heel = curves.place[one.side[0]]
+    heel = curves.heel_position[one.side[0]]
     gap = heel[end] - heel[start]
     # the foot that carries in the first step leaves the ground in the second
     stance = (two.off - start) / (end - start) if two.off is not None else float("nan")

@@ -1,8 +1,8 @@
 """Positions of standing feet, and the legs that reach them.
 
 A foot lands on its heel, lies flat, and rises over the metatarsal joint while the toes stay flat: what
-touches does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3 and 4);
-so does the `plan`. What that leaves open, two feet on the ground at once, is closed here, by the legs.
+touches the ground does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3
+and 4); so does `_plan`. While two feet are on the ground, that is not enough; the legs make up for it here.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _RISEN = np.sin(np.radians(12.0))
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """Frames of one foot. Float64.
+    """Poses of one foot over T frames, float64.
 
-    turn: (T, 3, 3) rotation of the foot. subtalar: (T, 3) place of its joint.
+    turn: (T, 3, 3) rotation of the foot. subtalar: (T, 3) position of its joint, metres.
     """
 
     turn: Float64
@@ -37,8 +37,11 @@ class Footing:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """Frames of one leg: rotations of the thigh (T, 3, 3), in the world, and bends of the knee (T,), with
-    the foot's turn (T, 3, 3), all float64."""
+    """Poses of one leg over T frames, float64.
+
+    thigh: (T, 3, 3) rotation in the world. bend: (T,) of the knee, radians. foot: (T, 3, 3) rotation of the
+    foot.
+    """
 
     thigh: Float64
     bend: Float64
@@ -55,10 +58,11 @@ def foot_turn(pitch: Float64, yaw: Float64 | float) -> Float64:
     return axis_matrices(1, np.broadcast_to(yaw, pitch.shape)) @ axis_matrices(0, -pitch)
 
 
-def standing(side: Side, place: Float64, pitch: Float64, yaw: float) -> Footing:
-    """A foot on the ground.
+def place_standing_foot(side: Side, place: Float64, pitch: Float64, yaw: float) -> Footing:
+    """The poses of a foot on the ground.
 
-    place: (T, 3), where its ankle's centre is above when the foot is flat, y = 0. pitch: (T,).
+    place: (T, 3), the point on the ground (y = 0) below the ankle's centre when the foot is flat. pitch:
+    (T,), yaw: radians.
     """
     turn, flat = foot_turn(pitch, yaw), axis_matrices(1, yaw)
     level = place + (0.0, side.ankle[1], 0.0) + flat @ side.subtalar
@@ -67,36 +71,35 @@ def standing(side: Side, place: Float64, pitch: Float64, yaw: float) -> Footing:
     return Footing(turn, np.where(pitch[..., None] > 0.0, on_heel, on_toes))
 
 
-def ankle_place(side: Side, footing: Footing, roll: Float64 | float = 0.0) -> Float64:
-    """(T, 3), where the ankle is that carries a foot, turned back by the subtalar joint's roll."""
+def ankle_position(side: Side, footing: Footing, roll: Float64 | float = 0.0) -> Float64:
+    """(T, 3) position of the ankle above a foot, for a roll of the subtalar joint, metres."""
     shape = footing.subtalar.shape[:-1]
     turn = footing.turn @ axis_matrices(2, -np.broadcast_to(roll, shape))
     return footing.subtalar - apply(turn, side.subtalar)
 
 
-def reach(side: Side, hip: Float64, footing: Footing, knee_yaw: float, level_roll: float = 0.0) -> Leg:
-    """The leg from a hip (T, 3) to a foot. knee_yaw: where the knee points, about +y, radians.
+def solve_leg(side: Side, hip: Float64, footing: Footing, knee_yaw: float, level_roll: float = 0.0) -> Leg:
+    """The leg from a hip (T, 3) to a foot. knee_yaw: direction of the knee about +y, radians.
 
-    The heel hangs on the ankle, which rolls with the shin where the foot does not. So that neither heel nor
-    ball leaves its place, a flat foot turns a little about the metatarsal joint: by nothing where that roll
-    is level_roll, and less as the heel rises.
+    The ankle rolls with the shin, the foot does not. So that neither heel nor ball moves, a flat foot turns a
+    little about the metatarsal joint: not at all where the roll is level_roll, and less as the heel rises.
     """
     roll: Float64 | float = 0.0
-    held = footing
+    solved = footing
     down = smoothstep(1.0 + footing.turn[..., 1, 2] / _RISEN)
     joint = footing.subtalar + apply(footing.turn, side.toe)
     for _ in range(_ROUNDS):  # the subtalar joint's roll moves ankle and heel, by less each time
-        thigh, bend = side.leg.solve(ankle_place(side, held, roll) - hip, knee_yaw)
-        leg = Leg(thigh, bend, held.turn)
+        thigh, bend = side.leg.solve(ankle_position(side, solved, roll) - hip, knee_yaw)
+        leg = Leg(thigh, bend, solved.turn)
         _, _, roll = leg.ankle()
         aside = side.heel[1] / (side.toe[2] - side.heel[2]) * (np.sin(roll) - np.sin(level_roll))
         turn = axis_matrices(1, down * aside) @ footing.turn
-        held = Footing(turn, joint - apply(turn, side.toe))
+        solved = Footing(turn, joint - apply(turn, side.toe))
     return leg
 
 
-def hanging(side: Side, hip: Float64, thigh: Float64, bend: Float64, foot: Float64) -> Footing:
-    """The foot (turned so in the world, (T, 3, 3)) of a leg from the hip with given thigh and knee."""
+def place_swinging_foot(side: Side, hip: Float64, thigh: Float64, bend: Float64, foot: Float64) -> Footing:
+    """The poses of a foot with rotation (T, 3, 3), at the end of a leg with given hip, thigh and knee."""
     shin = thigh @ axis_matrices(0, bend)
     angles = foot_angles(np.swapaxes(shin, -1, -2) @ foot)
     ankle = shin @ axis_matrices(0, angles[0]) @ axis_matrices(1, angles[1])
@@ -104,8 +107,8 @@ def hanging(side: Side, hip: Float64, thigh: Float64, bend: Float64, foot: Float
     return Footing(foot, at + apply(ankle, side.subtalar))
 
 
-def lowest(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> Float64:
-    """(T,), height of the lowest of heel, ball and tip of the toes; toes: bent up by so much, radians."""
+def lowest_height(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> Float64:
+    """(T,) height of the lowest of heel, ball and tip of the toes, metres; toes: bent up, radians."""
     heel = footing.subtalar + apply(footing.turn, side.heel)
     joint = footing.subtalar + apply(footing.turn, side.toe)
     bent = footing.turn @ axis_matrices(0, -np.broadcast_to(toes, footing.subtalar.shape[:-1]))
@@ -116,19 +119,23 @@ def lowest(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> Float64
 
 
 def hip_angles(pelvis: Float64, thigh: Float64) -> tuple[Float64, Float64, Float64]:
-    """Angles about x, y, z of the hip between pelvis and thigh, both in the world: as the pelvis turns one
-    way, they turn the other, and the leg keeps its direction."""
+    """Angles (x, y, z) of the hip, radians, between pelvis and thigh, both (T, 3, 3) in the world."""
     return limb_angles(np.swapaxes(pelvis, -1, -2) @ thigh)
 
 
-def hip_place(side: Side, pelvis_centre: Float64, root: Float64, lean: Float64, pelvis: Float64) -> Float64:
-    """(T, 3), where a hip is. root: (T, 3), its centre; lean: (T, 3, 3), its rotation; pelvis: in it."""
+def hip_position(
+    side: Side, pelvis_centre: Float64, root: Float64, lean: Float64, pelvis: Float64
+) -> Float64:
+    """(T, 3) position of a hip, metres.
+
+    root: (T, 3), its centre. lean: (T, 3, 3), its rotation. pelvis: (T, 3, 3), rotation relative to it.
+    """
     local = pelvis_centre + apply(pelvis, side.hip - pelvis_centre)
     return root + apply(lean, local)
 
 
 def hip_height(side: Side, hip: Float64, ankle: Float64, bend: Float64) -> Float64:
-    """(T,), height of the hip over the ground at which the leg to the ankle has that bend."""
+    """(T,) height of the hip over the ground at which the leg to the ankle has that bend, metres."""
     gap = hip - ankle
     rest = np.square(side.leg.length(bend)) - np.square(gap[..., 0]) - np.square(gap[..., 2])
     result: Float64 = ankle[..., 1] + np.sqrt(np.maximum(rest, 1e-6))

@@ -19,14 +19,16 @@ ON_GROUND = 0.002
 
 @dataclass(frozen=True, eq=False)
 class Soles:
-    """Points of the feet in every frame. Float64 (2, 3, T, 3), metres: left and right; heel, ball of the
-    foot, tip of the toes."""
+    """Points of the soles in every frame.
+
+    points: float64 (2, 3, T, 3), metres: left and right; heel, ball of the foot, tip of the toes.
+    """
 
     points: Float64
 
     @property
     def touching(self) -> Bool:
-        """(2, 3, T), whether a point is on the ground."""
+        """(2, 3, T) mask of points on the ground."""
         result: Bool = self.points[..., 1] <= ON_GROUND
         return result
 
@@ -59,7 +61,7 @@ class Soles:
 
 
 def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Soles:
-    """The feet of an animation's body in every frame. ValueError without a body track."""
+    """The soles of an animation's body in every frame. Raises ValueError without a body track."""
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     skeleton = Skeleton.default() if skeleton is None else skeleton
@@ -68,7 +70,7 @@ def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "i
 
 
 def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
-    """The feet in poses (T, J, 4, 4)."""
+    """The soles in poses given by joint matrices (T, J, 4, 4)."""
     points = np.zeros((2, 3, len(matrices), 3))
     for number, letter in enumerate("lr"):
         side = anatomy.sides[letter]
@@ -83,7 +85,7 @@ def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
 
 
 def advance(animation: Animation, axes: str = "iso") -> float:
-    """Millimetres over the ground from the first frame's root to the last's, as the crow flies."""
+    """Straight distance over the ground from the first frame's root to the last's, millimetres."""
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     columns = convention(axes).translation

@@ -1,4 +1,4 @@
-"""One cycle of a character on a body: where root, pelvis and feet are at any phase.
+"""One walking cycle of a character on a body: root, pelvis and feet at any phase.
 
 Phases are fractions of the cycle, from the contact of the right foot on. The body walks along +z.
 """
@@ -13,7 +13,7 @@ from fba.arrays import Float64
 from fba.body.gait import _ground as ground
 from fba.body.gait._anatomy import Anatomy, Side
 from fba.body.gait._characters import CYCLE, PHASES, Character
-from fba.body.gait._curves import Interpolation, cosine, periodic, spline
+from fba.body.gait._curves import Interpolation, cosine_wave, periodic_curve, spline
 from fba.body.gait._ground import TOE_OFF, Footing, Leg
 from fba.body.gait._joint_angles import limb_angles
 from fba.easing import smoothstep
@@ -26,15 +26,15 @@ FLAT = 0.09
 SHORTEST = 0.1
 """Metres: the shortest stride."""
 _DOUBLE = TOE_OFF - 0.5
-"""Fraction of the cycle over which the height goes over from the leg behind to the one in front."""
+"""Fraction of the cycle over which the height changes from the rear leg's to the front leg's."""
 _STRAIGHT = 0.9985
-"""Share of its length that a leg keeps to: a knee is never locked."""
+"""Share of its length to which a leg stretches: a knee is never locked."""
 _RISES = 0.33
 """Fraction of the cycle at which a heel begins to rise."""
 _STRAIN = 0.03
-"""Share of the length of a leg by which legs that are too short may hold the body down."""
-_FREED = 4.0
-"""Metres of height a cycle at which a leg that has left the ground stops holding the body down."""
+"""Largest lowering of the body by legs that are too short for the stride, as a share of their length."""
+_RELEASE_RATE = 4.0
+"""Metres per cycle at which the height limit of a leg rises once it has left the ground."""
 _CLEAR = 0.012
 """Metres that a swinging foot keeps off the ground."""
 _TINY = 1e-4
@@ -42,7 +42,7 @@ _TINY = 1e-4
 
 
 class Plan:
-    """anatomy, character, and stride, metres; ModelError where the legs cannot take it."""
+    """The plan of one cycle. stride: metres; raises ModelError where it is too long for the legs."""
 
     def __init__(
         self,
@@ -54,7 +54,7 @@ class Plan:
         self.anatomy, self.character, self.stride = anatomy, character, stride
         self.interpolation: Interpolation = interpolation
         self.size = stride / (character.stride * anatomy.scale)
-        """The stride against the character's own."""
+        """The stride relative to the character's own."""
         share = np.clip(self.size, 0.0, 1.3)
         foot = np.array(character.curve("foot"))
         foot[0] *= share
@@ -68,21 +68,21 @@ class Plan:
         knee[5:7] *= 0.55 + 0.45 * share
         self._knee = np.radians(knee)
         self._yaw = np.radians(character.toes_out)
-        self._ahead = self._split()
-        if self._held_down() > _STRAIN * anatomy.sides["r"].leg.reach:
+        self._ahead = self._front_foot_ahead()
+        if self._largest_hold_down() > _STRAIN * anatomy.sides["r"].leg.reach:
             raise self._too_long()
 
     def pitch(self, phase: Float64) -> Float64:
-        """Of a foot at a phase of its own leg."""
+        """(T,) pitch of a foot at phases of its own leg, radians."""
         phase = np.mod(phase, 1.0)
         flat = self._foot_values[1]
         landing = flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / FLAT, 0.0) ** 1.5
-        later = periodic(self._foot_knots, self._foot_values, phase, self.interpolation)
+        later = periodic_curve(self._foot_knots, self._foot_values, phase, self.interpolation)
         return np.where(phase < FLAT, landing, later)
 
     def knee(self, phase: Float64) -> Float64:
-        """Bend that the poses ask for, at a phase of the leg's own."""
-        return periodic(KNOTS, self._knee, phase, self.interpolation)
+        """(T,) bend of the knee by the poses, at phases of its own leg, radians."""
+        return periodic_curve(KNOTS, self._knee, phase, self.interpolation)
 
     def toes(self, phase: Float64) -> Float64:
         """Bend of the toes against the foot, up, radians: they lie flat until they leave the ground."""
@@ -95,11 +95,11 @@ class Plan:
         return axis_matrices(0, np.full(phase.shape, np.radians(self.character.pelvis.tilt)))
 
     def pelvis_angles(self, phase: Float64) -> tuple[Float64, Float64]:
-        """Torsion about y and roll about z of the pelvis, against the root."""
+        """(torsion about y, roll about z) of the pelvis relative to the root, each (T,), radians."""
         pelvis = self.character.pelvis
         turn = np.radians(pelvis.turn) * np.clip(self.size, 0.0, 1.5)
-        ahead = cosine(KNOTS, phase, self.interpolation)
-        hangs = cosine(KNOTS, phase - 0.25, self.interpolation)
+        ahead = cosine_wave(KNOTS, phase, self.interpolation)
+        hangs = cosine_wave(KNOTS, phase - 0.25, self.interpolation)
         return turn * ahead, -np.radians(pelvis.list) * hangs
 
     def pelvis(self, phase: Float64) -> Float64:
@@ -109,8 +109,8 @@ class Plan:
     def side_phase(self, side: Side, phase: Float64) -> Float64:
         return phase if side.letter == "r" else phase - 0.5
 
-    def place(self, side: Side, phase: Float64) -> Float64:
-        """(T, 3), footprint of the foot that stands, or stood last, at a phase of the cycle."""
+    def footprint(self, side: Side, phase: Float64) -> Float64:
+        """(T, 3) footprint at which a foot stands, or stood last, at phases of the cycle, metres."""
         own = self.side_phase(side, phase)
         result = np.zeros((*phase.shape, 3))
         result[..., 0] = side.way * self.character.width / 2.0 * self.anatomy.scale
@@ -118,12 +118,14 @@ class Plan:
         return result
 
     def footing(self, side: Side, phase: Float64) -> Footing:
-        """The foot as it stands; meaningless while it swings."""
+        """Poses of the standing foot; meaningless while it swings."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
-        return ground.standing(side, self.place(side, phase), self.pitch(own), side.way * self._yaw)
+        return ground.place_standing_foot(
+            side, self.footprint(side, phase), self.pitch(own), side.way * self._yaw
+        )
 
-    def _along(self, phase: Float64) -> Float64:
-        """(T, 3), the root's position along the ground, its height still 0."""
+    def _root_along(self, phase: Float64) -> Float64:
+        """(T, 3) the root's position over the ground, its height still 0, metres."""
         pelvis, scale = self.character.pelvis, self.anatomy.scale
         result = np.zeros((*phase.shape, 3))
         result[..., 0] = -pelvis.sway * scale * np.sin(2.0 * np.pi * (phase - 0.02))
@@ -132,27 +134,27 @@ class Plan:
         return result
 
     def hip(self, side: Side, root: Float64, phase: Float64) -> Float64:
-        return ground.hip_place(side, self.anatomy.pelvis, root, self.lean(phase), self.pelvis(phase))
+        return ground.hip_position(side, self.anatomy.pelvis, root, self.lean(phase), self.pelvis(phase))
 
     def _root_height(self, side: Side, root: Float64, phase: Float64, bend: Float64 | None = None) -> Float64:
-        """Height of the root at which a standing leg has the bend its poses ask for (or the one given)."""
+        """(T,) height of the root at which a standing leg has the bend of its poses, or the given one."""
         own = self.side_phase(side, phase)
         hip = self.hip(side, root, phase)
-        ankle = ground.ankle_place(side, self.footing(side, phase))
+        ankle = ground.ankle_position(side, self.footing(side, phase))
         bend = self.knee(own) if bend is None else bend
         return ground.hip_height(side, hip, ankle, bend) - (hip[..., 1] - root[..., 1])
 
-    def _split(self) -> float:
+    def _front_foot_ahead(self) -> float:
         """Metres that the front foot is ahead of the root in the extended pose.
 
-        Both feet are on the ground: what one leg's height is, the other's must be.
+        Both feet are on the ground, so both legs must give the root the same height.
         """
         right, left = self.anatomy.sides["r"], self.anatomy.sides["l"]
         at = np.zeros(1)
         legs = right.leg.reach + left.leg.reach
 
         def gap(ahead: float) -> float:
-            root = self._along(at) - (0.0, 0.0, ahead)
+            root = self._root_along(at) - (0.0, 0.0, ahead)
             front = self._root_height(right, root, at)
             rear = self._root_height(left, root, at)
             return float((front - rear)[0])
@@ -163,7 +165,7 @@ class Plan:
         for _ in range(60):
             middle = (low + high) / 2.0
             low, high = (middle, high) if gap(middle) > 0.0 else (low, middle)
-        root = self._along(at) - (0.0, 0.0, low)
+        root = self._root_along(at) - (0.0, 0.0, low)
         root[..., 1] = self._root_height(right, root, at)
         if float(root[0, 1]) < 0.45 * self.anatomy.skeleton.centres[0][1]:
             raise self._too_long()
@@ -177,14 +179,14 @@ class Plan:
         )
 
     def root(self, phase: Float64) -> Float64:
-        """(T, 3), position of the root: over the standing foot, at the height that the standing leg gives."""
+        """(T, 3) position of the root, metres, at the height that the standing leg gives."""
         root, wanted, limit = self._heights(phase)
         root[..., 1] = np.minimum(wanted, limit)
         return root
 
     def _heights(self, phase: Float64) -> tuple[Float64, Float64, Float64]:
-        """The root over the ground (T, 3), the height that its poses give it, and the most its legs allow."""
-        root = self._along(phase) - (0.0, 0.0, self._ahead)
+        """((T, 3) root over the ground, (T,) its height by the poses, (T,) the largest its legs allow)."""
+        root = self._root_along(phase) - (0.0, 0.0, self._ahead)
         share = smoothstep(np.mod(phase, 0.5) / _DOUBLE)
         right_leads = np.mod(phase, 1.0) < 0.5
         heights, limits = {}, []
@@ -192,14 +194,14 @@ class Plan:
             heights[letter] = self._root_height(side, root, phase)
             limit = self._root_height(side, root, phase, side.leg.bend(_STRAIGHT * side.leg.reach))
             own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0)
-            freed = np.maximum(own - TOE_OFF, 0.0) * _FREED * self.anatomy.scale
-            limits.append(np.where(own < KNOTS[6], limit + freed, np.inf))
+            released = np.maximum(own - TOE_OFF, 0.0) * _RELEASE_RATE * self.anatomy.scale
+            limits.append(np.where(own < KNOTS[6], limit + released, np.inf))
         front = np.where(right_leads, heights["r"], heights["l"])
         rear = np.where(right_leads, heights["l"], heights["r"])
         return root, share * front + (1.0 - share) * rear, np.minimum(*limits)
 
-    def _held_down(self) -> float:
-        """Metres that the legs hold the body down at most, because they are too short for the stride."""
+    def _largest_hold_down(self) -> float:
+        """Largest lowering of the body, metres, by legs that are too short for the stride."""
         _, wanted, limit = self._heights(np.arange(2 * CYCLE) / (2 * CYCLE))
         return float((wanted - limit).max())
 
@@ -208,19 +210,19 @@ class Plan:
         root = self.root(phase) if root is None else root
         footing = self.footing(side, phase)
         yaw, roll = side.way * self._yaw, side.way * self._level_roll
-        return ground.reach(side, self.hip(side, root, phase), footing, yaw, roll)
+        return ground.solve_leg(side, self.hip(side, root, phase), footing, yaw, roll)
 
     @cached_property
     def _level_roll(self) -> float:
-        """Of the left subtalar joint as the heel is about to rise."""
+        """Roll of the left subtalar joint as the heel is about to rise, radians."""
         side, at = self.anatomy.sides["l"], np.array([0.5 + _RISES])
         hip = self.hip(side, self.root(at), at)
-        leg = ground.reach(side, hip, self.footing(side, at), self._yaw)
+        leg = ground.solve_leg(side, hip, self.footing(side, at), self._yaw)
         return float(leg.ankle()[2][0])
 
     @cached_property
     def _swings(self) -> dict[str, tuple[Float64, Float64, Float64, Float64]]:
-        """For each side: knots, values and end slopes of thigh (x, z), in the world, and knee."""
+        """By side: knots, values and end slopes of the angles of thigh (x, z, in the world) and knee."""
         return {letter: self._swing(side) for letter, side in self.anatomy.sides.items()}
 
     def _swing(self, side: Side) -> tuple[Float64, Float64, Float64, Float64]:
@@ -233,7 +235,7 @@ class Plan:
         knots = np.array([TOE_OFF, KNOTS[6], KNOTS[7], 1.0])
         poses = self.character.poses
         landing = -np.degrees(solved[2][0])
-        own = landing if abs(self.size - 1.0) < 1e-9 else self._own_landing(side)
+        own = landing if abs(self.size - 1.0) < 1e-9 else self._usual_landing(side)
         values = [solved[1]]
         for number, (pose, follow) in enumerate((("passing", 0.6), ("anticipation", 1.0))):
             thigh = poses[pose, "swing"].thigh + follow * (landing - own)
@@ -245,7 +247,7 @@ class Plan:
         natural -= 0.5 * (values[3] - values[1]) / (knots[3] - knots[1])
         return knots, np.stack(values), off, 0.5 * (natural + on)
 
-    def _own_landing(self, side: Side) -> float:
+    def _usual_landing(self, side: Side) -> float:
         plan = Plan(
             self.anatomy, self.character, self.character.stride * self.anatomy.scale, self.interpolation
         )
@@ -265,17 +267,17 @@ class Plan:
             x, z, bend = np.moveaxis(spline(knots, values, off, on, swing), -1, 0)
         thigh = axis_matrices(0, x) @ axis_matrices(2, z) @ axis_matrices(1, np.full(x.shape, yaw))
         hip = self.hip(side, root, phase)
-        swinging = ground.hanging(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
+        swinging = ground.place_swinging_foot(side, hip, thigh, bend, ground.foot_turn(self.pitch(own), yaw))
         rise = np.minimum((own - TOE_OFF) / 0.03, (1.0 - own) / 0.06)
         room = _CLEAR * self.anatomy.scale * np.clip(rise, 0.0, 1.0)
-        lift = np.maximum(room - ground.lowest(side, swinging, self.toes(own)), 0.0)
+        lift = np.maximum(room - ground.lowest_height(side, swinging, self.toes(own)), 0.0)
         swinging.subtalar[..., 1] += lift
         standing = self.footing(side, phase)
         footing = Footing(
             np.where(stands[..., None, None], standing.turn, swinging.turn),
             np.where(stands[..., None], standing.subtalar, swinging.subtalar),
         )
-        return ground.reach(side, hip, footing, yaw, side.way * self._level_roll)
+        return ground.solve_leg(side, hip, footing, yaw, side.way * self._level_roll)
 
 
 __all__ = ["CYCLE", "KNOTS", "SHORTEST", "Plan"]

@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.body.gait._anatomy import Side, Writer
 from fba.body.gait._characters import Character
-from fba.body.gait._curves import cosine, periodic
+from fba.body.gait._curves import cosine_wave, periodic_curve
 from fba.body.gait._joint_angles import limb_angles
 from fba.body.gait._plan import KNOTS, Plan
 from fba.body.skeleton import Skeleton
@@ -26,13 +26,15 @@ _MORE_CURL = {"index": 0.75, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
 
 
 _LATE = 0.02
-"""Fraction of the cycle by which arms come after the legs."""
+"""Fraction of the cycle by which arms lag behind the legs."""
 _REACH = 0.995
 """Share of its length to which an arm stretches."""
 
 
-def _spread(writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: int, angle: Float64) -> None:
-    """Turn a part of the spine by an angle, radians, shared evenly by those of its joints that there are."""
+def _turn_spine(
+    writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: int, angle: Float64
+) -> None:
+    """Turn a part of the spine by an angle, radians, shared evenly by the joints that the skeleton has."""
     there = [joint for joint in joints if joint in skeleton]
     for joint in there:
         writer.turn(joint, axis, angle / len(there))
@@ -46,8 +48,8 @@ def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64
     spine, arms = plan.character.spine, plan.character.arms
     kind = plan.interpolation
     still = np.ones(phase.shape)
-    turn = -np.radians(spine.turn) * min(plan.size, 1.5) * cosine(KNOTS, phase, kind)
-    lean = np.radians(spine.lean) * cosine(
+    turn = -np.radians(spine.turn) * min(plan.size, 1.5) * cosine_wave(KNOTS, phase, kind)
+    lean = np.radians(spine.lean) * cosine_wave(
         KNOTS, phase - 0.25, kind
     )  # the right leg carries first: to the right
     nod = np.radians(spine.nod) * np.cos(4.0 * np.pi * phase)
@@ -59,7 +61,7 @@ def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64
     ):
         bent = np.radians(x) * still + (nod if joints is HEAD else -nod if joints is NECK else 0.0)
         for axis, values in ((0, bent), (1, y), (2, z)):
-            _spread(writer, skeleton, joints, axis, values)
+            _turn_spine(writer, skeleton, joints, axis, values)
     for letter, way in (("l", 1.0), ("r", -1.0)):
         girdle = f"{letter}_sternoclavicular"
         if girdle in skeleton:
@@ -86,7 +88,7 @@ def _palm_goals(side: Side, character: Character, size: float) -> Float64:
 
 
 def swing_arms(writer: Writer, plan: Plan, phase: Float64) -> None:
-    """Write the angles of shoulders and elbows; the spine stands in writer.values already.
+    """Write the angles of shoulders and elbows; writer.values must already hold the spine.
 
     At the poses the palms are at their goals; in between, angles are interpolated.
     """
@@ -106,7 +108,7 @@ def swing_arms(writer: Writer, plan: Plan, phase: Float64) -> None:
         x, y, z = limb_angles(upper)
         own = phase - start - _LATE
         for axis, angle in ((0, x), (1, y), (2, z)):
-            writer.turn(f"{letter}_shoulder", axis, periodic(KNOTS, angle, own, plan.interpolation))
-        writer.turn(f"{letter}_elbow", 0, -periodic(KNOTS, bend, own, plan.interpolation))
+            writer.turn(f"{letter}_shoulder", axis, periodic_curve(KNOTS, angle, own, plan.interpolation))
+        writer.turn(f"{letter}_elbow", 0, -periodic_curve(KNOTS, bend, own, plan.interpolation))
         wrist = -side.way * np.radians(character.arms.wrist)
         writer.turn(f"{letter}_wrist", 2, np.full(phase.shape, wrist))

@@ -19,14 +19,16 @@ from fba.body.solve.solver import BapSolver
 from fba.parameters import baps
 
 _STILL = 1e-6
-"""Change of a rotation's entries below which a joint stays as it is."""
+"""Change of a rotation matrix's entries below which a joint counts as still."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """keys: an `Animation` of the poses alone, at their own times, and of the frames between them in which
-    nobody walks. frames: how many there were from the first key to the last. walking, poses: how many of them
-    belonged to steps, and how many keys stand for those.
+    """A motion reduced to key frames.
+
+    keys: an `Animation` of the poses alone, at their own times, and of the frames between them that belong to
+    no step. frames: number of frames from the first key to the last. walking: number of these that belong to
+    steps. poses: number of keys that replace them.
     """
 
     keys: Animation
@@ -36,7 +38,7 @@ class Reduced:
 
     @property
     def factor(self) -> float:
-        """How many frames of walking a pose stands for."""
+        """Frames of walking per pose."""
         return self.walking / self.poses
 
     def whole(self, interpolation: Interpolation = "smooth") -> Animation:
@@ -45,7 +47,7 @@ class Reduced:
         interpolation: "linear", as in the digest, or "smooth": cubic curves that rise and fall only where the
         keys do. ValueError on another.
         """
-        index, values = self.keys.index, _unwound(_values(self.keys))
+        index, values = self.keys.index, _unwrap(_values(self.keys))
         every = np.arange(int(index[0]), int(index[-1]) + 1)
         if interpolation == "linear":
             between = np.stack([np.interp(every, index, column) for column in values.T], axis=1)
@@ -63,8 +65,11 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Errors:
-    """How far one motion is from another: degrees of each joint's own rotation; centimetres of its place in
-    the world, and against the root. worst_joint: whose rotation is furthest off."""
+    """Differences between two motions.
+
+    Degrees are of each joint's own rotation; centimetres of its position in the world and (local) relative to
+    the root. worst_joint: the joint with the largest difference of rotation.
+    """
 
     mean_degrees: float
     worst_degrees: float
@@ -83,9 +88,9 @@ def reduce(animation: Animation, found: Gait | None = None, skeleton: Skeleton |
         raise ValueError("gait: no steps to reduce this motion to")
     span = np.zeros(len(animation), dtype=bool)
     span[keys[0] : keys[-1] + 1] = True
-    kept = span & ~found.walking
-    kept[list(keys)] = True
-    places = np.flatnonzero(kept)
+    keep = span & ~found.walking
+    keep[list(keys)] = True
+    places = np.flatnonzero(keep)
     assert animation.body is not None
     track = BodyTrack(animation.body.values[places], animation.body.mask[places])
     thin = Animation(animation.rate, animation.index[places], None, track, animation.name)
@@ -107,11 +112,11 @@ def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) 
     a, b = solver.pose(_values(one)[first]), solver.pose(_values(other)[second])
     places = a[:, :, :3, 3] - b[:, :, :3, 3]
     inner = places - places[:, :1]
-    own = _own(a, skeleton)
+    own = _local_rotations(a, skeleton)
     moved = np.flatnonzero(np.ptp(own, axis=0).max(axis=(1, 2)) > _STILL)
     if not len(moved):
         moved = np.arange(len(skeleton))
-    angles = np.degrees(_angles(own, _own(b, skeleton)))[:, moved]
+    angles = np.degrees(_angles_between(own, _local_rotations(b, skeleton)))[:, moved]
     far, near = (100.0 * np.linalg.norm(p[:, moved], axis=-1) for p in (places, inner))
     return Errors(
         float(angles.mean()), float(angles.max()), skeleton.names[moved[int(angles.max(axis=0).argmax())]],
@@ -125,23 +130,23 @@ def _values(animation: Animation) -> Int32:
     return animation.body.values
 
 
-def _unwound(values: Int32) -> Float64:
-    """Angles that follow each other without a whole turn between."""
+def _unwrap(values: Int32) -> Float64:
+    """float64 (T, 296): BAPs with whole turns between successive angles removed."""
     result = values.astype(np.float64)
     angles = [bap.number - 1 for bap in baps() if bap.unit == "1e-5 rad"]
     result[:, angles] = np.unwrap(result[:, angles], axis=0, period=2e5 * np.pi)
     return result
 
 
-def _own(matrices: Float64, skeleton: Skeleton) -> Float64:
-    """(T, J, 3, 3), each joint's rotation in its parent."""
+def _local_rotations(matrices: Float64, skeleton: Skeleton) -> Float64:
+    """(T, J, 3, 3) rotation of each joint relative to its parent."""
     turns = matrices[:, :, :3, :3]
     result = turns.copy()
     result[:, 1:] = np.swapaxes(turns[:, skeleton.parents[1:]], -1, -2) @ turns[:, 1:]
     return result
 
 
-def _angles(a: Float64, b: Float64) -> Float64:
+def _angles_between(a: Float64, b: Float64) -> Float64:
     """Radians between rotations; by the chord, which keeps its accuracy near 0."""
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
     result: Float64 = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))

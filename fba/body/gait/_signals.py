@@ -1,4 +1,4 @@
-"""The curves of a motion in which steps show: feet ahead of the pelvis, knees, thighs."""
+"""Curves of a motion from which steps are detected: feet ahead of the pelvis, knees, thighs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ SHORTEST_SWING = 0.12
 SHORTEST_STEP = 0.08
 """Share of the leg's length by which a foot must be ahead of the other as it comes to the ground."""
 SINKING, LEAVING = 0.06, 0.08
-"""Seconds after a foot's foremost place, and about its hindmost, in which its height says when it meets or
-leaves the ground."""
+"""Seconds after a foot's foremost position, and about its hindmost, in which its height shows when it meets
+or leaves the ground."""
 TOUCH = 0.008
 """Share of the leg's length that a foot on the ground may be above its lowest place."""
 SMOOTH = 0.02
@@ -38,7 +38,7 @@ class Curves:
     toes: dict[str, Float64]
     knee: dict[str, Float64]
     thigh: dict[str, Float64]
-    place: dict[str, Float64]
+    heel_position: dict[str, Float64]
     lowest: dict[str, Float64]
     heading: Float64
     reach: float
@@ -48,7 +48,7 @@ class Curves:
         number = anatomy.skeleton.number
         rate = (len(times) - 1) / max(float(times[-1] - times[0]), 1e-9)
         pelvis = matrices[:, number("sacroiliac")]
-        facing = _smoothed(pelvis[:, :3, 2], FACING * rate)
+        facing = _smooth(pelvis[:, :3, 2], FACING * rate)
         facing[:, 1] = 0.0
         facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
         points = sole_points(anatomy, matrices).points
@@ -59,22 +59,22 @@ class Curves:
             )
 
             def ahead(point: Float64) -> Float64:
-                return _smoothed(np.sum((point - pelvis[:, :3, 3]) * facing, axis=1), SMOOTH * rate)
+                return _smooth(np.sum((point - pelvis[:, :3, 3]) * facing, axis=1), SMOOTH * rate)
 
             upper, lower = knee_at - hip, ankle - knee_at
             cosine = np.sum(upper * lower, axis=1)
             cosine /= np.linalg.norm(upper, axis=1) * np.linalg.norm(lower, axis=1)
             heel[letter], toes[letter] = ahead(points[row, 0]), ahead(points[row, 1])
-            knee[letter] = _smoothed(np.arccos(np.clip(cosine, -1.0, 1.0)), SMOOTH * rate)
+            knee[letter] = _smooth(np.arccos(np.clip(cosine, -1.0, 1.0)), SMOOTH * rate)
             raised = np.arctan2(np.sum(upper * facing, axis=1), -upper[:, 1])
-            thigh[letter] = _smoothed(raised, SMOOTH * rate)
+            thigh[letter] = _smooth(raised, SMOOTH * rate)
             place[letter] = points[row, 0]
             lowest[letter] = points[row, ..., 1].min(axis=0)
         heading = np.unwrap(np.arctan2(facing[:, 0], facing[:, 2]))
         return cls(times, heel, toes, knee, thigh, place, lowest, heading, anatomy.sides["l"].leg.reach)
 
     def contacts(self, letter: str) -> list[int]:
-        """Frames in which the foot comes to the ground, ahead of the other."""
+        """Frames in which a foot meets the ground, ahead of the other."""
         height, other = self.lowest[letter], self.heel["l" if letter == "r" else "r"]
         found = []
         for peak in self._peaks(self.heel[letter]):
@@ -84,8 +84,8 @@ class Curves:
             found.append(peak + int(np.argmax(coming <= coming.min() + TOUCH * self.reach)))
         return found
 
-    def offs(self, letter: str) -> list[int]:
-        """Frames in which the foot is off the ground for the first time."""
+    def departures(self, letter: str) -> list[int]:
+        """Frames in which a foot has just left the ground."""
         height = self.lowest[letter]
         found = []
         for peak in self._peaks(-self.toes[letter]):
@@ -97,7 +97,7 @@ class Curves:
         return found
 
     def _frames(self, seconds: float) -> int:
-        """At least one."""
+        """Number of frames in some seconds, at least one."""
         return max(1, round(seconds / max(float(np.median(np.diff(self.times))), 1e-9)))
 
     def _peaks(self, curve: Float64) -> list[int]:
@@ -112,8 +112,8 @@ class Curves:
         return [int(frame) - 1 for frame in found]
 
 
-def _smoothed(curve: Float64, width: float) -> Float64:
-    """A Gaussian of that many frames; the ends go on as they are."""
+def _smooth(curve: Float64, width: float) -> Float64:
+    """The curve smoothed by a Gaussian of `width` frames, the ends extended by their values."""
     if width < 0.3:
         return curve.copy()
     from scipy.ndimage import gaussian_filter1d

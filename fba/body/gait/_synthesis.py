@@ -1,4 +1,4 @@
-"""Walking, made of four poses: `walk`."""
+"""Synthesis of walks from four poses: `walk`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fba.arrays import Float64
 from fba.body.gait import _ground as ground
 from fba.body.gait._anatomy import Anatomy, Writer
 from fba.body.gait._characters import Character
-from fba.body.gait._curves import Interpolation, checked
+from fba.body.gait._curves import Interpolation, check_interpolation
 from fba.body.gait._plan import SHORTEST, Plan
 from fba.body.gait._posture import swing_arms, write_posture
 from fba.body.skeleton import Skeleton
@@ -20,7 +20,7 @@ from fba.errors import ModelError
 FEWEST = 8
 """Frames of a cycle: one for each pose of it."""
 MOST = 100_000
-"""Frames that are made at once: an hour and more."""
+"""Most frames of one walk: over half an hour."""
 
 
 def walk(
@@ -34,7 +34,7 @@ def walk(
     in_place: bool = False,
     skeleton: Skeleton | None = None,
 ) -> Animation:
-    """Someone walks along +z, from the contact of the right foot on: BAPs of legs, arms, spine and root.
+    """An animation of a walk along +z, from the contact of the right foot on: legs, arms, spine and root.
 
     stride: metres from one contact of a foot to its next, two steps; the character's own, at the size of
         the skeleton, where None. As the time of a cycle is the character's, it sets the speed. Rounded to mm.
@@ -52,7 +52,7 @@ def walk(
     if not isinstance(character, Character):
         character = Character.named(character)
     anatomy = Anatomy.measure(Skeleton.default() if skeleton is None else skeleton)
-    stride = _stride(stride, character, anatomy)
+    stride = _check_stride(stride, character, anatomy)
     rate = Fraction(rate)
     if rate <= 0:
         raise ValueError(f"walk: the frame rate must be positive, not {rate}")
@@ -62,8 +62,8 @@ def walk(
             f"walk: {rate} frames/s make {float(character.seconds * rate):.4g} frames of a cycle of "
             f"{character.seconds:g} s; needs at least {FEWEST}, and a plausible rate"
         )
-    count = _count(cycles, seconds, rate, period)
-    one = cycle(Plan(anatomy, character, stride, checked(interpolation)), period)
+    count = _frame_count(cycles, seconds, rate, period)
+    one = write_cycle(Plan(anatomy, character, stride, check_interpolation(interpolation)), period)
     frames = np.arange(count)
     values = one.values[frames % period]
     forward = one.forward_column
@@ -78,8 +78,8 @@ def walk(
     return Animation(rate, frames, None, BodyTrack(integers, mask), name)
 
 
-def cycle(plan: Plan, period: int) -> Writer:
-    """One cycle of `period` frames, as BAPs."""
+def write_cycle(plan: Plan, period: int) -> Writer:
+    """The BAPs of one cycle of `period` frames."""
     anatomy, character = plan.anatomy, plan.character
     phase = np.arange(period) / period
     writer = Writer(period)
@@ -116,7 +116,7 @@ def _write_leg(writer: Writer, letter: str, pelvis: Float64, leg: ground.Leg) ->
     writer.turn(f"{letter}_subtalar", 2, z)
 
 
-def _stride(stride: float | None, character: Character, anatomy: Anatomy) -> float:
+def _check_stride(stride: float | None, character: Character, anatomy: Anatomy) -> float:
     if stride is None:
         return round(character.stride * anatomy.scale, 3)
     try:
@@ -136,8 +136,8 @@ def _stride(stride: float | None, character: Character, anatomy: Anatomy) -> flo
     return round(metres, 3)
 
 
-def _count(cycles: float | None, seconds: float | None, rate: Fraction, period: int) -> int:
-    """How many frames."""
+def _frame_count(cycles: float | None, seconds: float | None, rate: Fraction, period: int) -> int:
+    """Number of frames of a walk; raises ValueError for lengths that make no sense."""
     if cycles is not None and seconds is not None:
         raise ValueError("walk: give either cycles or seconds, not both")
     wanted = seconds if seconds is not None else 4 if cycles is None else cycles

@@ -1,9 +1,9 @@
 """MakeHuman's base mesh with its default rig, as a body that BAPs move.
 
 Users point it at a copy of their own (the files are CC0): the base mesh "hm08" (`base.obj`), its rig
-(`default.mhskel`) and the weights (`default_weights.mhw`) in one folder. `makehuman.csv` says which places
-and bones of the rig each joint of the standard takes; the vertebrae are spread along its spine.
-`makehuman_neck.csv` is the ring of vertices where its heads end.
+(`default.mhskel`) and the weights (`default_weights.mhw`) in one folder. `makehuman.csv` gives the positions
+and bones of the rig for each joint of the standard; the vertebrae are distributed along its spine.
+`makehuman_neck.csv` lists the ring of vertices at which its head models end.
 """
 
 from __future__ import annotations
@@ -21,7 +21,13 @@ from fba.arrays import Bool, Float64, Int64
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest_weights
-from fba.body.solve.bind_pose import bind_matrices, chain, shares, unposed, vertebrae
+from fba.body.solve.bind_pose import (
+    bind_matrices,
+    chain_weights,
+    place_vertebrae,
+    skeleton_in_default_posture,
+    vertebrae_between,
+)
 from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
 from fba.gltf.document import MAX_ITEMS, parse_json
@@ -34,7 +40,7 @@ from fba.mesh.text_files import read_bytes
 METRES = 0.1
 """Metres per unit of the base mesh."""
 VERTICES = 19158
-"""How many vertices the base mesh hm08 has."""
+"""Number of vertices of the base mesh hm08."""
 SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01", "neck01", "neck02", "neck03", "head")
 """Bones of the spine, upwards."""
 NECK = ("neck01", "neck02", "neck03")
@@ -53,8 +59,8 @@ TRUNK = (
 HEAD = "head"
 BLADE = (0.3, 0.75)
 """Shares of the way from the breastbone to the arm over which the shoulder blade takes over."""
-WHOLE = 0.999
-"""What the skull carries by more is head."""
+SKULL_ONLY = 0.999
+"""Skull weight above which a vertex belongs to the head."""
 SKIN = Material("skin", (0.71, 0.47, 0.36), 0.55)
 EYE = Material("eye", (0.75, 0.72, 0.70), 0.2)
 MAX_WEIGHTS = 1 << 20
@@ -66,11 +72,11 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
 
     path: the folder with base.obj, default.mhskel and default_weights.mhw, or that base.obj. Its own head is
     a part of kind "head", left out where a face is put on the body. Raises FormatError where a file is
-    missing, ModelError, which names the place in it, where it is damaged or another mesh or rig.
+    missing; ModelError, with the position in it, where it is damaged or of another mesh or rig.
     """
     base = Path(path) / "base.obj" if Path(path).is_dir() else Path(path)
     folder = base.parent
-    mesh = read_obj(_existing(base))
+    mesh = read_obj(_require_file(base))
     body = _triangles(mesh, "body")
     if len(mesh.vertices) != VERTICES or not len(body):
         raise ModelError(
@@ -81,14 +87,14 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
     vertices = (mesh.vertices - (0.0, low, 0.0)) * METRES
     rig = _json(folder / RIG_FILE)
     bones, at = _rig(rig, vertices)
-    places = _places(at, rig)
+    places = _joint_positions(at, rig)
     bind = bind_matrices(places)
     weights = _weights(_json(folder / WEIGHTS_FILE), bones, vertices, places)
     pupils = np.array([at(rig, f"eye.{side}____head") for side in "LR"])
     pupils[:, 2] += _eye_radius(mesh, vertices)
     return BodyModel(
         parts=_parts(mesh, vertices, weights),
-        skeleton=unposed(bind),
+        skeleton=skeleton_in_default_posture(bind),
         bind=bind,
         eyes=pupils,
         name=name,
@@ -99,8 +105,8 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
     )
 
 
-class _At:
-    """Positions of a rig's joints: each is the mean of several vertices."""
+class _RigPositions:
+    """Positions of a rig's joints, each the mean of several vertices: call it with the rig and a name."""
 
     def __init__(self, listed: Mapping[str, Value], vertices: Float64) -> None:
         self._listed = listed
@@ -118,10 +124,10 @@ class _At:
 
 
 def _json(path: Path) -> Value:
-    return Value(parse_json(memoryview(read_bytes(_existing(path))), path.name), path.name)
+    return Value(parse_json(memoryview(read_bytes(_require_file(path))), path.name), path.name)
 
 
-def _existing(path: Path) -> Path:
+def _require_file(path: Path) -> Path:
     """The path, if there is a file; else FormatError."""
     if not path.is_file():
         raise FormatError("cannot be read: there is no such file", path=path)
@@ -133,7 +139,7 @@ def _triangles(mesh: Polygons, *groups: str) -> Int64:
     return triangulate(mesh, mesh.in_groups(*groups)).corners.astype(np.int64)
 
 
-def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _At]:
+def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _RigPositions]:
     """Each bone's parent, and the positions of the joints."""
     bones: dict[str, str | None] = {}
     for name, entry in rig.member("bones").members():
@@ -141,12 +147,12 @@ def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _At]:
         bones[name] = None if parent is None or parent.data is None else parent.text(200)
         if len(bones) > MAX_ITEMS:
             raise rig.error("more bones than are read")
-    return bones, _At(dict(rig.member("joints").members()), vertices)
+    return bones, _RigPositions(dict(rig.member("joints").members()), vertices)
 
 
 @cache
 def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
-    """joint, from, to, share, bones; both sides."""
+    """Rows (joint, from, to, share, bones) of makehuman.csv, for both sides."""
     found = []
     with (files(__package__) / "makehuman.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -157,7 +163,7 @@ def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
     return tuple(found)
 
 
-def _places(at: _At, rig: Value) -> Float64:
+def _joint_positions(at: _RigPositions, rig: Value) -> Float64:
     """(J, 3) positions of the standard's joints, metres."""
     default = Skeleton.default()
     places = np.full((len(default), 3), np.nan)
@@ -172,7 +178,7 @@ def _places(at: _At, rig: Value) -> Float64:
     knots = knots[np.concatenate([[True], np.diff(np.maximum.accumulate(knots[:, 1])) > 0])]
     places[default.number("skullbase")] = knots[-1]
     neck = int(np.abs(knots[:, 1] - at(rig, "neck01____head")[1]).argmin())
-    vertebrae(places, knots, neck)
+    place_vertebrae(places, knots, neck)
     return places
 
 
@@ -197,15 +203,15 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, pl
             weights[:, default.number(joint)] += given[bone]
             taken.add(bone)
     for names, row in (
-        (TRUNK, ("sacroiliac", *chain("vl5", "vc7"))),
-        (NECK, (*chain("vt1", "vc1"), "skullbase")),
+        (TRUNK, ("sacroiliac", *vertebrae_between("vl5", "vc7"))),
+        (NECK, (*vertebrae_between("vt1", "vc1"), "skullbase")),
     ):
         numbers = [default.number(name) for name in row]
         share = np.sum([given[name] for name in names if name in given], axis=0)
-        weights[:, numbers] += share[:, None] * shares(
+        weights[:, numbers] += share[:, None] * chain_weights(
             vertices[:, 1], places[numbers, 1], 1 if names is TRUNK else 0
         )
-    for side in "lr":  # the shoulder girdle: what is near the arm goes with the blade
+    for side in "lr":  # the shoulder girdle: weight near the arm goes to the blade
         inner, outer, arm = (
             default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular", "shoulder")
         )
@@ -216,12 +222,12 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, pl
         weights[:, inner] -= weights[:, outer]
     skull = default.number("skullbase")
     for bone in bones:
-        if bone not in taken:  # the head, and all that hangs on it
+        if bone not in taken:  # bones of the head
             weights[:, skull] += given[bone]
     total = weights.sum(axis=1, keepdims=True)
     weights[total[:, 0] <= 0, skull] = 1.0
-    whole: Float64 = weights / weights.sum(axis=1, keepdims=True)
-    return whole
+    normalised: Float64 = weights / weights.sum(axis=1, keepdims=True)
+    return normalised
 
 
 def _eye_radius(mesh: Polygons, vertices: Float64) -> float:
@@ -235,7 +241,7 @@ def _neckline() -> tuple[int, ...]:
         return tuple(int(row["vertex"]) for row in csv.DictReader(file))
 
 
-def _above(triangles: Int64, vertices: Float64) -> Bool:
+def _above_neckline(triangles: Int64, vertices: Float64) -> Bool:
     """(F,) mask of the triangles above the neckline, where head models made of this mesh end too."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -251,12 +257,12 @@ def _above(triangles: Int64, vertices: Float64) -> Bool:
 
 
 def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPart, ...]:
-    """Body, neck and head, and the eyes of that."""
+    """The parts: body, neck, head, and the head's eyes."""
     default = Skeleton.default()
     skull = weights[:, default.number("skullbase")]
     body = _triangles(mesh, "body")
-    above = _above(body, vertices)
-    head = above & (skull[body] > WHOLE).all(axis=1)
+    above = _above_neckline(body, vertices)
+    head = above & (skull[body] > SKULL_ONLY).all(axis=1)
     throat = above & ~head
     spine = [name[0] == "v" or name == "sacroiliac" for name in default.names]
     joints, strong = strongest_weights(weights, spine)

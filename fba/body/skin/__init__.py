@@ -1,4 +1,4 @@
-"""Vertices carried by joints: dual quaternions, twists, shoulders, moving normals.
+"""Skinning, vertices moved by joints: dual quaternions, twists, shoulders, normals.
 
 May use: the skeleton, compiled loops.
 """

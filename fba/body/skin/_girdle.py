@@ -1,12 +1,13 @@
-"""Shoulder blades that go with the arms, and armpits drawn taut.
+"""Shoulder blades that turn with the arms, and armpits that stay taut.
 
-An arm that is lifted turns its shoulder blade and collar bone along. BAPs often move the shoulder alone, and
-skin that only took part in that would be folded deep between neck and arm. What carries the skin of the
-shoulder girdle is therefore turned by a share of the arm's swing, less what BAPs turn the girdle themselves.
-Joints stay where they are.
+Lifting an arm turns its shoulder blade and collar bone. BAPs often move the shoulder alone, and skin that
+followed only that would fold deeply between neck and arm. The joints that carry the skin of the shoulder
+girdle are therefore turned by a share of the arm's swing, less the turn that BAPs give the girdle. Joint
+positions do not change.
 
 Between arm and ribs, dual quaternions would swing the skin of the armpit out in an arc about the shoulder:
-a bag below a raised arm. It is stretched there, so matrices, which take the straight way, have it.
+a bag below a raised arm. Skin is stretched there, so it is blended with linear skinning, which moves it in
+a straight line.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from fba.easing import smoothstep
 
 CHAIN = ("sternoclavicular", "acromioclavicular", "shoulder", "elbow")
 TAUT = 0.7
-"""The share that matrices have in the armpit."""
+"""Share of linear skinning in the armpit."""
 BELOW = (0.03, 0.08)
-"""Metres below the shoulder between which they come to have it."""
+"""Metres below the shoulder over which linear skinning fades in to that share."""
 LEAST = 0.02
-"""Vertices that the arm carries by less, or by all but less, are not between."""
+"""Vertices whose arm weight is within this of 0 or 1 are not in the armpit."""
 
 
 def find_girdle(
@@ -51,7 +52,7 @@ def find_girdle(
         chains.append((trunk, inner, outer, shoulder))
         centres.append(bind[inner, :3, 3])
         arms.append(way / length)
-        carried = (weights * np.isin(joints, _below(skeleton, shoulder))).sum(axis=1)
+        carried = (weights * np.isin(joints, _descendants(skeleton, shoulder))).sum(axis=1)
         low = bind[shoulder, 1, 3] - vertices[:, 1].astype(np.float64)
         between = (carried > LEAST) & (carried < 1 - LEAST)
         taut = np.maximum(taut, TAUT * between * smoothstep((low - BELOW[0]) / (BELOW[1] - BELOW[0])))
@@ -65,8 +66,8 @@ def find_girdle(
     )
 
 
-def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    """A joint and all that hang on it."""
+def _descendants(skeleton: Skeleton, joint: int) -> list[int]:
+    """A joint and all its descendants."""
     found = [joint]
     for number, parent in enumerate(skeleton.parents.tolist()):
         if parent in found:

@@ -22,17 +22,17 @@ class Girdle(NamedTuple):
 
 
 LIFT = 0.16
-"""The share of an arm's swing that its shoulder blade takes part in; of this, the collar bone half."""
+"""Share of an arm's swing by which its shoulder blade turns; the collar bone turns by half of that."""
 
 
 @compiled
-def lift(duals: Float32, girdle: Girdle) -> None:
-    """Shoulder girdles turned with their arms: see `fba.body.skin._girdle`."""
+def turn_girdles(duals: Float32, girdle: Girdle) -> None:
+    """Turn shoulder girdles with their arms, in place in duals (J, 8): see `fba.body.skin._girdle`."""
     for side in range(len(girdle.joints)):
         trunk, inner, outer, shoulder = girdle.joints[side]
         arm, centre = girdle.arm[side], girdle.centre[side]
         w, x, y, z = _relative(duals, trunk, shoulder)
-        # Where the arm points now, seen from the trunk, and the shortest way there from where it was.
+        # The arm's present direction, seen from the trunk, and the shortest rotation to it.
         ux, uy, uz = y * arm[2] - z * arm[1], z * arm[0] - x * arm[2], x * arm[1] - y * arm[0]
         dx = arm[0] + 2.0 * (w * ux + y * uz - z * uy)
         dy = arm[1] + 2.0 * (w * uy + z * ux - x * uz)
@@ -43,7 +43,7 @@ def lift(duals: Float32, girdle: Girdle) -> None:
         if sine < 1e-6:
             continue
         cx, cy, cz = cx / sine, cy / sine, cz / sine
-        fade = smoothstep_of_one((cosine + 1.0) / 0.15)  # straight backwards there is no one way
+        fade = smoothstep_of_one((cosine + 1.0) / 0.15)  # near 180 degrees the axis is undefined
         wanted = LIFT * np.arctan2(sine, cosine) * fade
         a, b, c, d = _relative(duals, trunk, outer)
         along = b * cx + c * cy + d * cz
@@ -68,7 +68,7 @@ def _relative(duals: Float32, one: int, other: int) -> tuple[float, float, float
 
 @inlined
 def _turn(duals: Float32, joint: int, angle: float, cx: float, cy: float, cz: float, centre: Float64) -> None:
-    """Turns a joint about a unit axis through a point, before its own motion."""
+    """Turn a joint, in place in duals, about a unit axis through a point, before its own motion."""
     s, g = np.sin(0.5 * angle), np.cos(0.5 * angle)
     h, i, j = s * cx, s * cy, s * cz
     # The turn's dual part: a place p is kept by e = p x (h, i, j).
@@ -87,17 +87,17 @@ def _turn(duals: Float32, joint: int, angle: float, cx: float, cy: float, cz: fl
 
 
 @compiled
-def straighten(
+def straighten_armpits(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
     girdle: Girdle, out: Float32,
 ) -> None:  # fmt: skip
-    """Draws vertices towards their positions under linear skinning: see `fba.body.skin._girdle`."""
+    """Blend vertices, in place in out (V, 3), with linear skinning: see `fba.body.skin._girdle`."""
     for n in range(len(girdle.rows)):
         i, straight = girdle.rows[n], girdle.shares[n]
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        kept, two = np.float32(1.0) - straight, np.float32(2.0)
+        remaining, two = np.float32(1.0) - straight, np.float32(2.0)
         for axis in range(3):
-            out[i, axis] *= kept
+            out[i, axis] *= remaining
         for k in range(counts[i]):
             j, share = joints[i, k], straight * weights[i, k]
             w, x, y, z = duals[j, 0], duals[j, 1], duals[j, 2], duals[j, 3]

@@ -1,8 +1,8 @@
-"""Twists of the arms, spread along them.
+"""Twists of the arms, distributed along them.
 
-BAPs turn a whole forearm about its axis at the elbow, and a hand at the wrist; skin that only took part in
-the joints' motion would be wrung there. In an arm the twist grows along the bone. Each vertex of an arm
-is therefore turned about its bone, before the joints carry it, by what it lacks of that.
+BAPs turn a whole forearm about its axis at the elbow, and a hand at the wrist; skin that followed only the
+joints would be wrung there. In a real arm the twist grows along the bone. Before skinning, each vertex of an
+arm is therefore turned about its bone by the difference.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ LIMB = ("shoulder", "elbow", "wrist")
 WRIST_FROM = 0.35
 """From this share of the forearm on, it takes part in the twist of the wrist."""
 LEAST = 0.02
-"""Vertices that the arm carries by less are none of it."""
+"""Vertices of less arm weight do not belong to the arm."""
 SMALL = 1e-3
+"""Vertices whose shares of the twists are smaller are left out."""
 
 
 def find_twists(
@@ -37,11 +38,11 @@ def find_twists(
         if not all(name in skeleton for name in names):
             continue
         shoulder, elbow, wrist = (skeleton.number(name) for name in names)
-        carried = [_carried(skeleton, number, joints, weights) for number in (shoulder, elbow, wrist)]
+        carried = [_carried_share(skeleton, number, joints, weights) for number in (shoulder, elbow, wrist)]
         along = [_along(bind, pair, vertices) for pair in ((shoulder, elbow), (elbow, wrist))]
         arm = carried[0] > LEAST
         upper = arm & (along[0] < 1)
-        # What the shoulder twists is wide enough as it is, and some of it hangs on the trunk.
+        # The shoulder's own twist is not distributed: its skin is wide, and partly belongs to the trunk.
         own, child = np.zeros(len(vertices)), -carried[1]
         for bone in (upper, arm & ~upper):
             turned = np.flatnonzero(bone & (np.maximum(np.abs(own), np.abs(child)) > SMALL))
@@ -72,8 +73,8 @@ def _axis(bind: Float64, joint: int, child: int) -> Float64:
     return unit
 
 
-def _carried(skeleton: Skeleton, joint: int, joints: Int32, weights: Float32) -> Float64:
-    """(V,) by how much a joint and those below it carry each vertex."""
+def _carried_share(skeleton: Skeleton, joint: int, joints: Int32, weights: Float32) -> Float64:
+    """(V,) total weight of a joint and its descendants for each vertex."""
     below = np.zeros(len(skeleton), dtype=bool)
     below[joint] = True
     for number, parent in enumerate(skeleton.parents.tolist()):

@@ -1,4 +1,4 @@
-"""The loops that carry vertices along with joints. Compiled; plain functions over NumPy arrays.
+"""The loops that move vertices with joints. Compiled; plain functions over NumPy arrays.
 
 Everything is in 32 bits, relative to the root joint, so that a body far from the origin loses nothing.
 """
@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skin._girdle_loops import Girdle, lift, straighten
+from fba.body.skin._girdle_loops import Girdle, straighten_armpits, turn_girdles
 from fba.compiled import compiled, inlined
 from fba.easing import smoothstep_of_one
 
 
 class Twisting(NamedTuple):
-    """Which vertices are turned about which bones, of B: see `fba.body.skin._twisting`."""
+    """Vertices that are turned about B bones before skinning: see `fba.body.skin._twisting`."""
 
     rows: Int64
     shares: Float64
@@ -36,26 +36,27 @@ TINY = np.float32(1e-30)
 def dual_frames(
     matrices: Float64, inverse: Float64, parents: Int64, vertices: Float32, upright: Float32,
     joints: Int32, weights: Float32, counts: Int32, around: Int32, numbers: Float32, scratch: Float32,
-    twists: Twisting, girdle: Girdle, wrung: Float32, out: Float32, normals: Float32,
+    twists: Twisting, girdle: Girdle, twisted: Float32, out: Float32, normals: Float32,
 ) -> None:  # fmt: skip
     """Dual-quaternion skinning of T frames (Kavan and others, "Skinning with dual quaternions", 2007).
 
     matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, upright (V, 3): as modelled.
-    joints, weights (V, 4): those that carry, first; counts (V,): how many. around, numbers: see `rings`.
-    scratch (J, 12). twists: what turns some of the vertices beforehand. girdle: joints that turn with
-    others. wrung (V, 3): scratch, the vertices. out (T, V, 3). normals: the same, or (0, V, 3) for none.
+    joints, weights (V, 4): those with a weight first; counts (V,): how many these are. around, numbers: see
+    `normal_rings`. scratch (J, 12). twists: vertices turned beforehand. girdle: joints that turn with the
+    arms. twisted (V, 3): scratch, must hold the vertices. out (T, V, 3). normals: the same, or (0, V, 3) for
+    none.
     """
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
         joint_duals(matrices[frame], inverse, parents, scratch)
-        _wring(vertices, parents, scratch, twists, wrung)
-        lift(scratch, girdle)
+        _twist_limbs(vertices, parents, scratch, twists, twisted)
+        turn_girdles(scratch, girdle)
         upper = normals[frame] if normals.shape[0] else out[frame]
         wanted = upright if normals.shape[0] else upright[:0]
-        _dual_places(wrung, joints, weights, counts, scratch, out[frame], wanted, around, upper)
-        straighten(wrung, joints, weights, counts, scratch, girdle, out[frame])
+        _skin_dual(twisted, joints, weights, counts, scratch, out[frame], wanted, around, upper)
+        straighten_armpits(twisted, joints, weights, counts, scratch, girdle, out[frame])
         if normals.shape[0]:
-            _across(out[frame], around, numbers, upper)
+            _normals_from_neighbours(out[frame], around, numbers, upper)
         _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
@@ -79,18 +80,18 @@ def linear_frames(
                     scratch[joint, 4 * row + column] = total
         upper = normals[frame] if normals.shape[0] else out[frame]
         wanted = upright if normals.shape[0] else upright[:0]
-        _linear_places(vertices, joints, weights, counts, scratch, out[frame], wanted, around, upper)
+        _skin_linear(vertices, joints, weights, counts, scratch, out[frame], wanted, around, upper)
         if normals.shape[0]:
-            _across(out[frame], around, numbers, upper)
+            _normals_from_neighbours(out[frame], around, numbers, upper)
         _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
 @compiled
 def joint_duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Float32) -> None:
-    """Joint matrices (J, 4, 4) as unit dual quaternions (J, 8), w x y z: rotation, then half the shift
-    (from the root) times it.
+    """Fill duals (J, 8), w x y z: unit dual quaternions of joint matrices (J, 4, 4).
 
-    Of both quaternions of a rotation, each joint takes that nearer to its parent's: blends go the short way.
+    The rotation comes first, then half the shift (from the root) times it. Of the two quaternions of a
+    rotation, each joint takes the one nearer to its parent's, so that blends take the short way.
     """
     s = np.empty((3, 4))
     root = matrices[0]
@@ -119,8 +120,10 @@ def joint_duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Floa
 
 
 @compiled
-def _wring(vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, wrung: Float32) -> None:
-    """Vertices of limbs turned about their bones: see `fba.body.skin._twisting`."""
+def _twist_limbs(
+    vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, twisted: Float32
+) -> None:
+    """Turn vertices of limbs about their bones into `twisted`: see `fba.body.skin._twisting`."""
     for bone in range(len(twists.joint)):
         own = twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
         child = twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
@@ -132,16 +135,16 @@ def _wring(vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, 
             s, c = np.sin(angle), np.cos(angle)
             px, py, pz = vertices[i, 0] - centre[0], vertices[i, 1] - centre[1], vertices[i, 2] - centre[2]
             along = (ax * px + ay * py + az * pz) * (1.0 - c)
-            wrung[i, 0] = px * c + (ay * pz - az * py) * s + ax * along + centre[0]
-            wrung[i, 1] = py * c + (az * px - ax * pz) * s + ay * along + centre[1]
-            wrung[i, 2] = pz * c + (ax * py - ay * px) * s + az * along + centre[2]
+            twisted[i, 0] = px * c + (ay * pz - az * py) * s + ax * along + centre[0]
+            twisted[i, 1] = py * c + (az * px - ax * pz) * s + ay * along + centre[1]
+            twisted[i, 2] = pz * c + (ax * py - ay * px) * s + az * along + centre[2]
 
 
 @inlined
 def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
-    """The angle by which a joint turns about an axis, seen from its parent.
+    """Angle by which a joint turns about an axis, seen from its parent, radians.
 
-    It fades where the limb points the other way, as there no twist can be told from that.
+    It fades to 0 where the limb points the opposite way, as the twist is undefined there.
     """
     parent = int(parents[joint])
     if parent < 0:
@@ -161,7 +164,7 @@ def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
 
 @inlined
 def _quaternion(s: Float64) -> tuple[float, float, float, float]:
-    """Unit quaternion w, x, y, z of the rotation in the left of a matrix (3, 4), by its largest part."""
+    """Unit quaternion w, x, y, z of the rotation in a matrix (3, 4), from its largest component."""
     trace = s[0, 0] + s[1, 1] + s[2, 2]
     if trace > 0.0:
         r = np.sqrt(1.0 + trace)
@@ -184,7 +187,7 @@ def _quaternion(s: Float64) -> tuple[float, float, float, float]:
 
 
 @compiled
-def _dual_places(
+def _skin_dual(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
     out: Float32, upright: Float32, around: Int32, normals: Float32,
 ) -> None:  # fmt: skip
@@ -193,7 +196,7 @@ def _dual_places(
     _matrices(duals, tops)
     for i in range(vertices.shape[0]):
         j = joints[i, 0]
-        if counts[i] == 1:  # as most of a head: nothing to blend
+        if counts[i] == 1:  # one joint, as for most of a head: nothing to blend
             px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
             out[i, 0] = tops[j, 0] * px + tops[j, 1] * py + tops[j, 2] * pz + tops[j, 3]
             out[i, 1] = tops[j, 4] * px + tops[j, 5] * py + tops[j, 6] * pz + tops[j, 7]
@@ -217,7 +220,7 @@ def _dual_places(
             b += share * duals[j, 5]
             c += share * duals[j, 6]
             d += share * duals[j, 7]
-        # Twice the inverse of the square of its length makes it unit, and a rotation.
+        # 2 / length^2: normalises, with the factor 2 of the rotation formula.
         per = TWO / max(w * w + x * x + y * y + z * z, TINY)
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         # v + 2 q x (q x v + w v)
@@ -240,7 +243,7 @@ def _dual_places(
 
 @compiled
 def _matrices(duals: Float32, tops: Float32) -> None:
-    """Dual quaternions (J, 8) as matrices (J, 12), row by row."""
+    """Fill tops (J, 12) with the 3x4 matrices of dual quaternions (J, 8), row by row."""
     for j in range(len(duals)):
         w, x, y, z = duals[j, 0], duals[j, 1], duals[j, 2], duals[j, 3]
         a, b, c, d = duals[j, 4], duals[j, 5], duals[j, 6], duals[j, 7]
@@ -266,7 +269,7 @@ def _matrices(duals: Float32, tops: Float32) -> None:
 
 
 @compiled
-def sized(vertices: Float32, size: float, shift: Float32, out: Float32) -> None:
+def scale_and_shift(vertices: Float32, size: float, shift: Float32, out: Float32) -> None:
     """out (V, 3) = size x vertices + shift (3,)."""
     times = np.float32(size)
     x, y, z = shift[0], shift[1], shift[2]
@@ -277,7 +280,7 @@ def sized(vertices: Float32, size: float, shift: Float32, out: Float32) -> None:
 
 
 @compiled
-def _linear_places(
+def _skin_linear(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, tops: Float32,
     out: Float32, upright: Float32, around: Int32, normals: Float32,
 ) -> None:  # fmt: skip
@@ -306,7 +309,7 @@ def _linear_places(
 
 
 @compiled
-def _across(places: Float32, around: Int32, numbers: Float32, normals: Float32) -> None:
+def _normals_from_neighbours(places: Float32, around: Int32, numbers: Float32, normals: Float32) -> None:
     """Normals from the positions of neighbours: see `normal_rings`."""
     for i in range(places.shape[0]):
         a, b, c, d = around[i, 0], around[i, 1], around[i, 2], around[i, 3]

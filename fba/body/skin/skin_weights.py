@@ -1,4 +1,4 @@
-"""Joints and weights of vertices: checked, and reduced to the few joints that a vertex can have."""
+"""Checks joints and weights of vertices, and reduces them to the few joints that a vertex can have."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError
 
 INFLUENCES = 4
-"""Joints that carry a vertex, at most."""
+"""Most joints that a vertex can have."""
 WEIGHT_TOLERANCE = 1e-3
-"""Weights of a vertex may miss a sum of 1 by this; they are then scaled to it."""
+"""Largest error of the sum of a vertex's weights; they are then scaled to a sum of 1."""
 LEAST = 0.012
-"""Taken from every weight: what is less does not count, and takes no place."""
+"""Subtracted from every weight of a chain, so that tiny weights take up no joint."""
 
 
 def checked_weights(
@@ -40,17 +40,18 @@ def checked_weights(
         )
     share = (share / total[:, None]).astype(np.float32)
     which = which.astype(np.int32)
-    which[share == 0] = 0  # what does not carry may not matter
+    which[share == 0] = 0  # joints without weight must not matter
     which.flags.writeable = share.flags.writeable = False
     return which, share
 
 
 def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int32, Float32]:
-    """Joints and weights (V, 4) of dense weights (V, J).
+    """(joints, weights), each (V, 4), of dense weights (V, J).
 
-    Of more than four joints, what the fifth has is taken from all, so that weights fade in and out over the
-    surface without a step. alike: of each joint, whether it is one of a chain of neighbours that move almost
-    as one, as vertebrae do. Those give way first, the greatest of them taking over what others carry.
+    Where there are more than four joints, the fifth weight is subtracted from all, so that weights fade in
+    and out over the surface without a step. alike: (J,) whether a joint belongs to a chain of neighbours that
+    move almost as one, as vertebrae do. Those are dropped first, and the strongest of them take over their
+    weight.
     """
     if alike is not None:
         dense = _thin_chain(dense, np.asarray(alike, dtype=bool))
@@ -69,7 +70,7 @@ def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tu
 
 
 def _thin_chain(dense: Float64, alike: Bool) -> Float64:
-    """Weights in which joints of the chain give way, so that each vertex has at most `INFLUENCES` joints."""
+    """(V, J) weights with chain joints dropped so that each vertex has at most `INFLUENCES` joints."""
     dense = np.maximum(dense - LEAST, 0.0)
     dense /= np.maximum(dense.sum(axis=1, keepdims=True), 1e-12)
     rooms = np.clip(INFLUENCES - (dense[:, ~alike] > 0).sum(axis=1), 1, INFLUENCES)
@@ -79,6 +80,6 @@ def _thin_chain(dense: Float64, alike: Bool) -> Float64:
     total = chain.sum(axis=1, keepdims=True)
     ranked = np.pad(-np.sort(-chain, axis=1), ((0, 0), (0, INFLUENCES)))
     less = np.maximum(chain - np.take_along_axis(ranked, rooms[:, None], axis=1), 0.0)
-    kept = less.sum(axis=1, keepdims=True)
-    dense[:, alike] = np.where(kept > 1e-9, less * (total / np.maximum(kept, 1e-12)), chain)
+    remaining = less.sum(axis=1, keepdims=True)
+    dense[:, alike] = np.where(remaining > 1e-9, less * (total / np.maximum(remaining, 1e-12)), chain)
     return dense

@@ -17,16 +17,16 @@ from fba.mesh.meshes import result_array
 METHODS = ("dual", "linear")
 """Ways to blend the motion of several joints."""
 BLOCK = 64
-"""Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
+"""Frames per call of the compiled loop: an interrupt can only get through between calls."""
 
 
 class Skinner:
-    """Carries vertices with joints.
+    """Moves vertices with joints.
 
     vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
     sum to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32
-    (F, 3), by which normals follow the surface (`fba.body.skin._moving_normals`); without them they
-    only turn.
+    (F, 3), by which normals follow the surface (`fba.body.skin._moving_normals`); without them
+    normals only rotate with their vertices.
 
     Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
     several threads, one after the other.
@@ -50,7 +50,7 @@ class Skinner:
         self._joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
         self._weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
         self._counts = (self._weights > 0).sum(axis=1).astype(np.int32)
-        # copies: compiled code is made anew for arrays that may not be written to
+        # copies: read-only arrays would make numba compile another version
         self._modelled = np.array(vertices, dtype=np.float32, order="C")
         self._upright_modelled = np.array(normals, dtype=np.float32, order="C")
         self._vertices, self._upright = self._modelled.copy(), self._upright_modelled.copy()
@@ -58,8 +58,8 @@ class Skinner:
         self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
         self._twists = find_twists(skeleton, bind, self._modelled, self._joints, self._weights)
         self._girdle = find_girdle(skeleton, bind, self._modelled, self._joints, self._weights)
-        self._wrung = self._vertices.copy()
-        self._wrung_modelled = True
+        self._twisted = self._vertices.copy()
+        self._twisted_is_modelled = True
         faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
         self._around, self._numbers = normal_rings(self._modelled, self._upright_modelled, faces)
         self._scratch = np.empty((len(bind), 12), dtype=np.float32)
@@ -84,7 +84,7 @@ class Skinner:
         normals: Float32 | None = None,
         method: str = "dual",
     ) -> Float32:
-        """As `skin`, for other rest positions (V, 3) of the vertices and, if wanted, their normals (V, 3)."""
+        """The result of `skin` for other rest positions (V, 3) and, optionally, their normals (V, 3)."""
         if normals is not None and upright is None:
             raise ValueError("normals are wanted, but not given as modelled")
         for array in (vertices, upright):
@@ -114,12 +114,14 @@ class Skinner:
             vertices = _as_writable(vertices, self._vertices)
             upright = self._upright if upright is None else _as_writable(upright, self._upright)
             mesh = (vertices, upright, self._joints, self._weights, self._counts, self._around, self._numbers)
-            wrung = vertices
+            twisted = vertices
             if method == "dual" and len(self._twists.rows):
-                wrung = self._wrung
-                if not (self._wrung_modelled and vertices is self._modelled):  # else what is wrung is anew
-                    np.copyto(wrung, vertices)
-                self._wrung_modelled = vertices is self._modelled
+                twisted = self._twisted
+                if not (
+                    self._twisted_is_modelled and vertices is self._modelled
+                ):  # else every twisted vertex is overwritten
+                    np.copyto(twisted, vertices)
+                self._twisted_is_modelled = vertices is self._modelled
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)
                 if method == "dual":
@@ -131,7 +133,7 @@ class Skinner:
                         self._scratch,
                         self._twists,
                         self._girdle,
-                        wrung,
+                        twisted,
                         placed[part],
                         turned[part],
                     )
@@ -152,7 +154,7 @@ class Skinner:
             raise ValueError(f"joint matrices must be real numbers, not {array.dtype}")
         frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, count, 4, 4)
         if not frames.flags.writeable:
-            frames = frames.copy()  # see above
+            frames = frames.copy()  # see the copies in __init__
         if not np.isfinite(frames).all():
             frame, joint = (int(place) for place in np.argwhere(~np.isfinite(frames))[0, :2])
             raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")

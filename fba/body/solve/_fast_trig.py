@@ -1,7 +1,6 @@
-"""Sine, cosine and arc tangent without a call and without a branch: loops over angles become vector code.
+"""Sine, cosine and arc tangent without calls or branches, so that loops over angles are vectorised.
 
-An angle is first brought to within an eighth of a turn; there the Taylor series end below the accuracy
-of the numbers.
+An angle is first reduced to an eighth of a turn; there the truncated Taylor series are exact to rounding.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ PER_RADIAN = 2.0 / math.pi
 QUARTER_HIGH = math.floor(math.pi / 2 * 2.0**32) / 2.0**32
 """The first 33 bits of a quarter turn: products with whole numbers below 2^20 are exact."""
 QUARTER_LOW = (math.pi / 2 - QUARTER_HIGH) + math.sin(math.pi) / 2
-"""The rest; sin(math.pi) is what the nearest number to pi lacks."""
+"""The rest of a quarter turn; sin(math.pi) is the rounding error of math.pi."""
 S3, S5, S7, S9, S11, S13, S15 = ((-1.0) ** (n // 2) / math.factorial(n) for n in range(3, 16, 2))
 C2, C4, C6, C8, C10, C12, C14, C16 = ((-1.0) ** (n // 2) / math.factorial(n) for n in range(2, 17, 2))
 
@@ -30,7 +29,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     z = x * x
     s = x + x * z * (S3 + z * (S5 + z * (S7 + z * (S9 + z * (S11 + z * (S13 + z * S15))))))
     c = 1.0 + z * (C2 + z * (C4 + z * (C6 + z * (C8 + z * (C10 + z * (C12 + z * (C14 + z * C16)))))))
-    # which quarter of the turn, 0.0 to 3.0: chosen among, not branched on
+    # quarter of the turn, 0.0 to 3.0; used in selections, not in branches
     quarter = quarters - 4.0 * math.floor(quarters * 0.25)
     odd = quarter - 2.0 * math.floor(quarter * 0.5)
     sine = c if odd > 0.5 else s

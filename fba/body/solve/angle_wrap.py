@@ -33,14 +33,14 @@ def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> Int32:
         if -limit <= low and high <= limit:
             continue
         low, high = int(angles.min()), int(angles.max())
-        angles = angles - _turns((low + high) / 2)
+        angles = angles - _full_turns((low + high) / 2)
         if int(np.abs(angles).max()) > limit:
-            angles = angles - _turns(angles.astype(np.float64))
+            angles = angles - _full_turns(angles.astype(np.float64))
         result[:, column] = angles
     return result
 
 
-def _turns(angle: float | Float64) -> Int64:
+def _full_turns(angle: float | Float64) -> Int64:
     """Whole turns in an angle, in 1e-5 rad."""
     full = 2e5 * np.pi
     turns: Int64 = np.rint(np.rint(np.asarray(angle) / full) * full).astype(np.int64)

@@ -1,7 +1,7 @@
 """Joint matrices of a modelled figure, relative to the standard's default posture.
 
-Models are made with their arms held off the sides or straight out. Bones tell how each joint is turned
-there against the default posture: arms at the sides, palms to the thighs, feet forward.
+Models are made with their arms held off the sides or straight out. The directions of bones give each
+joint's rotation relative to the default posture: arms at the sides, palms to the thighs, feet forward.
 """
 
 from __future__ import annotations
@@ -15,23 +15,25 @@ from fba.parameters import joints
 FINGERS = ("index", "middle", "ring", "pinky")
 
 
-def bind_matrices(places: Float64) -> Float64:
+def bind_matrices(positions: Float64) -> Float64:
     """Bind matrices, float64 (J, 4, 4), for positions (J, 3) of the default skeleton's joints, metres.
 
-    The figure stands upright, feet flat, looking along +z. Limbs turn as their bones do; trunk and head
-    stand in the figure as in the default posture.
+    The figure stands upright, feet flat, looking along +z. Limbs are rotated as their bones are; trunk and
+    head are not rotated.
     """
     default = Skeleton.default()
     bind = np.tile(np.eye(4), (len(default), 1, 1))
-    bind[:, :3, 3] = places
-    at = {name: places[number] for number, name in enumerate(default.names)}
+    bind[:, :3, 3] = positions
+    at = {name: positions[number] for number, name in enumerate(default.names)}
     rest = {name: default.centres[number] for number, name in enumerate(default.names)}
 
     def bone(joint: str, tip: str) -> tuple[Float64, Float64]:
         return rest[tip] - rest[joint], at[tip] - at[joint]
 
     def turn(joint: str, bones: tuple[Float64, Float64], sides: tuple[Float64, Float64]) -> None:
-        before, after = (frame(direction, side) for direction, side in zip(bones, sides, strict=True))
+        before, after = (
+            orthonormal_frame(direction, side) for direction, side in zip(bones, sides, strict=True)
+        )
         bind[default.number(joint), :3, :3] = after @ before.T
 
     def follow(joint: str, other: str) -> None:
@@ -56,14 +58,14 @@ def bind_matrices(places: Float64) -> Float64:
         turn(f"{s}_hip", bone(f"{s}_hip", f"{s}_knee"), ahead)
         turn(f"{s}_knee", bone(f"{s}_knee", f"{s}_ankle"), ahead)
         down = np.array([0.0, -1, 0])
-        flat = frame(down, ahead[1]) @ frame(down, ahead[0]).T
+        flat = orthonormal_frame(down, ahead[1]) @ orthonormal_frame(down, ahead[0]).T
         for joint in ("ankle", "subtalar", "midtarsal", "metatarsal"):  # feet stand flat in both
             bind[default.number(f"{s}_{joint}"), :3, :3] = flat
     return bind
 
 
-def unposed(bind: Float64) -> Skeleton:
-    """The skeleton in the default posture, whose joints are bound so (J, 4, 4) in the figure."""
+def skeleton_in_default_posture(bind: Float64) -> Skeleton:
+    """The skeleton in the default posture of a figure with bind matrices (J, 4, 4)."""
     default = Skeleton.default()
     centres = bind[:, :3, 3].copy()
     for number in range(1, len(default)):
@@ -73,35 +75,36 @@ def unposed(bind: Float64) -> Skeleton:
     return Skeleton(default.names, default.parents, centres)
 
 
-def vertebrae(places: Float64, knots: Float64, neck: int) -> None:
-    """Fills in NaN rows of positions (J, 3): vertebrae and other joints of the midline, along a spine.
+def place_vertebrae(positions: Float64, knots: Float64, neck: int) -> None:
+    """Fill NaN rows of positions (J, 3) in place: vertebrae and other midline joints, along a spine.
 
-    knots: (K, 3), places along the figure's spine from the pelvis up to the base of the skull; knot number
-    `neck` is where the neck begins. Joints stand between these three as they stand in the standard's body.
+    knots: (K, 3), points along the figure's spine from the pelvis up to the base of the skull, metres; knot
+    number `neck` is where the neck begins. Heights between pelvis, neck and skull are in the proportions of
+    the standard's body.
     """
     default = Skeleton.default()
     table = {joint.name: joint.centre for joint in joints()}
     known = [table["HumanoidRoot"][1], table["vc7"][1], table["skullbase"][1]]
     own = [knots[0, 1], knots[neck, 1], knots[-1, 1]]
     for number, name in enumerate(default.names):
-        if np.isnan(places[number]).any():
+        if np.isnan(positions[number]).any():
             height = np.interp(table[name][1], known, own)
-            places[number] = [0.0, height, np.interp(height, knots[:, 1], knots[:, 2])]
+            positions[number] = [0.0, height, np.interp(height, knots[:, 1], knots[:, 2])]
 
 
-def chain(first: str, last: str) -> list[str]:
-    """Names of the vertebrae from one to another, upwards."""
+def vertebrae_between(first: str, last: str) -> list[str]:
+    """Names of the vertebrae from `first` to `last`, upwards, both included."""
     default = Skeleton.default()
     names = [name for name in default.names if name.startswith("v")]
     order = sorted(names, key=lambda name: default.centres[default.number(name), 1])
     return order[order.index(first) : order.index(last) + 1]
 
 
-def shares(height: Float64, joints_at: Float64, eased: int = 1) -> Float64:
-    """(V, K) weights of a chain of joints (K,) for vertices at heights (V,): each moves what is above it.
+def chain_weights(height: Float64, joints_at: Float64, eased: int = 1) -> Float64:
+    """(V, K) weights of a vertical chain of joints at heights (K,) for vertices at heights (V,), metres.
 
-    eased: how often shares are spread over the neighbours in the chain. Two joints share a place at first,
-    and two more each time; a vertex has room for four in all.
+    eased: how often weights are smoothed over the neighbours in the chain. At first two joints share a
+    vertex, and two more after each smoothing; a vertex can have four.
     """
     middles = np.concatenate([(joints_at[:-1] + joints_at[1:]) / 2, [joints_at[-1] + 0.01]])
     found = np.zeros((len(height), len(joints_at)))
@@ -118,7 +121,7 @@ def shares(height: Float64, joints_at: Float64, eased: int = 1) -> Float64:
     return found
 
 
-def frame(direction: Float64, side: Float64) -> Float64:
+def orthonormal_frame(direction: Float64, side: Float64) -> Float64:
     """(3, 3), orthonormal columns: the direction, the side made perpendicular to it, their cross product."""
     first = direction / max(float(np.linalg.norm(direction)), 1e-12)
     second = side - first * (first @ side)

@@ -1,8 +1,7 @@
-"""Which BAP turns which joint about which axis, with which sign, in which order: conventions.json.
+"""Conventions: the joint, axis, sign and order of each BAP's rotation, from conventions.json.
 
-The standard leaves the order of rotations at a joint open, and old files follow other signs; so both
-are data, and everything that poses or solves takes the name of a convention. docs/body.md says what
-speaks for the default.
+The standard leaves the order of rotations at a joint open, and old files use other signs; so both are data,
+and everything that poses or solves takes the name of a convention. docs/body.md explains the default.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ NO_BAP = -1
 
 @dataclass(frozen=True, eq=False)
 class Convention:
-    """How BAPs turn joints. Rows of the arrays belong to `joints`.
+    """The rotations that BAPs make. Rows of the arrays correspond to `joints`.
 
     joints: names of the joints that BAPs turn.
     bap: int64 (N, 3), 0-based BAP column of each rotation, outermost (applied last to a point) first;
@@ -51,13 +50,13 @@ class Convention:
 
 
 def convention_names() -> tuple[str, ...]:
-    """Names of the conventions that there are; the first is the default."""
+    """Names of all conventions; the first is the default."""
     return tuple(_table())
 
 
 @cache
 def convention(name: str = "iso") -> Convention:
-    """A convention by name; ValueError where there is none of that name."""
+    """The convention of a name; raises ValueError for an unknown one."""
     if name not in _table():
         raise ValueError(f"axes must be one of {', '.join(_table())}, not {name!r}")
     row = _table()[name]
@@ -76,7 +75,7 @@ def convention(name: str = "iso") -> Convention:
             translation[letter], translation_sign[letter] = bap.number - 1, sign
             continue
         rank = _order(row, bap.joint).index("XYZ"[letter])
-        axis, sign = _turned(row, bap.joint, letter, sign)
+        axis, sign = _axis_in_body_frame(row, bap.joint, letter, sign)
         turns.setdefault(bap.joint, []).append((rank, bap.number - 1, axis, sign))
 
     names = tuple(turns)
@@ -99,8 +98,8 @@ def _order(row: dict[str, Any], joint: str) -> str:
     return next((order for key, order in orders.items() if re.fullmatch(key, joint)), row["order"])
 
 
-def _turned(row: dict[str, Any], joint: str, axis: int, sign: float) -> tuple[int, float]:
-    """The axis of a joint's own frame, seen from the body's: hands stand a quarter turn about y."""
+def _axis_in_body_frame(row: dict[str, Any], joint: str, axis: int, sign: float) -> tuple[int, float]:
+    """(axis, sign) in the body's frame of an axis of a joint's own: hands are a quarter turn about y."""
     for rule in row["turned"]:
         if re.fullmatch(rule["joints"], joint) and axis != 1:
             quarter = rule["quarter_turns_about_y"]

@@ -21,7 +21,7 @@ from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_numbers, baps
 
 DEGREES = np.degrees(1e-5)
 """Degrees in one unit of a rotational BAP."""
-WHOLE = 360.0
+FULL_TURN = 360.0
 
 
 @dataclass(frozen=True)
@@ -58,14 +58,14 @@ class Excess:
 
 
 class Limits:
-    """A set of limits. `limits`: the rows; a BAP that stands in none is free."""
+    """A set of limits. limits: its rows; a BAP in none of them is unlimited."""
 
     def __init__(self, limits: tuple[Limit, ...]) -> None:
         self.limits = limits
 
     @staticmethod
     def human() -> Limits:
-        """Typical limits of normal human motion, by segment; vertebrae share some, which their sum keeps."""
+        """Typical limits of normal human motion, by segment; some are limits of the sum over vertebrae."""
         return Limits(_human())
 
     @staticmethod
@@ -76,22 +76,22 @@ class Limits:
     def check(self, values: npt.ArrayLike) -> tuple[Excess, ...]:
         """The limits that BAPs (T, 296) or (296,), 1e-5 rad, exceed; empty if they exceed none.
 
-        Whole turns do not count. ValueError on another shape or values that are not finite.
+        Whole turns are ignored. Raises ValueError for other shapes or values that are not finite.
         """
         array = _frames(values)
         found = []
         for limit in self.limits:
             _, excess = _excess(limit, array)
-            out = np.abs(excess) > DEGREES * len(limit.baps)  # rounding is none
+            out = np.abs(excess) > DEGREES * len(limit.baps)  # less is rounding
             if out.any():
                 worst = float(np.abs(excess).max())
                 found.append(Excess(limit, int(out.sum()), int(np.argmax(out)), worst))
         return tuple(found)
 
     def clamp(self, values: npt.ArrayLike) -> Int32:
-        """The same BAPs within the limits, int32. Where several share a limit, all shrink by one factor.
+        """The BAPs clamped to the limits, int32. Where several share a limit, all are scaled by one factor.
 
-        What keeps within a limit is left as it is. ValueError as `check`.
+        Values within a limit do not change. Raises ValueError as `check`.
         """
         array = _frames(values)
         result = np.rint(array).astype(np.int32)
@@ -111,10 +111,10 @@ class Limits:
 
 
 @cache
-def widest() -> Float64:
+def widest_limits() -> Float64:
     """float64 (296, 2), degrees: the range that human limits or the standard allow each BAP by itself.
 
-    Body turn, roll and tilt, which a person has no limits for, have half a turn either way (roll a quarter).
+    Body turn, roll and tilt, which are unlimited for a person, get half a turn either way (roll a quarter).
     """
     result = np.zeros((BAP_COUNT, 2))
     for limit in (*_iso(), *_human()):
@@ -137,10 +137,10 @@ def _frames(values: npt.ArrayLike) -> Float64:
 
 
 def _excess(limit: Limit, array: Float64) -> tuple[Float64, Float64]:
-    """Totals (T,) in degrees, shifted by whole turns as close to the range as possible, and the excess."""
+    """(totals (T,) in degrees, shifted by whole turns as close to the range as possible; excess (T,))."""
     total = array[:, list(limit.baps)].sum(axis=1) * DEGREES
     if len(limit.baps) == 1:
-        total = total - WHOLE * np.rint((total - (limit.low + limit.high) / 2) / WHOLE)
+        total = total - FULL_TURN * np.rint((total - (limit.low + limit.high) / 2) / FULL_TURN)
     return total, total - np.clip(total, limit.low, limit.high)
 
 

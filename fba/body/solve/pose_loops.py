@@ -1,8 +1,8 @@
 """The compiled loop from body animation parameters to joint matrices.
 
 A joint's rotation is a product of up to three turns about different axes of the body's frame,
-outermost first. All sines and cosines of a frame come first, in one loop that becomes vector code; then each
-joint's matrix is written where it is to stand, from its parent's, turned in place.
+outermost first. All sines and cosines of a frame are computed first, in one vectorised loop; then each
+joint's matrix is copied from its parent's and turned in place.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ def pose(
     metres: Float64,
     result: Float64,
 ) -> None:
-    """values int32 or float64 (T, 296) -> result float64 (T * J * 16,); every number of it is written.
+    """Fill result, float64 (T * J * 16,), with joint matrices for values (T, 296), int32 or float64.
 
     offsets: float64 (J, 3) from the parent. counts: int64 (J,), numbers of turns; turns and axes: int64
-    (J, 3), their places in columns and their axes, outermost first. columns: int64 (N,), the BAP columns of
-    all turns, radians: float64 (N,), signed radians of one unit. translation: int64 (3,), columns of the
+    (J, 3), their indices into columns and their axes, outermost first. columns: int64 (N,), the BAP columns
+    of all turns, radians: float64 (N,), signed radians of one unit. translation: int64 (3,), columns of the
     root's translation, -1 for none; metres: float64 (3,), signed metres of one unit.
     """
     joints = parents.shape[0]

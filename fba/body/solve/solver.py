@@ -1,4 +1,4 @@
-"""BAPs -> joint matrices, and joint matrices -> BAPs."""
+"""Converts BAPs to joint matrices, and joint matrices to BAPs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fba.arrays import Float64, Int32
 from fba.body.skeleton import Skeleton
 from fba.body.solve import pose_loops, solver_loops
 from fba.body.solve.conventions import NO_BAP, Convention, convention
-from fba.body.solve.limits import widest
+from fba.body.solve.limits import widest_limits
 from fba.errors import ModelError
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT
 
@@ -50,15 +50,15 @@ class BapSolver:
         self._turns[used] = np.arange(len(self._columns))
         self._offsets = self.skeleton.offsets
         self._metres = rules.translation_sign * pose_loops.MILLIMETRE
-        ranges = np.radians(widest())
+        ranges = np.radians(widest_limits())
         self._limits = np.zeros((count, 3, 2))
         self._limits[used] = ranges[self._columns]
 
     def pose(self, baps: npt.ArrayLike, out: Float64 | None = None) -> Float64:
         """Joint matrices of a pose: float64 (J, 4, 4) for baps (296,), (T, J, 4, 4) for (T, 296).
 
-        186 columns do too. A matrix takes points of the default posture's frame, relative to the
-        joint's centre, into the world: its translation is where the joint is, its rotation is the
+        186 columns are accepted too. A matrix takes points of the default posture's frame, relative to the
+        joint's centre, into the world: its translation is the joint's position, its rotation is the
         identity in the default posture. out: a C-contiguous float64 array of the result's shape to write
         into, which is then returned. ValueError on other shapes or values that are not finite.
         """
@@ -101,8 +101,8 @@ class BapSolver:
     ) -> Int32:
         """BAPs that reach these joint matrices: int32 (296,) for (J, 4, 4), (T, 296) for (T, J, 4, 4).
 
-        Only the rotations count, and the root's translation. Where a joint lacks a freedom, it comes as
-        close as it can, and its children make up for the rest as far as they can. joints: the joints to
+        Only the rotations are used, and the root's translation. Where a joint lacks a freedom, it takes the
+        closest rotation, and its children make up for the rest as far as they can. joints: the joints to
         solve, by name; others stay unturned.
 
         Of the angles that make a rotation, each frame takes those closest to the frame before, and the first

@@ -1,7 +1,7 @@
 """The compiled loops from joint matrices to body animation parameters.
 
-A rotation taken apart into turns about three axes has two answers, and at gimbal lock a whole line of
-them; of these, the one closest to the frame before is taken, so a smooth motion has smooth angles.
+A rotation has two decompositions into turns about three axes, and at gimbal lock infinitely many; the one
+closest to the frame before is taken, so that a smooth motion has smooth angles.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from fba.compiled import compiled, inlined
 NEAR_LOCK = 1e-5
 """Below this cosine of the middle angle, only sum or difference of the outer angles is determined."""
 WITHIN_REACH = 1e-8
-"""A joint of two freedoms reaches a rotation whose part about the third axis is smaller."""
+"""A joint of two freedoms reaches a rotation whose component about the third axis is smaller."""
 ALMOST = 1e-4
-"""Where that part is smaller than this, one step of the search squares it away."""
+"""Where that component is smaller than this, one step of the search is enough."""
 SETTLED = 1e-8
-"""Radians by which two turns change in a last step of their search."""
+"""Radians: the search for two turns ends when a step changes them by less."""
 STEPS = 12
+"""Most steps of the search for two turns."""
 BLOCK = 16
 """Frames that are solved together, joint by joint."""
 TURN = 2.0 * math.pi
@@ -37,7 +38,7 @@ def _nearest(angle: float, wanted: float) -> float:
 
 @inlined
 def _excess(angle: float, low: float, high: float) -> float:
-    """By how much an angle leaves a range."""
+    """Amount by which an angle is outside a range, 0 inside."""
     return max(0.0, low - angle, angle - high)
 
 
@@ -55,7 +56,7 @@ def _turn(m: Float64, axis: int, sine: float, cosine: float) -> None:
 
 @inlined
 def _turn_rows(m: Float64, axis: int, sine: float, cosine: float) -> None:
-    """m := Rot(axis)^-1 . m, in place: takes an outermost turn off."""
+    """m := Rot(axis)^-1 . m, in place: removes an outermost turn."""
     first = axis + 1 if axis < 2 else 0
     second = axis - 1 if axis > 0 else 2
     for column in range(3):
@@ -67,19 +68,19 @@ def _turn_rows(m: Float64, axis: int, sine: float, cosine: float) -> None:
 
 @inlined
 def _angle_about(m: Float64, axis: int) -> float:
-    """The turn about one axis that comes closest to the rotation m (largest trace of their quotient)."""
+    """The angle about one axis whose rotation is closest to m (largest trace of their quotient)."""
     a = axis + 1 if axis < 2 else 0
     b = axis - 1 if axis > 0 else 2
     return arc_tangent(m[b, a] - m[a, b], m[a, a] + m[b, b])
 
 
 @compiled
-def _closest_two(m: Float64, f: int, a1: int, a2: int, start: Float64, work: Float64) -> None:
-    """Improves frame f of start (3, N): turns about two axes that come closest to rotations m (3, 3, N)."""
+def _refine_two(m: Float64, f: int, a1: int, a2: int, start: Float64, work: Float64) -> None:
+    """Refine frame f of start (3, N), in place: turns about two axes closest to the rotations m (3, 3, N)."""
     x = float(start[0, f])
     y = float(start[1, f])
     steps = STEPS if abs(m[a1, a2, f]) > ALMOST else 1
-    for _ in range(steps):  # each turn in its turn, climbing to the closest rotation
+    for _ in range(steps):  # coordinate ascent: one turn, then the other
         for i in range(3):
             for k in range(3):
                 work[i, k] = m[i, k, f]
@@ -102,10 +103,10 @@ def _closest_two(m: Float64, f: int, a1: int, a2: int, start: Float64, work: Flo
 
 
 @compiled
-def _locked(
+def _third_angle_at_lock(
     m: Float64, f: int, a1: int, a2: int, a3: int, outer: float, middle: float, work: Float64
 ) -> float:
-    """The third turn where, at gimbal lock, the outer one is given."""
+    """The third angle at gimbal lock, where the outer one is given."""
     for i in range(3):
         for k in range(3):
             work[i, k] = m[i, k, f]
@@ -121,10 +122,11 @@ def _angles(
     m: Float64, frames: int, count: int, j: int, axis: Int64, sign: Float64, previous: Float64,
     limits: Float64, bounded: bool, work: Float64, cosines: Float64, angles: Float64,
 ) -> None:  # fmt: skip
-    """Angles (3, N), outermost first, whose turns give the rotations m (3, 3, N), frame after frame.
+    """Fill angles (3, N), outermost first, with the decomposition of rotations m (3, 3, N).
 
     count: number of freedoms of joint j, 1 to 3; with one or two, the closest rotation that they can make.
-    First what depends on no other frame, as vector code; then the choice of whole turns and of the triple.
+    First the part that depends on no other frame, vectorised; then the choice of whole turns and of one of
+    the two triples, frame after frame.
     """
     a1 = int(axis[j, 0])
     a2 = int(axis[j, 1])
@@ -142,7 +144,7 @@ def _angles(
             angles[1, f] = arc_tangent(e * m[a1, a3, f], m[a1, a1, f])
         for f in range(frames):
             if abs(m[a1, a2, f]) > WITHIN_REACH:
-                _closest_two(m, f, a1, a2, angles, work)
+                _refine_two(m, f, a1, a2, angles, work)
     else:
         for f in range(frames):
             cosines[f] = math.sqrt(m[a1, a1, f] * m[a1, a1, f] + m[a1, a2, f] * m[a1, a2, f])
@@ -163,7 +165,7 @@ def _angles(
         if count == 3:
             if cosines[f] < NEAR_LOCK:
                 x = first
-                turn = _locked(m, f, a1, a2, a3, sign[j, 0] * first, angles[1, f], work)
+                turn = _third_angle_at_lock(m, f, a1, a2, a3, sign[j, 0] * first, angles[1, f], work)
                 z = _nearest(float(sign[j, 2]) * turn, third)
             else:
                 z = _nearest(float(sign[j, 2]) * float(angles[2, f]), third)
@@ -218,13 +220,13 @@ def solve(
     largest: int,
     values: Int32,
 ) -> bool:
-    """matrices float64 (T, J, 4, 4) -> values int32 (T, 296), given filled with 0.
+    """Fill values, int32 (T, 296) of zeros, with the BAPs of joint matrices float64 (T, J, 4, 4).
 
     centre: (3,) of the root. counts: int64 (J,), freedoms of each joint. wanted: bool (J,), joints to
     solve; the others stay unturned. previous: float64 (J, 3), angles before the first frame, changed. limits:
-    float64 (J, 3, 2), which count in the first frame only, and only where bounded. largest: of all magnitudes
-    of a value. What a joint cannot do is left to its children: each is solved against what its
-    parent really does. Returns False where a value would exceed the largest.
+    float64 (J, 3, 2), used in the first frame only, and only if bounded. largest: magnitude of a value.
+    Each joint is solved against the rotation that its parent really reaches, so children make up for what
+    a parent cannot do. Returns False where a value would exceed the largest.
     """
     joints = parents.shape[0]
     reached = np.zeros((joints, 3, 3, BLOCK))  # frames innermost: vector code
@@ -290,7 +292,7 @@ def solve(
 
 
 def joint_angles(local: Float64, count: int, axis: Int64, sign: Float64, angles: Float64) -> None:
-    """local float64 (3, 3, T) -> angles (3, T), each frame close to the one before.
+    """Fill angles (3, T) with the decomposition of local, float64 (3, 3, T), continuous over frames.
 
     count: number of freedoms, axis int64 (1, 3) and sign float64 (1, 3), see `Convention`.
     """
@@ -299,6 +301,6 @@ def joint_angles(local: Float64, count: int, axis: Int64, sign: Float64, angles:
     before = np.zeros((1, 3))
     limits = np.zeros((1, 3, 2))
     cosines = np.zeros(frames)
-    # as `solve` passes them, for the types that are compiled already
+    # the types that `solve` passes, so that nothing is compiled again
     axis, sign = np.array(axis, dtype=np.int64), np.array(sign)
     _angles(local, frames, count, 0, axis, sign, before, limits, False, work, cosines, angles)

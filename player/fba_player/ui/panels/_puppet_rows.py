@@ -115,13 +115,13 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
                 "deg",
             )
         else:
-            from fba.body.solve.limits import widest
+            from fba.body.solve.limits import widest_limits
 
             number = bap_numbers()[word]
             numbers, unit = (number,), baps()[number - 1].unit
             low, high = -SHIFT, SHIFT
             if unit != "mm":
-                (low, high), unit = widest()[number - 1].tolist(), "deg"
+                (low, high), unit = widest_limits()[number - 1].tolist(), "deg"
         if unit == "deg":
             low, high = max(low, _codable_degrees(numbers, 0)), min(high, _codable_degrees(numbers, 1))
         side = word[0] if word.startswith(("left ", "right ", "l_", "r_")) else ""
