@@ -24,7 +24,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     motion = body.animate()
     performance = face.animate(motion, NAME)
-    (folder / f"{NAME}.bvh").write_bytes(bvh.text(motion.local, motion.root).encode("ascii"))
+    (folder / f"{NAME}.bvh").write_bytes(bvh.format_bvh(motion.local, motion.root).encode("ascii"))
     fba.write(folder / f"{NAME}.fap", performance)
     for suffix in ("bvh", "fap"):
         path = folder / f"{NAME}.{suffix}"

@@ -1,4 +1,4 @@
-"""How the joints of limbs share the skin about them: in what way it bends."""
+"""Weights of the skin about the joints of limbs, which determine how it bends."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ HINGES = (
     ("?_elbow", "?_wrist", "?_middle1", (0.0, 0.0, 1.0), 0.040, 0.040),
     ("?_hip", "?_knee", "?_ankle", (0.0, 0.0, -1.0), 0.060, 0.070),
 )
-"""Upper joint, the one that bends, the next; the side that folds; over what way (m) to both sides of it the
-skin changes from one to the other, on the side that folds and on that which stretches."""
+"""Upper joint, bending joint, next joint; direction of the side that folds; metres to both sides of the joint
+over which weights change from one to the other, on the side that folds and on the one that stretches."""
 LIMB = 0.06
 """Metres from the bone to the skin, about."""
 ARMHOLE = (0.026, 0.060)
-"""Metres to both sides of where a sleeve is set in, over which skin changes from trunk to arm: at the armpit,
-and at the top."""
+"""Metres to both sides of a sleeve's seam over which weights change from trunk to arm: at the armpit and at
+the top."""
 SET = (0.020, 0.030)
-"""Metres out from the shoulder where that is."""
+"""Metres from the shoulder outwards to that seam: at the armpit and at the top."""
 BEHIND = 0.022
 """How much further out it is at the back of the armpit, which an arm in front would carry downwards."""
 PIT = (-0.01, -0.13, 0.01)
-"""Where the armpit is, from the left shoulder."""
+"""Position of the armpit relative to the left shoulder, metres."""
 ARMPIT = (-0.24, -0.12)
-"""Heights from the shoulder between which the side of the trunk comes to go with the arm at all."""
+"""Heights from the shoulder between which the arm begins to carry the side of the trunk, metres."""
 BLADE = (-0.13, -0.01)
-"""Heights from the shoulder between which the trunk comes to go with the blade."""
-EASED = 10
-"""How often the weights of trunk, arms and legs are drawn to those of their neighbours."""
+"""Heights from the shoulder between which the blade begins to carry the trunk, metres."""
+EASING_ROUNDS = 10
+"""Rounds of smoothing the weights of trunk, arms and legs over neighbours."""
 
 
-def evened(person: Person, places: dict[str, Float64], weights: Float64) -> Float64:
-    """(V, J) weights, with those about the limbs' joints laid anew. places: joints by name."""
+def ease_limb_weights(person: Person, places: dict[str, Float64], weights: Float64) -> Float64:
+    """(V, J) weights, with those about the joints of limbs replaced. places: joints' positions by name."""
     weights = weights.copy()
-    _shoulders(person, places, weights)
+    _ease_shoulders(person, places, weights)
     number = {name: n for n, name in enumerate(Skeleton.default().names)}
     for upper, joint, lower, inside, fold, stretch in HINGES:
         for side in "lr":
@@ -62,11 +62,11 @@ def evened(person: Person, places: dict[str, Float64], weights: Float64) -> Floa
         pit = places[f"{side}_shoulder"] + np.array(PIT) * (1 if side == "l" else -1, 1, 1)
         free *= 1 - 0.7 * np.exp(-((np.linalg.norm(person.vertices - pit, axis=1) / 0.06) ** 2))
     mesh = Cloth(person.vertices, person.vertices, weights, weights, person.triangles)
-    return mesh.smoothed(weights, free, EASED)
+    return mesh.smooth_rows(weights, free, EASING_ROUNDS)
 
 
-def _shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> None:
-    """Skin about the shoulders: as a sleeve is set in, in an upright plane from armpit to its top."""
+def _ease_shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> None:
+    """Replace weights about the shoulders, in place: they change at the plane of a sleeve's seam."""
     names = Skeleton.default().names
     for side, sign in (("l", 1.0), ("r", -1.0)):
         joint = places[f"{side}_shoulder"]
@@ -78,7 +78,7 @@ def _shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> 
         out = away[:, 0] - SET[0] - (SET[1] - SET[0]) * top - BEHIND * behind
         share = _smooth(out / (2 * reach) + 0.5) * np.maximum(high, _smooth((person.arms - 0.15) / 0.5))
         arm = names.index(f"{side}_shoulder")
-        rest = [n for n, name in enumerate(names) if not _of_arm(name, side)]
+        rest = [n for n, name in enumerate(names) if not _belongs_to_arm(name, side)]
         near = (away[:, 1] > ARMPIT[0]) & (away[:, 0] < 0.12) & (away[:, 0] > -0.12)
         girdle = names.index(f"{side}_acromioclavicular")
         spine = [n for n, name in enumerate(names) if name.startswith("v")]
@@ -89,16 +89,16 @@ def _shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> 
         trunk = weights[:, rest].sum(axis=1)
         lone = near & (trunk < 1e-3)
         weights[lone, girdle] = trunk[lone] = 1.0
-        others = weights[:, [n for n, name in enumerate(names) if _of_arm(name, side) and n != arm]].sum(
-            axis=1
-        )
+        others = weights[
+            :, [n for n, name in enumerate(names) if _belongs_to_arm(name, side) and n != arm]
+        ].sum(axis=1)
         share = np.maximum(share - others, 0.0)
         keep = np.where(near, (1 - share - others) / np.maximum(trunk, 1e-9), 1.0)
         weights[:, rest] *= keep[:, None]
         weights[near, arm] = share[near]
 
 
-def _of_arm(name: str, side: str) -> bool:
+def _belongs_to_arm(name: str, side: str) -> bool:
     return name[:2] == f"{side}_" and name[2:].startswith(("shoulder", "elbow", "wrist"))
 
 

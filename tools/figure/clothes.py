@@ -1,7 +1,7 @@
-"""Shirt and trousers: the figure's own surface, cut along lines, set off and smoothed.
+"""Shirt and trousers: the figure's own surface, cut along lines, moved outwards and smoothed.
 
-Each garment is given by a function over places of the figure as modelled (arms held off the sides) that is
-positive where the garment is; its edge is laid along the line where the function is 0.
+Each garment is given by a function over points of the figure as modelled (arms held off the sides) that is
+positive where the garment is; its edge is the line where the function is 0.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from fba.mesh.meshes import vertex_normals
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
-Way = Callable[[Float64, Float64], Float64]
+EdgeDistance = Callable[[Float64, Float64], Float64]
 
 _NAMES = list(Skeleton.default().names)
 MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2:]) for n in _NAMES])
-"""The joint of the other side, of each."""
+"""For each joint the number of its mate on the other side."""
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.040, 0.042, 0.048])
 SEAM, INSIDE = 0.72, 0.6
-"""How dark the bands along collar and hems, and what turns in there, are against the cloth."""
+"""Brightness of the bands along collar and hems, and of the folds there, relative to the cloth."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
 SLEEVE = 0.62
-"""How much of the upper arm the sleeve covers."""
+"""Share of the upper arm that the sleeve covers."""
 SHOULDER, ELBOW = np.array([0.161, 1.401, -0.063]), np.array([0.342, 1.176, -0.051])
 LEG = -0.10
 """z of the middle of the ankle."""
@@ -47,14 +47,17 @@ NECKLINE = (
 )
 """Degrees from the front about the neck, and the height of the collar there."""
 FOLD = 0.003
-"""How far an edge turns in below the skin."""
+"""Metres by which an edge is folded in below the skin."""
 
 
 @dataclass(frozen=True, eq=False)
 class Garment:
-    """vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J). covered (of the person,): how deep
-    under the garment each vertex of the person is, metres; negative where it is free. inside (V,): what
-    turns in at an edge, which is a crease."""
+    """A garment: vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J).
+
+    covered: for each
+    vertex of the person its depth under the garment, metres; negative where it is free. inside (V,): mask of
+    vertices folded in at an edge, which is a crease.
+    """
 
     vertices: Float64
     triangles: Int64
@@ -66,53 +69,55 @@ class Garment:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """What garments are made from. weights: (V, J)."""
+    """The person that garments are made from. weights: (V, J) of its vertices."""
 
     person: Person
     weights: Float64
 
 
-def collar(p: Float64) -> Float64:
-    """How far places are below the collar, metres."""
+def depth_below_collar(p: Float64) -> Float64:
+    """(N,) metres by which points (N, 3) are below the collar."""
     turn = np.degrees(np.arctan2(np.abs(p[:, 0]), p[:, 2] - AXIS))
     return PchipInterpolator(*NECKLINE)(turn) - p[:, 1]
 
 
-def sleeve(p: Float64) -> Float64:
-    """How far places are from the end of the sleeve, towards the shoulder; metres."""
+def length_inside_sleeve(p: Float64) -> Float64:
+    """(N,) metres from the end of the sleeve to points (N, 3), towards the shoulder."""
     folded = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1)
     arm = ELBOW - SHOULDER
     length = np.linalg.norm(arm)
     return SLEEVE * length - (folded - SHOULDER) @ (arm / length)
 
 
-def turn_up(p: Float64) -> Float64:
-    """How far places are above the trousers' hem, metres."""
+def height_above_hem(p: Float64) -> Float64:
+    """(N,) metres by which points (N, 3) are above the trousers' hem."""
     return p[:, 1] - TURN_UP[0] - TURN_UP[1] * np.clip(p[:, 2] - LEG, -0.05, 0.09)
 
 
-def shirt(body: Body) -> Garment:
+def make_shirt(body: Body) -> Garment:
     """A T-shirt."""
     p = body.person.vertices
     arms = body.person.arms > 0.5
 
     def way(places: Float64, kind: Float64) -> Float64:
-        ends = np.stack([sleeve(places), collar(places), places[:, 1] - HEM], axis=1)
+        ends = np.stack(
+            [length_inside_sleeve(places), depth_below_collar(places), places[:, 1] - HEM], axis=1
+        )
         return np.take_along_axis(ends, kind.astype(int)[:, None], axis=1)[:, 0]
 
     # On an arm only the sleeve's plane counts: the hem's and the collar's would cut it, and it the trunk.
     kind = np.where(arms, 0, np.where(p[:, 1] > 1.25, 1, 2))
     loose = _smooth((1.30 - p[:, 1]) / 0.25)
-    thick = 0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * _smooth((0.13 - sleeve(p)) / 0.13)
-    return _made(body, way, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
+    thick = 0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * _smooth((0.13 - length_inside_sleeve(p)) / 0.13)
+    return _make_garment(body, way, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
 
 
-def trousers(body: Body) -> Garment:
+def make_trousers(body: Body) -> Garment:
     """Plain trousers, a little wide below the knee."""
     p = body.person.vertices
 
     def way(places: Float64, kind: Float64) -> Float64:
-        ends = np.stack([np.full(len(places), -1.0), WAIST - places[:, 1], turn_up(places)], axis=1)
+        ends = np.stack([np.full(len(places), -1.0), WAIST - places[:, 1], height_above_hem(places)], axis=1)
         return np.take_along_axis(ends, kind.astype(int)[:, None], axis=1)[:, 0]
 
     kind = np.where(body.person.arms > 0.3, 0, np.where(p[:, 1] > 0.6, 1, 2))
@@ -123,12 +128,12 @@ def trousers(body: Body) -> Garment:
         + 0.0105 * below
         + 0.006 * _smooth((0.35 - p[:, 1]) / 0.25)
     )
-    return _made(body, way, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
+    return _make_garment(body, way, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 
 
-def _made(
+def _make_garment(
     body: Body,
-    way: Way,
+    way: EdgeDistance,
     kind: Float64,
     thick: Float64,
     slack: Float64,
@@ -136,33 +141,33 @@ def _made(
     colour: Float64,
     band: float,
 ) -> Garment:
-    """A garment where way(places, kind) is positive, the way to its edge, of which there are kinds (V,).
+    """The garment where way(points, kind), the distance to its edge, is positive.
 
-    thick (V,): how far it is off the skin. slack (V,): how far it smooths hollows over. band: width of a
-    darker band along the edges.
+    kind (V,): number of the edge that applies. thick (V,): metres off the skin. slack (V,): share by which
+    hollows are smoothed over. band: width of a darker band along the edges, metres.
     """
     surface, triangles = body.person, body.person.triangles
     normals = vertex_normals(surface.vertices, triangles).astype(np.float64)
     value = way(surface.vertices, kind)
     values = np.stack([value, kind, thick, slack], axis=1)
-    cloth = Cloth(surface.vertices, normals, body.weights, values, triangles).above(value)
+    cloth = Cloth(surface.vertices, normals, body.weights, values, triangles).cut_above(value)
     cloth, _ = cloth.split(cloth.values[:, 0] - band)
     kinds = np.rint(cloth.values[:, 1])
     lines = np.unique(cloth.border), np.flatnonzero(np.abs(cloth.values[:, 0] - band) < 1e-9)
     rim = lines[0]
     free = np.ones(len(cloth.vertices))
     free[rim] = 0
-    outward = cloth.smoothed(cloth.normals, np.ones(len(free)), rounds)
+    outward = cloth.smooth_rows(cloth.normals, np.ones(len(free)), rounds)
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    vertices = cloth.smoothed(cloth.vertices, cloth.values[:, 3] * free, rounds)
-    # Smoothing draws hollows tight; it must not sink into the body.
+    vertices = cloth.smooth_rows(cloth.vertices, cloth.values[:, 3] * free, rounds)
+    # Smoothing must not sink the cloth into the body.
     sunk = np.minimum(((vertices - cloth.vertices) * outward).sum(axis=1), 0.0)
     thickness = cloth.values[:, 2]
     vertices = vertices + outward * (thickness - sunk)[:, None]
     vertices = _even_rim(vertices, cloth.border, rim)
     for rows, level in zip(lines, (0.0, band), strict=True):
-        vertices[rows] = _onto(vertices[rows], level, lambda p, rows=rows: way(p, kinds[rows]))
-    # The edge turns in below the skin.
+        vertices[rows] = _move_onto_edge(vertices[rows], level, lambda p, rows=rows: way(p, kinds[rows]))
+    # The edge is folded in below the skin.
     place = {vertex: len(vertices) + k for k, vertex in enumerate(rim.tolist())}
     fold = vertices[rim] - outward[rim] * (thickness[rim] + FOLD)[:, None]
     loop = cloth.border.tolist()
@@ -175,14 +180,14 @@ def _made(
     shade = np.where(across[faces].max(axis=1) < band + 1e-6, SEAM, 1.0)
     shade[inner] = INSIDE
     side = np.concatenate([cloth.vertices[:, 0], cloth.vertices[rim, 0]])
-    everything, weights, faces, shade = _mirrored(everything, weights, faces, shade, side)
-    everything, weights, faces, tone = _parted(everything, weights, faces, shade)
+    everything, weights, faces, shade = _mirror(everything, weights, faces, shade, side)
+    everything, weights, faces, tone = _split_by_shade(everything, weights, faces, shade)
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)
     return Garment(everything, faces, colours, weights, value, tone == INSIDE)
 
 
-def _onto(places: Float64, level: float, way: Callable[[Float64], Float64]) -> Float64:
-    """Places moved to where the way to the edge is exactly so far."""
+def _move_onto_edge(places: Float64, level: float, way: Callable[[Float64], Float64]) -> Float64:
+    """Points (N, 3) moved to where their distance to the edge, way(points), is exactly `level`."""
     step = 1e-4
     for _ in range(4):
         value = way(places) - level
@@ -194,7 +199,7 @@ def _onto(places: Float64, level: float, way: Callable[[Float64], Float64]) -> F
 
 
 def _even_rim(vertices: Float64, border: Int64, rim: Int64) -> Float64:
-    """Edges without the small steps of what they were cut from; to and fro, so that they do not shrink."""
+    """Vertices with the rim smoothed, alternating inwards and outwards so that it does not shrink."""
     vertices = vertices.copy()
     count = np.bincount(border.ravel(), minlength=len(vertices))[:, None]
     for share in (0.5, -0.52) * 14:
@@ -205,10 +210,10 @@ def _even_rim(vertices: Float64, border: Int64, rim: Int64) -> Float64:
     return vertices
 
 
-def _mirrored(
+def _mirror(
     vertices: Float64, weights: Float64, faces: Int64, shade: Float64, side: Float64
 ) -> tuple[Float64, Float64, Int64, Float64]:
-    """The left half and its mirror image. side (V,): x of the vertices as they were cut."""
+    """The left half and its mirror image. side (V,): x of the vertices before smoothing."""
     half = (side[faces] > -MIDLINE).all(axis=1)
     used, left = np.unique(faces[half], return_inverse=True)
     left = left.reshape(-1, 3)
@@ -227,10 +232,10 @@ def _mirrored(
     )
 
 
-def _parted(
+def _split_by_shade(
     vertices: Float64, weights: Float64, faces: Int64, shade: Float64
 ) -> tuple[Float64, Float64, Int64, Float64]:
-    """Vertices doubled where triangles of different shades meet; the shade of each."""
+    """The mesh with vertices doubled where shades meet; the last array is each vertex's shade."""
     pairs = np.stack([faces.ravel(), np.repeat(np.unique(shade, return_inverse=True)[1], 3)], axis=1)
     found, number = np.unique(pairs, axis=0, return_inverse=True)
     rows = found[:, 0]

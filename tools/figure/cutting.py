@@ -1,4 +1,4 @@
-"""Triangles with numbers at their corners, cut exactly along the line where a function of them is 0."""
+"""Triangle meshes with values at their vertices, cut exactly along the line where a function is 0."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
 
 MIDLINE = 1e-6
-"""Metres from the plane of symmetry."""
+"""Vertices within this many metres of the plane of symmetry are on it."""
 SNAP = 0.28
-"""A corner nearer to the line than this share of an edge is moved onto it: no slivers."""
+"""A corner nearer to the line than this share of an edge is moved onto it, to avoid slivers."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cloth:
-    """vertices, normals: (V, 3). weights: (V, J). values: (V, K), anything else. triangles: (F, 3)."""
+    """A mesh. vertices, normals: (V, 3). weights: (V, J). values: (V, K), any others. triangles: (F, 3)."""
 
     vertices: Float64
     normals: Float64
@@ -41,8 +41,8 @@ class Cloth:
         )
         return sides[counts[inverse.ravel()] == 1]
 
-    def kept(self, faces: Bool) -> Cloth:
-        """Only some triangles, and the vertices that they use."""
+    def select(self, faces: Bool) -> Cloth:
+        """The mesh of some triangles (mask (F,)) and the vertices that they use."""
         used, triangles = np.unique(self.triangles[faces], return_inverse=True)
         return replace(self._rows(used), triangles=triangles.reshape(-1, 3))
 
@@ -55,8 +55,8 @@ class Cloth:
             values=self.values[rows],
         )
 
-    def blended(self, first: Int64, second: Int64, share: Float64) -> tuple[Float64, ...]:
-        """Rows between two vertices each."""
+    def interpolate_rows(self, first: Int64, second: Int64, share: Float64) -> tuple[Float64, ...]:
+        """Vertices, normals, weights and values interpolated between pairs of vertices, by shares (N,)."""
         part = share[:, None]
         return tuple(
             array[first] * (1 - part) + array[second] * part
@@ -64,7 +64,7 @@ class Cloth:
         )
 
     def split(self, height: Float64) -> tuple[Cloth, Float64]:
-        """With vertices along the line where height (V,) is 0; and the heights, exactly 0 there."""
+        """(the cloth with vertices along the line where height (V,) is 0, the heights, exactly 0 there)."""
         height = height.copy()
         arrays = [self.vertices.copy(), self.normals.copy(), self.weights.copy(), self.values.copy()]
         edges = self.edges
@@ -74,33 +74,33 @@ class Cloth:
         best = np.full(len(height), SNAP)
         for corner, at in ((a, share), (b, 1 - share)):
             np.minimum.at(best, corner, at)
-        moved = self.blended(a, b, share)
+        moved = self.interpolate_rows(a, b, share)
         for corner, at in ((a, share), (b, 1 - share)):
             chosen = at == best[corner]
             for array, rows in zip(arrays, moved, strict=True):
                 array[corner[chosen]] = rows[chosen]
             height[corner[chosen]] = 0.0
-        for array in arrays[:2]:  # what is on the midline stays there
+        for array in arrays[:2]:  # vertices on the midline stay on it
             array[np.abs(self.vertices[:, 0]) < MIDLINE, 0] = 0.0
         on_line = Cloth(arrays[0], arrays[1], arrays[2], arrays[3], self.triangles)
         a, b = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0].T
-        fresh = on_line.blended(a, b, height[a] / (height[a] - height[b]))
+        fresh = on_line.interpolate_rows(a, b, height[a] / (height[a] - height[b]))
         number = {pair: len(height) + k for k, pair in enumerate(zip(a.tolist(), b.tolist(), strict=True))}
         triangles: list[list[int]] = []
         for corners in self.triangles.tolist():
             triangles += _cut(corners, height, number)
-        whole = [np.concatenate([old, new]) for old, new in zip(arrays, fresh, strict=True)]
-        cloth = Cloth(whole[0], whole[1], whole[2], whole[3], np.array(triangles))
+        joined = [np.concatenate([old, new]) for old, new in zip(arrays, fresh, strict=True)]
+        cloth = Cloth(joined[0], joined[1], joined[2], joined[3], np.array(triangles))
         return cloth, np.concatenate([height, np.zeros(len(a))])
 
-    def above(self, height: Float64) -> Cloth:
-        """What lies where height (V,) is positive, cut along the line where it is 0."""
+    def cut_above(self, height: Float64) -> Cloth:
+        """The part where height (V,) is positive, cut along the line where it is 0."""
         cloth, level = self.split(height)
         corners = level[cloth.triangles]
-        return cloth.kept((corners >= 0).all(axis=1) & (corners > 0).any(axis=1))
+        return cloth.select((corners >= 0).all(axis=1) & (corners > 0).any(axis=1))
 
-    def smoothed(self, array: Float64, free: Float64, rounds: int) -> Float64:
-        """Rows (V, N) drawn to the mean of their neighbours, each by its share free (V,)."""
+    def smooth_rows(self, array: Float64, free: Float64, rounds: int) -> Float64:
+        """Rows (V, N) moved to their neighbours' mean by shares free (V,), `rounds` times."""
         edges = self.edges
         for _ in range(rounds):
             total, count = array.copy(), np.ones((len(array), 1))
@@ -112,7 +112,7 @@ class Cloth:
 
 
 def _cut(corners: list[int], height: Float64, number: dict[tuple[int, int], int]) -> list[list[int]]:
-    """One triangle, cut where the line crosses it."""
+    """The one to three triangles into which the line cuts a triangle."""
     for turn in range(3):
         a, b, c = corners[turn:] + corners[:turn]
         one, other = (number.get((min(pair), max(pair))) for pair in ((a, b), (c, a)))
@@ -130,7 +130,7 @@ def _sides(triangles: Int64) -> Int64:
     return np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
 
 
-def triangulated(vertices: Float64, quads: Int64) -> Int64:
+def triangulate(vertices: Float64, quads: Int64) -> Int64:
     """Two triangles of each quad, along its shorter diagonal: the same on both sides of a figure."""
     first = np.linalg.norm(vertices[quads[:, 0]] - vertices[quads[:, 2]], axis=1)
     second = np.linalg.norm(vertices[quads[:, 1]] - vertices[quads[:, 3]], axis=1)

@@ -1,4 +1,4 @@
-"""The base figure: what `extract.py` kept of it, and the parts of its surface by name."""
+"""The base figure from `figure.npz`, which `extract.py` makes, and its head."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ class Surface:
         sides = sides[sides[:, 0] != sides[:, 1]]
         return np.unique(np.sort(sides, axis=1), axis=0)
 
-    def kept(self, faces: npt.NDArray[np.bool_]) -> Surface:
-        """Only some faces, and the vertices that they use."""
+    def select(self, faces: npt.NDArray[np.bool_]) -> Surface:
+        """The surface of some faces (mask (F,)) and the vertices that they use."""
         used, quads = np.unique(self.quads[faces], return_inverse=True)
         used_uvs, corners = np.unique(self.corners[faces], return_inverse=True)
         return Surface(self.vertices[used], quads.reshape(-1, 4), corners.reshape(-1, 4), self.uvs[used_uvs])
 
     def rings(self, start: npt.NDArray[np.integer], most: int) -> Int64:
-        """(V,) edges from the start vertices, -1 beyond `most`."""
+        """(V,) number of edges from the start vertices, -1 beyond `most`."""
         distance = np.full(len(self.vertices), -1, dtype=np.int64)
         distance[start] = 0
         front = np.zeros(len(self.vertices), dtype=bool)
@@ -63,14 +63,14 @@ class Surface:
         return distance
 
     def vertices_of(self, faces: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        """(V,) vertices that any of the faces uses."""
+        """(V,) mask of the vertices that any of the faces uses."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.quads[faces]] = True
         return used
 
 
 def load() -> tuple[Surface, dict[str, np.ndarray]]:
-    """The whole figure, 1.76 m tall, standing on y = 0, and its joints and weights."""
+    """(the whole figure, 1.76 m tall, standing on y = 0; its joints and weights by name)."""
     data = dict(np.load(FILE))
     surface = Surface(
         data.pop("vertices").astype(np.float64),
@@ -88,5 +88,5 @@ def head() -> Surface:
     """
     figure, _ = load()
     high = (figure.vertices[figure.quads][:, :, 1] > EYE_LEVEL - 0.12).all(axis=1)
-    found = figure.kept((figure.tile == 0) | ((figure.tile == 1) & high))
+    found = figure.select((figure.tile == 0) | ((figure.tile == 1) & high))
     return Surface(found.vertices - (0.0, EYE_LEVEL, 0.0), found.quads, found.corners, found.uvs)

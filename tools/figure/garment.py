@@ -1,4 +1,4 @@
-"""A plain shirt over the figure's shoulders, so that the head does not end in the air."""
+"""A plain shirt over the figure's shoulders, a base for the head as of a bust."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ BAND = ((0.004, -0.003), (0.0, 0.0012), (-0.0012, 0.0036), (0.0008, 0.0068), (0.
 LOWEST = -0.38
 WIDEST = 0.245
 BUST = (0.205, 0.185, -0.165, 2.6)
-"""Where the cloth ends, as a sculptor's bust does: half its width, how far below the height that follows (all
-m) its lowest place lies, and the exponent of the curve between."""
+"""Edge of the cloth, as of a sculptor's bust: half its width, depth of its lowest point below the height that
+follows (all metres), and the exponent of the curve between."""
 ON_EDGE, CORE, OVERLAP = 0.03, -0.11, 0.002
-"""What counts as that end; the depth at which both halves of the underside meet, and how far they go on."""
+"""Tolerance of that edge; z at which both halves of the underside meet, and by how much they overlap (m)."""
 ARCH = -0.24
-"""No higher do they meet: at the sides they hang from the arch over the shoulder (m)."""
+"""Greatest height at which they meet: at the sides they hang from the arch over the shoulder (m)."""
 
 
 def neckline(places: Float64) -> Float64:
-    """(N,) height of the neckline in the direction of places (N, 3), metres, head frame."""
+    """(N,) height of the neckline in the direction of points (N, 3), metres, in the head's frame."""
     turn = np.arctan2(np.abs(places[:, 0]), places[:, 2] - AXIS)
     from scipy.interpolate import PchipInterpolator
 
@@ -41,35 +41,38 @@ def neckline(places: Float64) -> Float64:
     return PchipInterpolator(degrees, heights)(np.degrees(turn))
 
 
-def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
-    """Vertices, triangles and colours (V, 4) of the shirt.
+def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
+    """(vertices (V, 3), triangles (F, 3), colours (V, 4)) of the shirt.
 
-    origin: of the head, in the frame of `figure.head`.
+    origin: (3,) of the head, in the frame of `figure.head`.
     """
-    whole, _ = figure.load()
+    whole_figure, _ = figure.load()
     surface = figure.Surface(
-        whole.vertices - (0.0, figure.EYE_LEVEL, 0.0) - origin, whole.quads, whole.corners, whole.uvs
+        whole_figure.vertices - (0.0, figure.EYE_LEVEL, 0.0) - origin,
+        whole_figure.quads,
+        whole_figure.corners,
+        whole_figure.uvs,
     )
     middle = surface.vertices[surface.quads].mean(axis=1)
     trunk = (middle[:, 1] > LOWEST) & (np.abs(middle[:, 0]) < WIDEST) & (surface.tile != 1)
     whole_skin = surface.vertices[np.unique(surface.quads[trunk])]
-    torso = _finer(surface.kept(trunk & (middle[:, 1] < neckline(middle) + 0.004)))
+    torso = _refine_near_neck(surface.select(trunk & (middle[:, 1] < neckline(middle) + 0.004)))
     triangles = torso.quads[:, :3]
     from fba.mesh.meshes import vertex_normals
 
     outward = vertex_normals(torso.vertices, triangles).astype(np.float64)
     for _ in range(6):  # cloth does not follow every hollow
-        outward = _averaged(outward, torso.edges)
+        outward = _average_with_neighbours(outward, torso.edges)
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     rim = _rim(torso)
     top = rim[torso.vertices[rim, 1] > -0.21]
     vertices = torso.vertices.copy()
-    rim_places = _in_order(torso, top)
+    rim_places = _evenly_around_neck(torso, top)
     vertices[top] = _on_skin(rim_places, neckline(rim_places) - 0.006, whole_skin)
     turn = np.arctan2(vertices[top, 0], vertices[top, 2] - AXIS)
     outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
     for _ in range(4):  # the rows below follow
-        eased = _averaged(vertices, torso.edges)
+        eased = _average_with_neighbours(vertices, torso.edges)
         near = smooth(1 - (neckline(vertices) - vertices[:, 1]) / 0.05)[:, None]
         near[top] = 0
         vertices = vertices + (eased - vertices) * near * 0.6
@@ -77,12 +80,12 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     vertices = vertices + outward * (THICK + 0.004 * hang)
     fallen = vertices.copy()
     for _ in range(5):
-        smoothed = _averaged(fallen, torso.edges)
+        smoothed = _average_with_neighbours(fallen, torso.edges)
         fallen = np.where(hang > 0, fallen * (1 - 0.7 * hang) + smoothed * 0.7 * hang, fallen)
     cloth = Cloth(fallen, outward, np.zeros((len(fallen), 0)), np.zeros((len(fallen), 0)), triangles)
-    cloth = cloth.above(_within_bust(fallen))
+    cloth = cloth.cut_above(_within_bust(fallen))
     collar, band = _collar(whole_skin, len(cloth.vertices))
-    below, closing = _closed(cloth, len(cloth.vertices) + len(collar))
+    below, closing = _close_below(cloth, len(cloth.vertices) + len(collar))
     vertices = np.concatenate([cloth.vertices, collar, below])
     colours = np.tile([*COLOUR, 0.06], (len(vertices), 1))
     colours[len(cloth.vertices) :, :3] *= 0.82
@@ -90,16 +93,16 @@ def shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
 
 
 def _within_bust(places: Float64) -> Float64:
-    """(N,) above 0 within the line that the cloth of a bust ends at, for places (N, 3)."""
+    """(N,) for points (N, 3): positive within the edge of the bust's cloth, 0 on it."""
     wide, deep, height, power = BUST
     down = np.maximum(height - places[:, 1], 0.0) / deep
     return 1 - ((np.abs(places[:, 0]) / wide) ** power + down**power) ** (1 / power)
 
 
-def _closed(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
-    """What closes the bust below: from its edge straight to the middle between front and back.
+def _close_below(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
+    """(vertices, triangles) that close the bust below, from its edge to the middle between front and back.
 
-    start: number of its first vertex. The edge's vertices are there once more, so that it stays sharp.
+    start: number of its first vertex. The edge's vertices are duplicated, so that it stays sharp.
     """
     sides = cloth.border
     sides = sides[(_within_bust(cloth.vertices)[sides] < ON_EDGE).all(axis=1)]
@@ -120,7 +123,7 @@ def _closed(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
 
 
 def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
-    """A ribbed band along the neckline, over the edge of the cloth; start: number of its first vertex."""
+    """(vertices, triangles) of a ribbed band along the neckline; start: number of its first vertex."""
     from scipy.ndimage import gaussian_filter1d
 
     turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
@@ -141,10 +144,10 @@ def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
     return np.concatenate(rows), quads.reshape(-1, 3)
 
 
-def _in_order(torso: figure.Surface, top: Int64) -> Float64:
-    """The places of the collar's vertices, at even turns about the neck in the order of its edge.
+def _evenly_around_neck(torso: figure.Surface, top: Int64) -> Float64:
+    """(N, 3) positions of the collar's vertices, spaced evenly about the neck in the order of its edge.
 
-    The edge climbs in steps along the quads; a collar runs round evenly.
+    The edge climbs in steps along the quads; a collar is even.
     """
     after = {
         int(a): int(b) for a, b in _open_edges(torso) if a in set(top.tolist()) and b in set(top.tolist())
@@ -165,7 +168,7 @@ def _in_order(torso: figure.Surface, top: Int64) -> Float64:
 
 
 def _on_skin(places: Float64, height: Float64, skin: Float64) -> Float64:
-    """The skin of the neck in the direction of places (N, 3) from its axis, at heights (N,)."""
+    """(N, 3) points of the neck's skin in the directions of points (N, 3) from its axis, at heights (N,)."""
     from scipy.interpolate import LinearNDInterpolator
 
     def around(points: Float64) -> Float64:
@@ -181,16 +184,16 @@ def _on_skin(places: Float64, height: Float64, skin: Float64) -> Float64:
     return np.stack([radius * np.sin(turn), height, AXIS + radius * np.cos(turn)], axis=1)
 
 
-def _finer(surface: figure.Surface) -> figure.Surface:
-    """Every quad cut into four where the shirt hangs near the neck."""
+def _refine_near_neck(surface: figure.Surface) -> figure.Surface:
+    """The surface with quads near the neck cut into four."""
     middle = surface.vertices[surface.quads].mean(axis=1)
     refined = refine(surface, middle[:, 1] > neckline(middle) - 0.016)
-    # As quads again: each triangle counts as one with a doubled corner.
+    # Triangles as quads with a doubled corner.
     quads = np.concatenate([refined.triangles, refined.triangles[:, 2:]], axis=1)
     return figure.Surface(refined.vertices, quads, quads * 0, refined.uvs)
 
 
-def _averaged(values: Float64, edges: Int64) -> Float64:
+def _average_with_neighbours(values: Float64, edges: Int64) -> Float64:
     total, count = values.copy(), np.ones((len(values), 1))
     for a, b in (edges.T, edges[:, ::-1].T):
         np.add.at(total, a, values[b])

@@ -1,4 +1,4 @@
-"""Where hair grows: scalp and brows, as places on the head."""
+"""Density of hair on the head: scalp and brows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BROW = np.array([
 
 
 def scalp(places: Float64, soft: float = 0.004) -> Float64:
-    """(N,) how much hair grows at places (N, 3): 0 on the face, 1 on the scalp.
+    """(N,) density of hair at points (N, 3): 0 on the face, 1 on the scalp.
 
     soft: width of the edge, metres.
     """
@@ -41,7 +41,7 @@ def scalp(places: Float64, soft: float = 0.004) -> Float64:
 
 
 def brow(places: Float64) -> tuple[Float64, Float64]:
-    """(N,) how far along the brow (0 inner, 1 outer end) and how dense its hair is there, 0..1."""
+    """(position along the brow (N,): 0 inner, 1 outer end; density of its hair (N,), 0..1)."""
     x = np.abs(places[:, 0])
     middle, low, high = (np.interp(x, BROW[:, 0], BROW[:, column]) for column in (1, 2, 3))
     offset = places[:, 1] - middle

@@ -23,7 +23,7 @@ def bound_points(
     found: dict[str, int],
     starts: dict[str, int],
 ) -> tuple[Float64, npt.NDArray[np.int32]]:
-    """The feature points (84, 3) and the vertices (84,) they are bound to, by the rules of points.csv.
+    """(feature points (84, 3), the vertices (84,) they are bound to), by the rules of points.csv.
 
     found: vertices of points on parts other than the skin; starts: first vertex of each part.
     """
@@ -49,11 +49,14 @@ def bound_points(
 
 
 class Finder:
-    """Vertices of the skin by where they are."""
+    """Finds vertices of the skin by the rules of points.csv."""
 
     def __init__(self, surface: Refined, where: sculpt.Marks) -> None:
         self.vertices = surface.vertices
-        self.eye, self.mouth = sculpt.carried(surface, where.eye), sculpt.carried(surface, where.mouth)
+        self.eye, self.mouth = (
+            sculpt.interpolate_rings(surface, where.eye),
+            sculpt.interpolate_rings(surface, where.mouth),
+        )
         self.lip = surface.blend @ where.lip.astype(np.float64)
         self.normals = vertex_normals(surface.vertices, surface.triangles)
         self.outside = np.zeros(len(self.vertices), dtype=bool)

@@ -19,7 +19,8 @@ LENGTH = 0.0076
 def lashes(margin: Float64, centre: Float64) -> Mesh:
     """Upper lashes of the left eye: vertices, triangles, colours (V, 4); one connected piece each.
 
-    margin: (N, 3) places along the upper lid's from the inner to the outer corner. centre: the eyeball's.
+    margin: (N, 3) points along the upper lid's margin from the inner to the outer corner. centre: the
+    eyeball's.
     """
     random = np.random.default_rng(23)
     blades = []

@@ -21,7 +21,7 @@ import shoes
 from cutting import Cloth
 from person import Person
 from sculpt import ORIGIN
-from shoulders import sloping
+from shoulders import slope_shoulders
 
 from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart, Material
@@ -36,15 +36,15 @@ Int64 = npt.NDArray[np.int64]
 TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
 GLOSS = 0.38
 DARKEST = 0.55
-"""What is left of a colour where no light of the sky falls."""
+"""Brightness of a colour where no light of the sky falls."""
 UNDER = 0.02
 """Skin stays this far (m) under the edges of clothes."""
 TUCKED = 0.011
-"""The neck under the collar, metres: with more of it, it shows through when the head is thrown back."""
+"""Metres of neck under the collar: more would show through when the head is thrown back."""
 EVENED = 1.46
-"""Height above which weights are, metres."""
-SKULL_WHOLE = 0.9
-"""What the skull carries to this share it carries alone: jaw and chin do not lag behind."""
+"""Height above which the skull's weights are smoothed, metres."""
+SKULL_ALONE = 0.9
+"""From this share of the skull on, vertices move with it alone: jaw and chin do not lag behind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,16 +60,16 @@ class Piece:
     normals: Float64
 
 
-def pieces() -> tuple[dict[str, Piece], rig.Rig]:
+def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
     """Skin and garments of the body, and its rig."""
-    person, bones = rig.rig()
-    person = sloping(person, bones)
-    weights = _skull(person, bones)
+    person, bones = rig.make_rig()
+    person = slope_shoulders(person, bones)
+    weights = _skull_weights(person, bones)
     body = clothes.Body(person, weights)
     made = {
-        "shirt": clothes.shirt(body),
-        "trousers": clothes.trousers(body),
-        "shoes": shoes.shoes(person.vertices, weights),
+        "shirt": clothes.make_shirt(body),
+        "trousers": clothes.make_trousers(body),
+        "shoes": shoes.make_shoes(person.vertices, weights),
     }
     hidden = np.max([garment.covered for garment in made.values()], axis=0)
     triangles, of_tile = person.triangles, person.tile
@@ -78,7 +78,7 @@ def pieces() -> tuple[dict[str, Piece], rig.Rig]:
     whole = Cloth(person.vertices, normals, weights, hidden[:, None], triangles)
     free = (hidden[triangles] < UNDER).any(axis=1)
     colour = np.array([*complexion(), GLOSS])
-    skin = whole.kept(free & (of_tile != 0) & ~inside[triangles].any(axis=1))
+    skin = whole.select(free & (of_tile != 0) & ~inside[triangles].any(axis=1))
     found = {
         "skin": _piece("skin", skin, colour),
         "neck": _piece("neck", _neck(whole, of_tile == 0, bones), colour),
@@ -89,13 +89,13 @@ def pieces() -> tuple[dict[str, Piece], rig.Rig]:
             kind, garment.vertices, garment.triangles, garment.colours, garment.weights,
             _welded_normals(garment),
         )  # fmt: skip
-    found["skin"].colours[:, :3] *= _flushed(found["skin"], bones)
+    found["skin"].colours[:, :3] *= _flush_factors(found["skin"], bones)
     _shade([piece for piece in found.values() if piece.kind != "neck"])
     return found, bones
 
 
-def _flushed(piece: Piece, bones: rig.Rig) -> Float64:
-    """(V, 3) what fingertips, knuckles and elbows multiply the complexion by."""
+def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
+    """(V, 3) factors of the complexion: redder at fingertips, knuckles and elbows."""
     middles = bones.bind[:, :3, 3]
     tips = [n for n, name in enumerate(bones.names) if name[-1] == "3"]
     bends = [n for n, name in enumerate(bones.names) if name[-1] in "12" and name[2:-1] in FINGERS]
@@ -108,7 +108,7 @@ def _flushed(piece: Piece, bones: rig.Rig) -> Float64:
 
 
 def _shade(found: list[Piece]) -> None:
-    """Colours darkened where little light falls: in folds, between fingers, under hems."""
+    """Darken colours, in place, where little light falls: in folds, between fingers, under hems."""
     starts = np.cumsum([0, *(len(piece.vertices) for piece in found)])
     vertices = np.concatenate([piece.vertices for piece in found]).astype(np.float32)
     normals = np.concatenate([piece.normals for piece in found]).astype(np.float32)
@@ -126,17 +126,17 @@ def _piece(kind: str, cloth: Cloth, colour: Float64) -> Piece:
     return Piece(kind, cloth.vertices, cloth.triangles, colours, cloth.weights, cloth.normals)
 
 
-def _skull(person: Person, bones: rig.Rig) -> Float64:
-    """(V, J) the rig's weights, the head's whole, the step to the neck evened: skin there stretches far."""
+def _skull_weights(person: Person, bones: rig.Rig) -> Float64:
+    """(V, J) the rig's weights, the head on the skull alone, smoothed towards the neck."""
     skull = bones.names.index("skullbase")
-    share = np.minimum(bones.weights[:, skull] / SKULL_WHOLE, 1.0)
+    share = np.minimum(bones.weights[:, skull] / SKULL_ALONE, 1.0)
     head = person.vertices_of(person.tile == 0)
     free = (head & (share < 1) & (person.vertices[:, 1] > EVENED)).astype(np.float64)
     cloth = Cloth(person.vertices, person.vertices, bones.weights, bones.weights, person.triangles)
-    share = cloth.smoothed(share[:, None], free, 12)[:, 0]
+    share = cloth.smooth_rows(share[:, None], free, 12)[:, 0]
     weights = bones.weights.copy()
     rest = 1 - weights[:, skull]
-    lone = rest < 1e-9  # nothing else carries it: its neighbours in the chain do
+    lone = rest < 1e-9  # moved by the skull alone: the rest goes to the next joint of the chain
     weights[lone, bones.names.index("vc1")] = rest[lone] = 1.0
     weights[lone, skull] = 0.0
     weights *= ((1 - share) / rest)[:, None]
@@ -145,11 +145,11 @@ def _skull(person: Person, bones: rig.Rig) -> Float64:
 
 
 def _neck(whole: Cloth, of_head: npt.NDArray[np.bool_], bones: rig.Rig) -> Cloth:
-    """The head's part of the surface from below the collar up to where the skull carries it alone."""
-    head = whole.kept(of_head)
-    head = head.above(clothes.collar(head.vertices) * -1 + TUCKED)
+    """The head's surface from below the collar up to where the skull moves it alone."""
+    head = whole.select(of_head)
+    head = head.cut_above(clothes.depth_below_collar(head.vertices) * -1 + TUCKED)
     skull = bones.names.index("skullbase")
-    neck = head.above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
+    neck = head.cut_above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
     rim = np.unique(neck.border)
     rim = rim[neck.weights[rim, skull] > 0.9]
     neck.weights[rim] = 0.0
@@ -158,7 +158,7 @@ def _neck(whole: Cloth, of_head: npt.NDArray[np.bool_], bones: rig.Rig) -> Cloth
 
 
 def complexion() -> Float64:
-    """(3,) linear light: what the texture of the built-in head shows at its neck."""
+    """(3,) linear light: colour of the built-in head's texture at its neck."""
     from PIL import Image
 
     part = FaceModel.default().part("skin")
@@ -175,7 +175,7 @@ def complexion() -> Float64:
 
 
 def _welded_normals(garment: clothes.Garment) -> Float64:
-    """(V, 3) normals smooth across vertices in the same place, but for the creases of hems."""
+    """(V, 3) normals, smooth across coinciding vertices except at the creases of hems."""
     keys = np.concatenate([np.round(garment.vertices, 7), garment.inside[:, None]], axis=1)
     _, first, same = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     normals = vertex_normals(garment.vertices[first], same.ravel()[garment.triangles])
@@ -184,7 +184,7 @@ def _welded_normals(garment: clothes.Garment) -> Float64:
 
 def model() -> BodyModel:
     """The whole person without the head."""
-    found, bones = pieces()
+    found, bones = make_pieces()
     spine = [name[0] == "v" or name == "sacroiliac" for name in bones.names]
     parts = []
     for name, piece in found.items():

@@ -33,15 +33,15 @@ Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
 TEETH = np.array([0.0, -0.0713, 0.0823])
-"""Where the edges of the middle incisors meet."""
+"""Point at which the edges of the middle incisors meet."""
 TONGUE = TEETH + np.array([0.0, 0.0002, -0.0022])
 
 
-def skin() -> tuple[Refined, sculpt.Marks]:
-    """The refined skin in the final frame, and where its vertices are by rings."""
+def make_skin() -> tuple[Refined, sculpt.Marks]:
+    """(the refined skin in the final frame, the marks of the coarse one)."""
     base = figure.head()
-    where = sculpt.marks(base)
-    formed = sculpt.sculpted(base, where)
+    where = sculpt.find_marks(base)
+    formed = sculpt.sculpt_head(base, where)
     centre = formed.vertices[formed.quads].mean(axis=1)
     x, y, z = centre.T
     from_eye = np.linalg.norm(np.stack([np.abs(x), y, z], axis=1) - EYE_CENTRE, axis=1)
@@ -49,18 +49,18 @@ def skin() -> tuple[Refined, sculpt.Marks]:
     eyes = (from_eye < 0.026) & (z > 0.066)
     lips = (np.abs(x) < 0.034) & (y < -0.025) & (y > -0.098) & (z > 0.07)
     refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
-    vertices = sculpt.laid_on_eyeballs(refined.vertices, sculpt.carried(refined, where.eye)) - ORIGIN
+    vertices = sculpt.lay_on_eyeballs(refined.vertices, sculpt.interpolate_rings(refined, where.eye)) - ORIGIN
     normals = vertex_normals(vertices, refined.triangles)
     vertices = vertices + normals * (hair.THICKNESS * hair.scalp(vertices, 0.012))[:, None]
-    vertices = exactly_symmetric(vertices)
+    vertices = symmetrise(vertices)
     return (
         Refined(vertices, refined.triangles, refined.corners, refined.uvs, refined.quads, refined.blend),
         where,
     )
 
 
-def exactly_symmetric(vertices: Float64) -> Float64:
-    """Every vertex and its mirror image averaged, those of the midline put on it."""
+def symmetrise(vertices: Float64) -> Float64:
+    """Vertices (V, 3) averaged with their mirror images, so that the head is exactly symmetric."""
     from scipy.spatial import cKDTree
 
     _, mate = cKDTree(vertices).query(vertices * (-1.0, 1.0, 1.0))
@@ -69,7 +69,7 @@ def exactly_symmetric(vertices: Float64) -> Float64:
     return (vertices + vertices[mate] * (-1.0, 1.0, 1.0)) / 2
 
 
-def shells() -> tuple[dict[str, mouth.Mesh], dict[str, int]]:
+def make_inner_parts() -> tuple[dict[str, mouth.Mesh], dict[str, int]]:
     """Eyes, teeth and tongue in the final frame, and the vertices of their feature points."""
     ball = eyeballs.eyeball(EYE_CENTRE, EYE_RADIUS, IRIS)
     other = (ball[0] * (-1.0, 1.0, 1.0), ball[1][:, ::-1].copy(), ball[2])
@@ -96,15 +96,15 @@ ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.
 
 
 def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64, npt.NDArray[np.int32]]:
-    """Everything of the head but its tables: parts, feature points (84, 3) and bound vertices (84,).
+    """(parts, feature points (84, 3), bound vertices (84,)): the head without its tables.
 
     painted: whether to paint the texture of the skin, which takes most of the time.
     """
-    surface, where = skin()
-    meshes, found = shells()
+    surface, where = make_skin()
+    meshes, found = make_inner_parts()
     parts = [_skin_part(surface, where, painted)]
     meshes |= _lashes(surface, where)
-    meshes["shirt"] = garment.shirt(ORIGIN)
+    meshes["shirt"] = garment.make_shirt(ORIGIN)
     for name, (vertices, triangles, colours) in meshes.items():
         material = Material(KINDS[name], (1.0, 1.0, 1.0), ROUGHNESS[KINDS[name]])
         parts.append(Part(name, KINDS[name], vertices, triangles, colours=colours, material=material))
@@ -134,15 +134,17 @@ def _skin_part(surface: Refined, where: sculpt.Marks, painted: bool) -> Part:
     vertices = np.concatenate([surface.vertices, surface.vertices[unique[:, 0]]])
     uv_rows = np.concatenate([first, unique[:, 1]])
     source = np.concatenate([np.arange(len(surface.vertices)), unique[:, 0]])
-    # The insides take the colour of their border: of the lips, or of the corner of the eyes.
-    lips = surface.uvs[first[np.flatnonzero(sculpt.carried(surface, where.mouth) == 0)]].mean(axis=0)
-    corner = surface.vertices[:, 0] * 1000 - 50 * np.abs(sculpt.carried(surface, where.eye) - 1)
+    # Insides take the colour of their border: of the lips, or of the corners of the eyes.
+    lips = surface.uvs[first[np.flatnonzero(sculpt.interpolate_rings(surface, where.mouth) == 0)]].mean(
+        axis=0
+    )
+    corner = surface.vertices[:, 0] * 1000 - 50 * np.abs(sculpt.interpolate_rings(surface, where.eye) - 1)
     eye = surface.uvs[first[np.where(first >= 0, -np.abs(corner - 17), -np.inf).argmax()]]
     inner_uv = np.where((vertices[:, 1] > -0.03)[:, None], eye, lips)
     texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], inner_uv)
     texcoords = np.stack([texcoords[:, 0], 1 - texcoords[:, 1]], axis=1)
     triangles = np.array(flat).reshape(-1, 3)
-    texture = paint.encoded(paint.paint(_chart(surface, where))) if painted else None
+    texture = paint.encode_jpeg(paint.paint(_chart(surface, where))) if painted else None
     return Part(
         "skin", "skin", vertices, triangles,
         texcoords=texcoords, colours=_finish(surface, where)[source],
@@ -153,15 +155,18 @@ def _skin_part(surface: Refined, where: sculpt.Marks, painted: bool) -> Part:
 def _chart(surface: Refined, where: sculpt.Marks) -> paint.Chart:
     outside = surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0
     lip = surface.blend @ where.lip.astype(np.float64)
-    values = np.stack([sculpt.carried(surface, where.mouth), sculpt.carried(surface, where.eye), lip], axis=1)
+    values = np.stack(
+        [sculpt.interpolate_rings(surface, where.mouth), sculpt.interpolate_rings(surface, where.eye), lip],
+        axis=1,
+    )
     return paint.chart(
         surface.vertices, values, surface.triangles[outside], surface.uvs[surface.corners[outside]]
     )
 
 
 def _finish(surface: Refined, where: sculpt.Marks) -> Float64:
-    """(V, 4) what the texture is multiplied by, and how glossy the skin is."""
-    ring, eye = sculpt.carried(surface, where.mouth), sculpt.carried(surface, where.eye)
+    """(V, 4) factors of the texture (3), and gloss of the skin (1)."""
+    ring, eye = sculpt.interpolate_rings(surface, where.mouth), sculpt.interpolate_rings(surface, where.eye)
     near = ring != sculpt.FAR
     colours = np.ones((len(surface.vertices), 4))
     depth = np.where(near & (ring < 0), -ring, 0.0)
@@ -194,7 +199,7 @@ def _nostrils(surface: Refined) -> Float64:
 
 def _lashes(surface: Refined, where: sculpt.Marks) -> dict[str, mouth.Mesh]:
     """Lashes along the outer edge of each upper lid's margin."""
-    ring = sculpt.carried(surface, where.eye)
+    ring = sculpt.interpolate_rings(surface, where.eye)
     v = surface.vertices
     edge = (np.abs(ring - sculpt.MARGIN_RING - 1) < 1e-6) & (v[:, 0] > 0)
     inner, outer = v[edge, 0].argmin(), v[edge, 0].argmax()

@@ -19,16 +19,16 @@ GUM = np.array([0.52, 0.165, 0.145])
 TONGUE = np.array([0.50, 0.170, 0.155])
 TONGUE_UNDER = np.array([0.34, 0.09, 0.09])
 HALF_WIDTH, DEPTH = 0.0272, 0.0400
-"""The outer edge of the upper arch of teeth: half an ellipse."""
+"""Half axes of the outer edge of the upper arch of teeth, half an ellipse, metres."""
 LOWER_INSET = 0.0004
-"""How much smaller the lower arch is: the incisors' edges touch."""
+"""Metres by which the lower arch is smaller: the incisors' edges touch."""
 AROUND = 12
 
 
 def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
-    """A row of teeth and its gum: vertices, triangles, colours (V, 4), and the vertices of feature points.
+    """((vertices, triangles, colours (V, 4)) of a row of teeth and its gum, vertices of feature points).
 
-    front: (3,), where the edges of the middle incisors meet those of the other jaw.
+    front: (3,), point at which the edges of the middle incisors meet those of the other jaw.
     """
     sign = 1.0 if upper else -1.0
     inset = 0.0 if upper else LOWER_INSET
@@ -40,7 +40,10 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
         width, height, thick = (float(row[name]) / 1000 for name in ("width", "height", "thick"))
         place, turn = _arch(along + width / 2, inset)
         tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
-        meshes += [_placed(tooth, place, turn, front, 1.0), _placed(tooth, place, turn, front, -1.0)]
+        meshes += [
+            _place_tooth(tooth, place, turn, front, 1.0),
+            _place_tooth(tooth, place, turn, front, -1.0),
+        ]
         along += width + 0.00008
     # Of all lowest vertices of the first incisor the one nearest to the midline and the front.
     vertices = meshes[0][0]
@@ -53,11 +56,11 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     middle = np.flatnonzero(np.abs(gum[0][:, 0]) < 1e-9)
     high = middle[(gum[0][middle, 1] * sign).argmax()]
     found["root"] = start + int(high)
-    return _joined(meshes), found
+    return _join(meshes), found
 
 
 def _arch(length: float, inset: float) -> tuple[Float64, float]:
-    """Place (x, z below the front) at a length along the arch from its middle, and the turn about y."""
+    """(position (3,) relative to the front, turn about y) at a length along the arch from its middle."""
     angle = np.linspace(0, np.pi / 2, 400)
     x, z = (HALF_WIDTH - inset) * np.sin(angle), -DEPTH * (1 - np.cos(angle)) - inset
     run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
@@ -68,7 +71,7 @@ def _arch(length: float, inset: float) -> tuple[Float64, float]:
 
 
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
-    """A crown: its outer face at z = 0, its edge at y = 0, the gum towards sign x y."""
+    """The mesh of a crown: outer face at z = 0, edge at y = 0, gum towards sign x y."""
     turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     square = 2.8
     cx = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** (2 / square)
@@ -97,7 +100,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = np.stack([np.full(AROUND, last), ring, np.roll(ring, -1)], axis=1)
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
-    behind = 1 - 0.045 * (place - 1) ** 1.35  # those further back lie in the shade of the cheeks
+    behind = 1 - 0.045 * (place - 1) ** 1.35  # teeth further back lie in the shade of the cheeks
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * max(behind, 0.3)
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1]])
     # Between the teeth it is darker.
@@ -114,7 +117,7 @@ def _tube(rows: int, around: int, sign: float) -> Int64:
     return triangles if sign > 0 else triangles[:, ::-1].copy()
 
 
-def _placed(tooth: Mesh, place: Float64, turn: float, front: Float64, side: float) -> Mesh:
+def _place_tooth(tooth: Mesh, place: Float64, turn: float, front: Float64, side: float) -> Mesh:
     vertices, triangles, colours = tooth
     cos, sin = np.cos(turn), np.sin(turn)
     x = vertices[:, 0] * cos + vertices[:, 2] * sin
@@ -127,7 +130,7 @@ def _placed(tooth: Mesh, place: Float64, turn: float, front: Float64, side: floa
 
 
 def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) -> Mesh:
-    """The gum: a band along the arch, scalloped round the necks of the teeth."""
+    """The mesh of the gum: a band along the arch, scalloped round the necks of the teeth."""
     widths = np.array([float(row["width"]) for row in rows]) / 1000
     heights = np.array([float(row["height"]) for row in rows]) / 1000
     ends = np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
@@ -165,7 +168,7 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
 
 
 def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
-    """A tongue lying flat, its tip (3,) at the teeth; and the vertices of its feature points."""
+    """(mesh of a tongue lying flat, vertices of its feature points). tip: (3,), at the teeth."""
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
         (-68, -12, 17, 17), (-58, -4, 20, 21), (-48, 0.5, 22, 21), (-38, 2.0, 22.5, 19), (-28, 2.2, 21.5, 16),
@@ -215,7 +218,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     return mesh, found
 
 
-def _joined(meshes: list[Mesh]) -> Mesh:
+def _join(meshes: list[Mesh]) -> Mesh:
     starts = np.cumsum([0, *(len(mesh[0]) for mesh in meshes)])
     triangles = [mesh[1] + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
     return (

@@ -1,4 +1,4 @@
-"""The skin's texture: complexion, lips, brows, cropped hair, painted where they lie on the head."""
+"""The skin's texture: complexion, lips, brows and cropped hair, painted by position on the head."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ SCALP = np.array([112, 86, 73.0])
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """What lies at every texel: place (S, S, 3), metres; value (S, S, K); known (S, S)."""
+    """The surface at every texel.
+
+    place: (S, S, 3) position, metres. value: (S, S, K). known: (S, S) mask of covered texels.
+    """
 
     place: Float64
     value: Float64
@@ -40,7 +43,7 @@ class Chart:
 def chart(
     vertices: Float64, values: Float64, triangles: npt.NDArray[np.integer], uvs: Float64, size: int = SIZE
 ) -> Chart:
-    """Draw triangles (F, 3) at their corners' uvs (F, 3, 2), origin at the bottom left."""
+    """The chart of triangles (F, 3) with uvs (F, 3, 2) at their corners, origin at the bottom left."""
     data = np.concatenate([vertices, values], axis=1)
     out = np.zeros((size, size, data.shape[1]))
     known = np.zeros((size, size), dtype=bool)
@@ -58,7 +61,7 @@ def chart(
         wb = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / area
         wc = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / area
         wa = 1 - wb - wc
-        grown = -0.6 / max(np.sqrt(abs(area)), 1e-6)  # half a texel beyond, against seams
+        grown = -0.6 / max(np.sqrt(abs(area)), 1e-6)  # half a texel beyond the edge, to hide seams
         inside = (wa >= grown) & (wb >= grown) & (wc >= grown)
         weights = np.stack([wa, wb, wc], axis=-1)[inside]
         out[y[inside], x[inside]] = weights @ data[triangle]
@@ -67,7 +70,7 @@ def chart(
 
 
 def noise(places: Float64, scale: float, seed: int) -> Float64:
-    """Smooth noise in -1..1 over places (N, 3); scale: size of its grains, metres."""
+    """(N,) smooth noise in -1..1 at points (N, 3); scale: size of its grains, metres."""
     from scipy.ndimage import map_coordinates
 
     lattice = np.random.default_rng(seed).uniform(-1, 1, (48, 48, 48))
@@ -75,7 +78,7 @@ def noise(places: Float64, scale: float, seed: int) -> Float64:
 
 
 def paint(lay: Chart) -> Image.Image:
-    """The texture. lay.value: rings about the mouth, about the eyes, and whether it is the upper lip."""
+    """The texture of a chart. Its values: rings about mouth and eyes, upper lip or not."""
     p = lay.place[lay.known]
     ring_mouth, ring_eye, lip_side = (lay.value[lay.known][:, k] for k in range(3))
     colour = _complexion(p)
@@ -86,7 +89,7 @@ def paint(lay: Chart) -> Image.Image:
     cover = smooth(hair * 1.25 - 0.55 * speckle * (1 - hair))
     # Hairs end at the seam of the texture, at the back of the head: a darker ground hides it.
     seam = np.exp(-((p[:, 0] / 0.003) ** 2)) * (p[:, 2] < -0.12)
-    colour = _towards(colour, HAIR, hair * seam * 0.25)
+    colour = _blend(colour, HAIR, hair * seam * 0.25)
     colour = (
         colour * (1 - 0.72 * (cover * (1 - 0.3 * seam))[:, None])
         + SCALP * 0.72 * (cover * (1 - 0.3 * seam))[:, None]
@@ -96,39 +99,39 @@ def paint(lay: Chart) -> Image.Image:
     image = np.zeros((*lay.known.shape, 3))
     image[:] = SKIN
     image[lay.known] = colour
-    _spread(image, lay.known)
+    _fill_unknown(image, lay.known)
     picture = Image.fromarray(np.clip(image, 0, 255).astype(np.uint8))
     _strokes(picture, lay)
     return picture
 
 
-def encoded(picture: Image.Image, quality: int = 88) -> bytes:
+def encode_jpeg(picture: Image.Image, quality: int = 88) -> bytes:
     """The picture as a JPEG file."""
     buffer = io.BytesIO()
     picture.save(buffer, "JPEG", quality=quality, optimize=True, subsampling=0)
     return buffer.getvalue()
 
 
-def _towards(colour: Float64, other: Float64, share: Float64) -> Float64:
+def _blend(colour: Float64, other: Float64, share: Float64) -> Float64:
     return colour + (other - colour) * np.clip(share, 0, 1)[:, None]
 
 
 def _spot(p: Float64, centre: tuple[float, float, float], radius: float) -> Float64:
-    """1 in the middle of a spot on either side of the face, 0 at its edge; millimetres."""
+    """(N,) 1 in the middle of a spot on both sides of the face, 0 at its edge; centre, radius: mm."""
     folded = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1) * 1000
     return 1 - smooth(np.linalg.norm(folded - centre, axis=1) / radius)
 
 
 def _complexion(p: Float64) -> Float64:
     colour = np.tile(SKIN, (len(p), 1))
-    colour = _towards(colour, NECK, smooth((-0.095 - p[:, 1]) / 0.05) * 0.9)
+    colour = _blend(colour, NECK, smooth((-0.095 - p[:, 1]) / 0.05) * 0.9)
     broad = 0.75 + 0.5 * noise(p, 0.011, 1)
     for centre, radius, share in (
         ((40, -40, -4), 40, 0.55), ((0, -38, 33), 24, 0.45), ((14, -40, 14), 14, 0.35),
         ((0, -104, 6), 26, 0.25),
         ((84, -15, -98), 44, 0.5), ((0, 40, 12), 40, 0.10),
     ):  # fmt: skip
-        colour = _towards(colour, BLUSH, _spot(p, centre, radius) * share * broad)
+        colour = _blend(colour, BLUSH, _spot(p, centre, radius) * share * broad)
     colour += np.array([5, 3.2, 2.4]) * (noise(p, 0.018, 2) * 0.8 + noise(p, 0.007, 3) * 0.7)[:, None]
     red = noise(p, 0.0042, 4)[:, None] * np.array([1.5, -2.4, -2.6])
     fine = noise(p, 0.0011, 5)[:, None] * np.array([2.6, 2.6, 2.4])
@@ -136,7 +139,7 @@ def _complexion(p: Float64) -> Float64:
     nose = np.clip(_spot(p, (6, -34, 24), 26) + _spot(p, (28, -34, 6), 26) * 0.7, 0, 1)[:, None]
     colour += red + fine - pores * (6 + 26 * nose) * np.array([0.8, 1.0, 1.0])
     freckle = smooth((noise(p, 0.0021, 7) - 0.62) / 0.2) * smooth((noise(p, 0.010, 8) + 0.2) / 0.8)
-    return _towards(colour, np.array([178, 118, 92.0]), freckle * 0.30 * _spot(p, (24, -26, 8), 42))
+    return _blend(colour, np.array([178, 118, 92.0]), freckle * 0.30 * _spot(p, (24, -26, 8), 42))
 
 
 def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
@@ -145,14 +148,14 @@ def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
     upper = _spot(p, (31, 8, 1), 17) * (y > -1)
     lower = _spot(p, (26, -10, 0), 15) * (y <= -1)
     inner = _spot(p, (17, 1, 2), 13)
-    colour = _towards(colour, SOCKET, upper * 0.42 + lower * 0.30 + inner * 0.25)
+    colour = _blend(colour, SOCKET, upper * 0.42 + lower * 0.30 + inner * 0.25)
     lid = near & (ring < 5.0)
-    colour = _towards(colour, WATERLINE, np.where(lid, smooth((4.2 - ring) / 2.4) * 0.75, 0))
+    colour = _blend(colour, WATERLINE, np.where(lid, smooth((4.2 - ring) / 2.4) * 0.75, 0))
     # The root of the lashes draws a line along the margin's outer edge.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
     line *= smooth((x - 19.0) / 5.0)
-    colour = _towards(colour, HAIR, line)
+    colour = _blend(colour, HAIR, line)
     caruncle = near & (ring < 1.6) & (x < 24)
     return np.where(caruncle[:, None], CARUNCLE + noise(p, 0.001, 9)[:, None] * 10, colour)
 
@@ -164,18 +167,18 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64) -> Float64
     red = np.where(near, smooth((border + 0.55 - ring) / 1.0), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
     lip = LIP + lines[:, None] * np.array([9, 9, 8.0]) + (side > 0)[:, None] * np.array([-8, -7, -6.0])
-    colour = _towards(colour, lip, red * 0.88)
+    colour = _blend(colour, lip, red * 0.88)
     seam = np.where(near, smooth((2.1 - ring) / 1.2), 0.0)
-    colour = _towards(colour, LIP_LINE, seam * 0.8)
+    colour = _blend(colour, LIP_LINE, seam * 0.8)
     inside = np.where(near, smooth((0.6 - ring) / 1.2), 0.0)
-    colour = _towards(colour, MOUTH, inside)
-    # A light edge above the upper lip catches the eye.
+    colour = _blend(colour, MOUTH, inside)
+    # A light edge above the upper lip.
     edge = np.where(near & (side > 0), np.exp(-(((ring - border - 0.9) / 0.5) ** 2)), 0.0) * (1 - corner)
-    return _towards(colour, SKIN + 12, edge * 0.35)
+    return _blend(colour, SKIN + 12, edge * 0.35)
 
 
-def _spread(image: Float64, known: npt.NDArray[np.bool_]) -> None:
-    """Colours carried into what no triangle covers, so that nothing bleeds in at the seams."""
+def _fill_unknown(image: Float64, known: npt.NDArray[np.bool_]) -> None:
+    """Fill texels that no triangle covers with the nearest colour, in place, so that seams do not show."""
     from scipy.ndimage import distance_transform_edt
 
     _, (row, column) = distance_transform_edt(~known, return_indices=True)
@@ -183,7 +186,7 @@ def _spread(image: Float64, known: npt.NDArray[np.bool_]) -> None:
 
 
 def _strokes(picture: Image.Image, lay: Chart) -> None:
-    """Single hairs: cropped ones on the scalp, longer ones in the brows."""
+    """Draw single hairs onto the picture: cropped ones on the scalp, longer ones in the brows."""
     random = np.random.default_rng(17)
     step_x = np.gradient(lay.place, axis=1)
     step_y = np.gradient(lay.place, axis=0)
@@ -221,7 +224,7 @@ def _strokes(picture: Image.Image, lay: Chart) -> None:
 
 
 def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:
-    """Hairs grow upwards at the inner end, outwards along the brow, and down at its tail."""
+    """(N, 3) hairs of the brow, metres: upwards at its inner end, outwards along it, down at its tail."""
     lean = np.interp(along, [0.0, 0.2, 0.6, 1.0], [78.0, 42.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
     middle = np.interp(np.abs(p[:, 0]), [0.012, 0.035, 0.06], [0.0148, 0.0232, 0.0135])
     lean = np.radians(lean - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
@@ -230,7 +233,7 @@ def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Floa
 
 
 def _in_texels(step_x: Float64, step_y: Float64, direction: Float64) -> Float64:
-    """(N, 2) texels that a way (N, 3) on the surface takes."""
+    """(N, 2) texels of directions (N, 3) on the surface."""
     xx, yy, xy = ((a * b).sum(axis=1) for a, b in ((step_x, step_x), (step_y, step_y), (step_x, step_y)))
     dx, dy = ((step * direction).sum(axis=1) for step in (step_x, step_y))
     det = np.maximum(xx * yy - xy**2, 1e-24)

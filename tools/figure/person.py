@@ -19,28 +19,31 @@ Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 
 WIDER = 0.024
-"""Metres that each shoulder is set out: joints 0.37 m apart, in the middle of adults of this height."""
+"""Metres by which each shoulder is moved out: joints 0.37 m apart, average for adults of this height."""
 NECK, GIRDLE = 0.085, 0.155
-"""Metres from the midline: nearer than the first nothing is set out, from the second on everything."""
+"""Metres from the midline: up to the first nothing is moved out, from the second on everything."""
 CHEST = (1.10, 1.34)
-"""Heights between which the trunk comes to be set out."""
+"""Heights over which moving out the trunk fades in, metres."""
 CHEST_LEAST = 0.25
-"""What the waist takes of it."""
+"""Share of it at the waist."""
 SLIMMER = 0.012
-"""Metres that the outside of each thigh is drawn in."""
+"""Metres by which the outside of each thigh is moved in."""
 THIGH, THIGH_HIGH = 0.84, 0.15
-"""Where, and over how much height."""
+"""Height of its middle, and its extent, metres."""
 BENDS = (("?_knee", (0.0, 0.0, 1.0), 0.090), ("?_elbow", (0.0, 0.0, -1.0), 0.064))
-"""Joints about which the surface is cut finer: the side that stretches when they bend, and how far."""
+"""Joints about which the surface is refined: direction of the side that stretches, and radius in metres."""
 PAST = 0.02
-"""How far this reaches round to the other side, metres."""
+"""Metres by which the refined region extends to the other side."""
 
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """vertices (V, 3), metres. triangles (F, 3). tile (F,): the texture that each lay on, 0 the head's.
-    inner (F,): within mouth and eye sockets. blend: sparse (V, the figure's vertices), what carries a
-    value of these to them. arms (V,): how far they are the arms'."""
+    """The figure in the person's proportions.
+
+    vertices (V, 3), metres. triangles (F, 3). tile (F,): texture of each, 0 the head's. inner (F,): mask of
+    triangles within mouth and eye sockets. blend: sparse (V, the figure's vertices), interpolates values of
+    these to the vertices. arms (V,): weight of the arms.
+    """
 
     vertices: Float64
     triangles: Int64
@@ -50,14 +53,14 @@ class Person:
     arms: Float64
 
     def vertices_of(self, faces: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        """(V,) vertices that any of the faces uses."""
+        """(V,) mask of the vertices that any of the faces uses."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.triangles[faces]] = True
         return used
 
 
-def person(surface: figure.Surface, places: dict[str, Float64], arms: Float64) -> Person:
-    """The person on a figure. places: its joints by name. arms (V,): how far the arms carry each vertex."""
+def make_person(surface: figure.Surface, places: dict[str, Float64], arms: Float64) -> Person:
+    """The person made from a figure. places: joints by name. arms (V,): weight of the arms per vertex."""
     middle = surface.vertices[surface.quads].mean(axis=1)
     chosen = np.zeros(len(middle), dtype=bool)
     for joint, side, reach in BENDS:
@@ -71,7 +74,7 @@ def person(surface: figure.Surface, places: dict[str, Float64], arms: Float64) -
     high = (surface.vertices[surface.quads][:, :, 1] > figure.EYE_LEVEL - 0.12).all(axis=1)
     vertices = np.concatenate([surface.vertices, refined.vertices[len(surface.vertices) :]])
     return Person(
-        proportioned(vertices, arms),
+        reproportion(vertices, arms),
         refined.triangles,
         surface.tile[refined.quads],
         ((surface.tile == 1) & high)[refined.quads],
@@ -80,8 +83,8 @@ def person(surface: figure.Surface, places: dict[str, Float64], arms: Float64) -
     )
 
 
-def proportioned(places: Float64, arms: Float64) -> Float64:
-    """Places (N, 3) of the figure as those of the person. arms (N,): how far they are the arms'."""
+def reproportion(places: Float64, arms: Float64) -> Float64:
+    """Points (N, 3) of the figure in the person's proportions. arms (N,): weight of the arms."""
     x, height = np.abs(places[:, 0]), places[:, 1]
     chest = CHEST_LEAST + (1 - CHEST_LEAST) * _smooth((height - CHEST[0]) / (CHEST[1] - CHEST[0]))
     chest *= _smooth((height - 0.95) / 0.15)

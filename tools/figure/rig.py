@@ -1,7 +1,7 @@
-"""The figure's rig in the standard's terms: H-Anim joints, what each moves, and how they stand.
+"""The figure's rig in the standard's terms: H-Anim joints, their weights and their modelled rotations.
 
-The figure was modelled with its arms held off its sides. `Rig.bind` says how each joint is turned
-there, seen from the standard's default posture (arms at the sides, palms to the thighs, feet forward).
+The figure was modelled with its arms held off its sides. `Rig.bind` holds the rotation of each joint there,
+relative to the standard's default posture (arms at the sides, palms to the thighs, feet forward).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import bending
 import figure
 import numpy as np
 import numpy.typing as npt
-from person import Person, person, proportioned
+from person import Person, make_person, reproportion
 
 from fba.body import Skeleton
 from fba.body.solve.bind_pose import (
@@ -29,7 +29,7 @@ from fba.body.solve.bind_pose import (
 Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 SKULLBASE = np.array([0.0, 1.6182, -0.0177])
-"""Where the head turns: feature point 7.1 of the built-in head."""
+"""Centre of the head's rotation: feature point 7.1 of the built-in head."""
 TORSO = ("Root", "Hips", "Spine1", "Spine2", "Chest")
 NECK = ("Neck1", "Neck2")
 ARM = ("shoulder", "elbow", "wrist", "thumb", *FINGERS)
@@ -38,8 +38,11 @@ HEAD = ("Head", "HeadEnd", "Jaw", "LeftEye", "RightEye")
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """names: J joints, parents first. parents (J,). centres (J, 3): in the default posture, metres.
-    bind (J, 4, 4): each joint as the person is modelled. weights (V, J) of its vertices: rows sum to 1."""
+    """A rig of J joints.
+
+    names: of the joints, parents first. parents (J,). centres (J, 3): in the default posture, metres.
+    bind (J, 4, 4): each joint as the person is modelled. weights (V, J) of its vertices: rows sum to 1.
+    """
 
     names: tuple[str, ...]
     parents: npt.NDArray[np.int64]
@@ -48,22 +51,24 @@ class Rig:
     weights: Float64
 
 
-def rig() -> tuple[Person, Rig]:
+def make_rig() -> tuple[Person, Rig]:
     """The person, and its rig."""
     surface, data = figure.load()
     default = Skeleton.default()
-    given = _places(data, default)
+    given = _joint_positions(data, default)
     coarse = _weights(surface, data, default, given)
     arm = np.array([name[2:].startswith(ARM) for name in default.names])
-    made = person(surface, dict(zip(default.names, given, strict=True)), coarse[:, arm].sum(axis=1))
-    places = proportioned(given, arm.astype(np.float64))
+    made = make_person(surface, dict(zip(default.names, given, strict=True)), coarse[:, arm].sum(axis=1))
+    places = reproportion(given, arm.astype(np.float64))
     bind = bind_matrices(places)
-    weights = bending.evened(made, dict(zip(default.names, places, strict=True)), made.blend @ coarse)
+    weights = bending.ease_limb_weights(
+        made, dict(zip(default.names, places, strict=True)), made.blend @ coarse
+    )
     return made, Rig(default.names, default.parents, skeleton_in_default_posture(bind).centres, bind, weights)
 
 
-def _places(data: dict[str, np.ndarray], default: Skeleton) -> Float64:
-    """(J, 3) where the joints are in the figure as modelled."""
+def _joint_positions(data: dict[str, np.ndarray], default: Skeleton) -> Float64:
+    """(J, 3) positions of the joints in the figure as modelled, metres."""
     source = dict(zip(data["joint_names"].tolist(), data["joint_centres"].astype(np.float64), strict=True))
     places = np.full((len(default), 3), np.nan)
     with (HERE / "rig.csv").open(encoding="utf-8") as file:
@@ -73,11 +78,11 @@ def _places(data: dict[str, np.ndarray], default: Skeleton) -> Float64:
                 end = source[row["to"].replace("?", word)] if row["to"] else start
                 name = row["joint"].replace("?", side)
                 places[default.number(name)] = start + (end - start) * float(row["share"])
-    for side in "lr":  # where a foot turns on its heel, and bends at its middle
+    for side in "lr":  # joints at the heel and in the middle of the foot
         ankle, toe = (places[default.number(f"{side}_{joint}")] for joint in ("ankle", "metatarsal"))
         places[default.number(f"{side}_subtalar")] = [ankle[0], ankle[1] * 0.55, ankle[2] + 0.012]
         places[default.number(f"{side}_midtarsal")] = (ankle * 0.4 + toe * 0.6) + (0, 0.008, 0)
-    # Vertebrae stand along the figure's spine as they stand along the standard's.
+    # Vertebrae are distributed along the figure's spine in the standard's proportions.
     knots = np.array([source[name] for name in ("Hips", "Spine1", "Spine2", "Chest", "Neck1", "Neck2")])
     knots = np.concatenate([knots, SKULLBASE[None]])
     place_vertebrae(places, knots, 4)
@@ -112,9 +117,9 @@ def _weights(
             height, places[numbers, 1], 1 if group == "torso" else 0
         )
     weights[:, default.number("skullbase")] += given[:, [source.index(name) for name in HEAD]].sum(axis=1)
-    for side in "lr":  # the sole's parts: toes bend, the rest follows the ankle
-        _split(weights, default, surface, f"{side}_ankle", f"{side}_midtarsal", places)
-        # The shoulder girdle: what is near the arm goes with the blade.
+    for side in "lr":  # the foot: toes bend, the rest follows the ankle
+        _share_forward(weights, default, surface, f"{side}_ankle", f"{side}_midtarsal", places)
+        # The shoulder girdle: weight near the arm goes to the blade.
         out = np.abs(surface.vertices[:, 0])
         far = _smooth((out - 0.07) / 0.06)
         inner, outer = (
@@ -125,10 +130,10 @@ def _weights(
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def _split(
+def _share_forward(
     weights: Float64, default: Skeleton, surface: figure.Surface, rear: str, front: str, places: Float64
 ) -> None:
-    """Part of what one joint moves given to the joint before it, by how far forward it is."""
+    """Give part of the rear joint's weight to the front joint, in place, by how far forward vertices are."""
     a, b = default.number(rear), default.number(front)
     ahead = _smooth((surface.vertices[:, 2] - places[b, 2] + 0.02) / 0.04)
     weights[:, b] += weights[:, a] * ahead

@@ -1,6 +1,6 @@
-"""The base head made into the standard's neutral face, with an adult's proportions.
+"""Reshapes the base head into the standard's neutral face, with an adult's proportions.
 
-The base has small eyes that look a little down and a narrow mouth. Published norms of adults ask for
+The base has small eyes that look a little down and a narrow mouth. Published norms of adults have
 eyes some 29 mm wide and 34 mm apart and a mouth of 51 mm; the standard asks for lids that touch the rim
 of the iris above and below, and lips that touch along a level line.
 """
@@ -23,20 +23,20 @@ EYE_RADIUS = 0.0123
 IRIS = 0.0108
 """Diameter of the iris and height of the eye opening: IRISD0."""
 LID_GAP = 0.00022
-"""Between the inner edge of a lid and the eyeball."""
+"""Metres between the inner edge of a lid and the eyeball."""
 INNER_CORNER, OUTER_CORNER = np.array([0.0199, -0.0041]), np.array([0.0441, -0.0012])
 """Corners of the base's left eye opening, x and y."""
 MARGIN_RING = 2
-"""Inner edge of the lid margin: its ring about the border of the eye socket."""
+"""Ring of the lid margin's inner edge, counted from the border of the eye socket."""
 MOUTH = np.array([0.0, -0.0708])
-"""Where the lips meet."""
+"""Point at which the lips meet, x and y."""
 CONTACT_RING = 1
-"""Where the lips touch: its ring about the border of the inside of the mouth."""
+"""Ring along which the lips touch, counted from the border of the inside of the mouth."""
 
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """Where vertices are on the head, by rings of edges.
+    """Regions of the head's vertices, by rings of edges.
 
     eye: (V,) rings about the border of the left or right eye socket, positive on the outside, negative
     within, 99 far away. mouth: the same about the border of the inside of the mouth. lip: (V,) 1 on the
@@ -50,32 +50,32 @@ class Marks:
 
 FAR = 99
 ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
-"""Of the finished head, between the pupils, in the frame of `figure.head`."""
+"""Origin of the finished head, between the pupils, in the frame of `figure.head`."""
 
 
-def carried(refined: Refined, ring: npt.NDArray[np.int64]) -> Float64:
-    """A ring number on the coarse vertices, on the fine ones between them too."""
+def interpolate_rings(refined: Refined, ring: npt.NDArray[np.int64]) -> Float64:
+    """Ring numbers of the coarse vertices interpolated to the fine ones."""
     value = refined.blend @ ring.astype(np.float64)
     far = refined.blend @ (ring == FAR).astype(np.float64)
     return np.where(far > 0, FAR, value)
 
 
-def marks(head: Surface) -> Marks:
-    """Rings about eyes and mouth of the base head."""
+def find_marks(head: Surface) -> Marks:
+    """The marks of the base head."""
     inside, outside = head.vertices_of(head.tile == 1), head.vertices_of(head.tile == 0)
     border = inside & outside
     low = head.vertices[:, 1] < -0.03
-    eye, mouth = (_signed(head, border & chosen, inside & ~border) for chosen in (~low, low))
+    eye, mouth = (_signed_rings(head, border & chosen, inside & ~border) for chosen in (~low, low))
     return Marks(eye, mouth, _lips(head, mouth))
 
 
-def _signed(head: Surface, border: npt.NDArray[np.bool_], inside: npt.NDArray[np.bool_]) -> Int64:
+def _signed_rings(head: Surface, border: npt.NDArray[np.bool_], inside: npt.NDArray[np.bool_]) -> Int64:
     rings = head.rings(np.flatnonzero(border), 16)
     return np.where(rings < 0, FAR, np.where(inside, -rings, rings))
 
 
-def sculpted(head: Surface, where: Marks) -> Surface:
-    """The base head with its eyes and mouth in proportion; symmetric as the base is."""
+def sculpt_head(head: Surface, where: Marks) -> Surface:
+    """The base head with its eyes, mouth and nose in proportion; symmetric as the base is."""
     vertices = head.vertices.copy()
     vertices = _wider_eyes(vertices, where)
     for _ in range(4):  # laying the lids on the eyeballs moves them a little each time
@@ -87,7 +87,7 @@ def sculpted(head: Surface, where: Marks) -> Surface:
 
 
 def _both_sides(vertices: Float64) -> tuple[Float64, Float64]:
-    """The head folded onto its left side, and the sign of each vertex."""
+    """(vertices mirrored onto the left side, sign of x of each vertex)."""
     sign = np.where(vertices[:, 0] < 0, -1.0, 1.0)
     return vertices * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1), sign
 
@@ -121,8 +121,8 @@ def eye_corners() -> tuple[Float64, Float64]:
     return inner, outer
 
 
-def column(x: Float64) -> Float64:
-    """How far each x is from the corners of the left eye: 0 there, 1 in the middle of the opening."""
+def opening_profile(x: Float64) -> Float64:
+    """(N,) height of the lid opening at each x: 0 at the corners of the left eye, 1 in the middle."""
     inner, outer = eye_corners()
     t = np.clip((x - inner[0]) / (outer[0] - inner[0]), 0, 1)
     middle = (EYE_CENTRE[0] - inner[0]) / (outer[0] - inner[0])
@@ -131,7 +131,7 @@ def column(x: Float64) -> Float64:
 
 
 def upper_side(x: Float64, y: Float64) -> npt.NDArray[np.bool_]:
-    """Whether places near the left eye are above the line through its corners."""
+    """(N,) mask of points near the left eye above the line through its corners."""
     inner, outer = eye_corners()
     return y > np.interp(x, [inner[0], outer[0]], [inner[1], outer[1]])
 
@@ -154,18 +154,18 @@ def _open_lids(vertices: Float64, where: Marks) -> Float64:
         x, y = left[edge, 0][order], left[edge, 1][order]
         move = wanted[side] - np.interp(EYE_CENTRE[0], x, y)
         fade = np.where(ring >= 0, 1 - smooth((ring - 4) / 8.0), 1 - smooth(-ring / 3.0))
-        shift = move * column(left[:, 0]) * fade * mine
+        shift = move * opening_profile(left[:, 0]) * fade * mine
         left[:, 1] += shift
     left = _onto_eyeball(left, ring, region)
     return left * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1)
 
 
 def _onto_eyeball(left: Float64, ring: Int64, region: npt.NDArray[np.bool_]) -> Float64:
-    """Lids laid on the eyeball, with what surrounds them; the socket kept clear of it."""
+    """Vertices with the lids and their surroundings laid on the eyeball, and the socket clear of it."""
     offset = left - EYE_CENTRE
     away = np.linalg.norm(offset, axis=1)
     edge = region & (ring == MARGIN_RING)
-    # Where the margin has to go, looked up by direction for the rings outside it.
+    # The margin's displacement, looked up by direction for the rings outside it.
     angle = np.arctan2(offset[:, 1], offset[:, 0])
     order = np.argsort(angle[edge])
     towards = (EYE_RADIUS + LID_GAP - away[edge])[order]
@@ -184,8 +184,8 @@ def _onto_eyeball(left: Float64, ring: Int64, region: npt.NDArray[np.bool_]) -> 
     return EYE_CENTRE + offset / away[:, None] * keep_out[:, None]
 
 
-def laid_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
-    """Lid margins and sockets of the refined head, clear of the eyeballs again."""
+def lay_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
+    """Vertices of the refined head with lid margins and sockets clear of the eyeballs again."""
     left, sign = _both_sides(vertices)
     offset = left - EYE_CENTRE
     away = np.linalg.norm(offset, axis=1)
@@ -198,7 +198,7 @@ def laid_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
 
 
 def _mouth(vertices: Float64, where: Marks) -> Float64:
-    """A wider mouth, whose lips touch along a level line."""
+    """Vertices with a wider mouth, whose lips touch along a level line."""
     ring, lip = where.mouth, where.lip
     away = np.hypot(vertices[:, 0] / 1.25, vertices[:, 1] - MOUTH[1])
     weight = np.where(vertices[:, 2] > 0.02, 1 - smooth((away - 0.016) / 0.022), 0.0)
@@ -231,7 +231,7 @@ def _mouth(vertices: Float64, where: Marks) -> Float64:
 
 
 def _fuller_lips(vertices: Float64, where: Marks) -> Float64:
-    """The red of the lips a little higher and rounder; where they meet stays."""
+    """Vertices with the red of the lips a little higher and rounder; the line of contact stays."""
     out = np.where(where.mouth == FAR, 0, np.maximum(where.mouth - CONTACT_RING, 0)).astype(np.float64)
     fade = np.where(out > 0, np.exp(-(((out - 3.0) / 2.2) ** 2)), 0.0)
     middle = 1 - smooth((np.abs(vertices[:, 0]) - 0.006) / 0.018)
@@ -243,7 +243,7 @@ def _fuller_lips(vertices: Float64, where: Marks) -> Float64:
 
 
 def _nose(vertices: Float64) -> Float64:
-    """The tip a little lower, so that the nostrils look down and not ahead."""
+    """Vertices with the tip of the nose a little lower, so that the nostrils face down, not ahead."""
     tip = np.array([0.0, -0.0385, 0.106])
     away = np.linalg.norm((vertices - tip) * (0.75, 1.0, 0.8), axis=1)
     weight = 1 - smooth((away - 0.004) / 0.020)

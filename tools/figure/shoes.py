@@ -17,22 +17,22 @@ AROUND = 44
 ROOM = 0.007
 """Metres between foot and outline."""
 THICK = 0.019
-"""Height of the sole."""
+"""Height of the sole, metres."""
 SPRING = 0.007
-"""How far the tip of the sole is off the ground."""
+"""Height of the tip of the sole above the ground, metres."""
 TOP = 0.115
 COVERED = 0.115
-"""The foot is wholly inside the shoe, or the trousers, below this."""
+"""Height below which the foot is entirely inside shoe or trousers, metres."""
 UPPER = (0.0, 0.10, 0.22, 0.36, 0.50, 0.64, 0.76, 0.86, 0.94, 1.0)
-"""Where along its way from the sole to the ankle the upper has its rings."""
+"""Positions of the upper's rings on the way from sole to ankle, 0..1."""
 
 
-def shoes(body: Float64, weights: Float64) -> Garment:
+def make_shoes(body: Float64, weights: Float64) -> Garment:
     """Both shoes, for vertices (V, 3) of the person as modelled. weights (V, J)."""
     left = body[:, 0] > 0
     foot = np.flatnonzero(left & (body[:, 1] < TOP + 0.01))
     vertices, triangles, colours = _shoe(body[foot])
-    carried = _carried(vertices, body[foot], weights[foot])
+    carried = _nearest_weights(vertices, body[foot], weights[foot])
     other = vertices * (-1.0, 1.0, 1.0)
     return Garment(
         np.concatenate([vertices, other]),
@@ -45,7 +45,7 @@ def shoes(body: Float64, weights: Float64) -> Garment:
 
 
 def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
-    """Vertices, triangles and colours of the left shoe about the vertices of a foot."""
+    """(vertices, triangles, colours) of the left shoe about the vertices of a foot."""
     low = foot[foot[:, 1] < 0.05]
     ahead, origin = _direction(low)
     aside = np.array([ahead[2], 0.0, -ahead[0]])
@@ -68,7 +68,7 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
     colours.append(LEATHER)
     reach = np.linalg.norm(top - welt, axis=1)
     front = _smooth((forward - 0.55) / 0.40)
-    # Up from the welt, and in from the side of the ankle: two handles of a cubic curve.
+    # Handles of a cubic curve: up from the welt, and inwards from the side of the ankle.
     rise = 0.034 + 0.006 * front
     slope = np.minimum(0.55 * reach, 0.085)
     for t in UPPER:
@@ -101,13 +101,13 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
 
 
 def vertices_out(vertices: Float64, triangles: Int64) -> Float64:
-    """(V,) how far normals point away from the middle of a mesh."""
+    """(V,) component of normals away from the middle of a mesh; positive where they point outwards."""
     normals = vertex_normals(vertices, triangles)
     return (normals * (vertices - vertices.mean(axis=0))).sum(axis=1)
 
 
 def _direction(low: Float64) -> tuple[Float64, Float64]:
-    """Unit vector ahead along the foot, level, and the middle of the foot on the ground."""
+    """(level unit vector ahead along the foot, middle of the foot on the ground)."""
     flat = low[:, [0, 2]] - low[:, [0, 2]].mean(axis=0)
     _, _, axes = np.linalg.svd(flat, full_matrices=False)
     ahead = np.array([axes[0, 0], 0.0, axes[0, 1]])
@@ -117,7 +117,7 @@ def _direction(low: Float64) -> tuple[Float64, Float64]:
 
 
 def _outline(flat: Float64) -> Float64:
-    """(AROUND, 2) the sole's outline about places (N, 2), evenly along, counter-clockwise from above."""
+    """(AROUND, 2) the sole's outline about points (N, 2), evenly spaced, counter-clockwise from above."""
     from scipy.spatial import ConvexHull
 
     hull = flat[ConvexHull(flat).vertices]
@@ -125,7 +125,7 @@ def _outline(flat: Float64) -> Float64:
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
     fine = np.linspace(0, along[-1], 400, endpoint=False)
     places = np.stack([np.interp(fine, along, closed[:, k]) for k in (0, 1)], axis=1)
-    # A shoe is drawn in at its waist, and rounder than toes.
+    # A shoe is narrower at its waist, and rounder than toes.
     forward = (places[:, 1] - places[:, 1].min()) / np.ptp(places[:, 1])
     middle = np.interp(places[:, 1], *_spine(places))
     waist = 1 - 0.10 * np.exp(-(((forward - 0.42) / 0.16) ** 2))
@@ -141,7 +141,7 @@ def _outline(flat: Float64) -> Float64:
 
 
 def _spine(places: Float64) -> tuple[Float64, Float64]:
-    """Levels along the foot, and the middle between both sides there."""
+    """(positions along the foot, middles between both sides there)."""
     levels = np.linspace(places[:, 1].min(), places[:, 1].max(), 12)
     middles = []
     for level in levels:
@@ -164,7 +164,7 @@ def _level(outline: Float64, lift: Float64, height: float) -> Float64:
 
 
 def _tube(rings: int) -> Int64:
-    """Triangles between rings."""
+    """Triangles that join successive rings."""
     k = np.arange(AROUND)
     after = (k + 1) % AROUND
     found = []
@@ -177,8 +177,8 @@ def _tube(rings: int) -> Int64:
     return np.concatenate(found)
 
 
-def _carried(places: Float64, foot: Float64, weights: Float64) -> Float64:
-    """(N, J) weights of the nearest places of the foot, evened."""
+def _nearest_weights(places: Float64, foot: Float64, weights: Float64) -> Float64:
+    """(N, J) weights averaged over the nearest vertices of the foot."""
     from scipy.spatial import cKDTree
 
     away, rows = cKDTree(foot).query(places, k=12)

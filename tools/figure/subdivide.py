@@ -18,11 +18,11 @@ Int64 = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """Triangles over vertices, and what each vertex was before.
+    """A refined surface and its relation to the coarse one.
 
     vertices: (V, 3). triangles: (F, 3). corners: (F, 3), rows of uvs. uvs: (U, 2). quads: (F,), the quad
     of the coarse surface that each triangle lies in. blend: sparse (V, coarse vertices), averages that
-    carry any value on the coarse vertices to the fine ones.
+    interpolate any value of the coarse vertices to the fine ones.
     """
 
     vertices: Float64
@@ -34,7 +34,10 @@ class Refined:
 
 
 def refine(surface: Surface, chosen: npt.NDArray[np.bool_], fit: int = 4) -> Refined:
-    """Subdivide the chosen quads (F,) once. fit: rounds of making the result pass through the cage."""
+    """The surface with the chosen quads (mask (F,)) subdivided once.
+
+    fit: rounds of adjusting the cage so that the result passes through the surface's vertices.
+    """
     from scipy.sparse import csr_matrix, eye
 
     count = len(surface.vertices)
@@ -122,7 +125,7 @@ def _cut(
     face_row: Int64,
     vertices: Float64,
 ) -> tuple[Int64, Int64, Float64, Int64]:
-    """Triangles of all faces, their texture corners, and the quad that each came from."""
+    """(triangles of all faces, their texture corners, uvs, the quad that each came from)."""
     triangles: list[list[int]] = []
     corners: list[list[int]] = []
     owner: list[int] = []
@@ -162,17 +165,17 @@ def _cut(
             polygons = [(ring, ring_uv)]
         for ring, ring_uv in polygons:
             straight = [not chosen[face] and vertex in middles for vertex in ring]
-            for a, b, c in _triangulated(ring, vertices, straight):
+            for a, b, c in _triangulate(ring, vertices, straight):
                 triangles.append([ring[a], ring[b], ring[c]])
                 corners.append([ring_uv[a], ring_uv[b], ring_uv[c]])
                 owner.append(face)
     return np.array(triangles), np.array(corners), np.array(uvs), np.array(owner)
 
 
-def _triangulated(ring: list[int], vertices: Float64, straight: list[bool]) -> list[tuple[int, int, int]]:
-    """A polygon as triangles, always across its shortest diagonal; ties alike on both sides of a face.
+def _triangulate(ring: list[int], vertices: Float64, straight: list[bool]) -> list[tuple[int, int, int]]:
+    """Triangles of a polygon, cut along its shortest diagonals; ties are broken symmetrically.
 
-    straight: corners that are none, in the middle of a side; cutting them off would leave slivers.
+    straight: corners in the middle of a side; cutting these off would leave slivers.
     """
     left = list(range(len(ring)))
     found = []

@@ -1,1 +1,1 @@
-"""The sample performance: curves, a skeleton and a face that follow keys, and their files."""
+"""The sample performance: curves, a skeleton and a face animated by keys, and their files."""

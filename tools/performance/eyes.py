@@ -1,24 +1,24 @@
-"""Eyes and lids: eyes stay on what they look at while the head moves, lids follow them and blink."""
+"""Eyes and lids: eyes hold their gaze while the head moves, lids follow them and blink."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from performance.curves import RATE, Float, moments, rows
+from performance.curves import RATE, Float, read_table, sample_times
 
 SHUT_TOP, SHUT_BOTTOM = 930.0, 110.0
-"""IRISD units of both lids of a closed eye: together more than 1024, the height of the opening."""
+"""FAP values of both lids of a closed eye: together more than 1024, the height of the opening."""
 FOLLOW_TOP, FOLLOW_BOTTOM = 13.0, -6.0
-"""Units a lid moves by for each degree that the eye looks down."""
+"""FAP units by which a lid moves for each degree that the eye looks down."""
 OPEN = 60.0
-"""Units by which awake eyes are opened wider than those of the neutral face."""
+"""FAP units by which awake eyes are opened wider than those of the neutral face."""
 STILL = 30
-"""Moments (0.1 s) between the small flicks that eyes make all the time."""
+"""Samples (0.1 s) between the small flicks that eyes make all the time."""
 
 
 def eyeballs(yaw: Float, pitch: Float, head: Rotation) -> tuple[Float, Float]:
-    """Degrees (T,) to the left and down, in the head, for a gaze in the world (degrees, T)."""
+    """((T,) left, (T,) down) of the eyeballs in the head, degrees, for a gaze in the world, degrees."""
     turn = np.deg2rad([yaw, pitch])
     looked = np.stack(
         [np.sin(turn[0]) * np.cos(turn[1]), -np.sin(turn[1]), np.cos(turn[0]) * np.cos(turn[1])], axis=-1
@@ -28,7 +28,7 @@ def eyeballs(yaw: Float, pitch: Float, head: Rotation) -> tuple[Float, Float]:
 
 
 def lids(pitch: Float, squint: Float, smile: Float) -> tuple[Float, Float]:
-    """FAPs (T,) of top and bottom lids, downward and upward. squint: -1 wide .. 1 narrow."""
+    """(top (T,), bottom (T,)) FAP values of the lids. squint: -1 wide .. 1 narrow."""
     shut = _blinks()
     top = FOLLOW_TOP * pitch - OPEN + np.where(squint < 0, 190, 60) * squint
     bottom = FOLLOW_BOTTOM * pitch + 150 * np.maximum(squint, 0) + 85 * smile
@@ -37,10 +37,10 @@ def lids(pitch: Float, squint: Float, smile: Float) -> tuple[Float, Float]:
 
 
 def _blinks() -> Float:
-    """(T,) 0 open .. 1 shut: down fast, up slower, and slower still at the end."""
-    time = moments()
+    """(T,) closure by blinks, 0 open .. 1 shut: down fast, up slower, and slower still at the end."""
+    time = sample_times()
     result = np.zeros(round(len(time)))
-    for row in rows("blinks.csv"):
+    for row in read_table("blinks.csv"):
         start, closing, shut, opening = (float(row[k]) for k in ("time", "closing", "shut", "opening"))
         down = np.clip((time - start) / closing, 0, 1)
         up = np.clip((time - start - closing - shut) / opening, 0, 1)
@@ -49,8 +49,8 @@ def _blinks() -> Float:
 
 
 def flicks(seed: int) -> Float:
-    """Degrees (T,): steps of a third of a degree or so, held until the next."""
-    steps = np.arange(round(len(moments()) / STILL))
+    """(T,) degrees: random steps of about a third of a degree, each held until the next."""
+    steps = np.arange(round(len(sample_times()) / STILL))
     held = 0.45 * (np.modf((steps // (2 + steps % 3 % 2) * 7 + seed) * 0.6180339887498949)[0] - 0.5)
     assert RATE % 10 == 0
     return np.repeat(held, STILL)

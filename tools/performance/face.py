@@ -1,4 +1,4 @@
-"""The face as FAPs, 25 frames a second: smile, brows, speech, eyes, and the head's share of its turn."""
+"""The face as FAPs, 25 frames a second: smile, brows, speech, eyes, and part of the head's rotation."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from fba import Animation, FaceTrack
 from fba.parameters import FAP_COUNT, fap_numbers
 from performance.body import BodyMotion
-from performance.curves import RATE, Float, tracks
+from performance.curves import RATE, Float, read_tracks
 from performance.eyes import eyeballs, flicks, lids
 from performance.mouth import speech
 
 FACE_RATE = 25
 OUTER = 0.88
-"""The outer contour of the lips moves a little less than the inner one."""
+"""Motion of the outer contour of the lips relative to the inner one."""
 RADIAN = 1e5
 """Angle units (AU) to a radian."""
 
 
 def animate(body: BodyMotion, name: str) -> Animation:
-    """The face that goes with this body."""
+    """The face's animation for a motion of the body."""
     curves = _mouth() | _brows() | _eyes(body)
     for fap, angle in zip(("head_yaw", "head_roll", "head_pitch"), body.own.T, strict=True):
         curves[fap] = np.deg2rad(angle) * RADIAN
@@ -38,7 +38,7 @@ def animate(body: BodyMotion, name: str) -> Animation:
 
 
 def _mouth() -> dict[str, Float]:
-    key = tracks("face_keys.csv")
+    key = read_tracks("face_keys.csv")
     say, held = speech()
     smile, grin = key["smile"], key["grin"] * (1 - held)
     press = key["press"] * (1 - held)
@@ -79,7 +79,7 @@ def _mouth() -> dict[str, Float]:
 
 
 def _brows() -> dict[str, Float]:
-    key = tracks("face_keys.csv")
+    key = read_tracks("face_keys.csv")
     curves = {}
     for side, tilt in (("l", 1.0), ("r", -0.6)):
         inner, outer = key["brow_inner"], key["brow_outer"] + tilt * key["brow_tilt"]
@@ -91,11 +91,11 @@ def _brows() -> dict[str, Float]:
 
 
 def _eyes(body: BodyMotion) -> dict[str, Float]:
-    key = tracks("face_keys.csv")
+    key = read_tracks("face_keys.csv")
     yaw, pitch = eyeballs(key["gaze_yaw"] + flicks(1), key["gaze_pitch"] + flicks(4), body.head)
     top, bottom = lids(pitch, key["squint"], key["smile"])
     curves = {}
-    for side, inward in (("l", -0.6), ("r", 0.6)):  # degrees: both look at one point, some metres away
+    for side, inward in (("l", -0.6), ("r", 0.6)):  # degrees: both eyes look at one point some metres away
         curves[f"close_t_{side}_eyelid"] = top
         curves[f"close_b_{side}_eyelid"] = bottom
         curves[f"yaw_{side}_eyeball"] = np.deg2rad(yaw + inward) * RADIAN

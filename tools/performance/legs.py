@@ -1,4 +1,4 @@
-"""Legs that reach from moving hips to feet that stand: two bones, bent at the knee."""
+"""Legs from moving hips to standing feet: two bones, bent at the knee."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from scipy.spatial.transform import Rotation
 
 from performance.curves import Float
 from performance.skeleton import offsets
-from performance.turning import pointing
+from performance.turning import rotation_between_directions
 
 ANKLES = {"Left": (11.0, 7.7, -2.2), "Right": (-10.5, 7.7, 1.6)}
-"""Where the ankles stand, centimetres."""
+"""Positions of the ankles, centimetres."""
 TOES_OUT = {"Left": 12.0, "Right": 9.0}
 """Degrees by which the feet point outward."""
 
 SOFT = 0.25
-"""Centimetres over which one leg hands the weight to the other."""
+"""Centimetres over which the limit changes smoothly from one leg's to the other's."""
 
 
-def height(hips: Float, bend: Float) -> Float:
-    """Centimetres (T,) by which hips (T, 2, 3), left and right, may rise until the straighter leg is bent by
-    so many degrees (T,).
+def hip_rise(hips: Float, bend: Float) -> Float:
+    """(T,) centimetres by which hips (T, 2, 3), left and right, may rise until the straighter leg has a bend
+    of (T,) degrees.
     """
     upper, lower = (float(np.linalg.norm(offsets()[f"Left{part}"])) for part in ("Leg", "Foot"))
     reach = np.sqrt(upper**2 + lower**2 + 2 * upper * lower * np.cos(np.deg2rad(bend)))
@@ -31,8 +31,8 @@ def height(hips: Float, bend: Float) -> Float:
     return result
 
 
-def leg(side: str, hip: Float) -> dict[str, Rotation]:
-    """World rotations of thigh, shank, foot and toes for the place (T, 3) of the hip."""
+def solve_leg(side: str, hip: Float) -> dict[str, Rotation]:
+    """World rotations (T,) of thigh, shank, foot and toes for positions (T, 3) of the hip, centimetres."""
     outward = TOES_OUT[side] * (1 if side == "Left" else -1)
     foot = Rotation.from_euler("Y", outward, degrees=True)
     pole = Rotation.from_euler("Y", 0.8 * outward, degrees=True).apply([0.0, 0.0, 1.0])
@@ -50,8 +50,8 @@ def leg(side: str, hip: Float) -> dict[str, Rotation]:
     forward = np.array([0.0, 0.0, 1.0])
     standing = Rotation.from_quat(np.broadcast_to(foot.as_quat(), (len(hip), 4)))
     return {
-        "UpLeg": pointing((thigh, forward), (knee, front)),
-        "Leg": pointing((shank, forward), (reach - knee, front)),
+        "UpLeg": rotation_between_directions((thigh, forward), (knee, front)),
+        "Leg": rotation_between_directions((shank, forward), (reach - knee, front)),
         "Foot": standing,
         "ToeBase": standing,
     }

@@ -1,29 +1,29 @@
-"""The mouth in speech: every sound has a shape, and sounds close in time blend into each other."""
+"""The mouth in speech: every sound has a shape, and neighbouring sounds blend."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from performance.curves import Float, moments, rows, smooth
+from performance.curves import Float, read_table, sample_times, smooth
 
 PARTS = ("jaw", "top", "bottom", "width", "push", "tip", "tongue")
-"""How far the jaw opens, the top lip rises, the bottom lip falls, the corners spread, the lips come forward,
-the tip and the body of the tongue rise: in the units of the FAPs that they move."""
+"""Opening of the jaw, rise of the top lip, fall of the bottom lip, spread of the corners, protrusion of the
+lips, rise of the tongue's tip and body: in the units of their FAPs."""
 REST = "rest"
 AHEAD, BEHIND = 0.075, 0.095
-"""Seconds by which a sound shows before it begins and after it ends."""
+"""Seconds by which a sound is visible before it begins and after it ends."""
 
 
 def speech() -> tuple[dict[str, Float], Float]:
-    """Each of PARTS over time, (T,), and how much of the mouth speech takes hold of, 0..1.
+    """(curves (T,) by PARTS, share (T,) of the mouth that speech controls, 0..1).
 
-    A sound pulls with the strength of its stress and of `hold`: lips that must meet, meet.
+    A sound is weighted by `hold`, so that lips that must meet do meet, and scaled by its stress.
     """
-    time = moments()
-    shapes = {row["sound"]: row for row in rows("mouth_shapes.csv")}
+    time = sample_times()
+    shapes = {row["sound"]: row for row in read_table("mouth_shapes.csv")}
     weight = np.full(len(time), float(shapes[REST]["hold"]))
     totals = {part: np.zeros(len(time)) for part in PARTS}
-    for row in rows("speech.csv"):
+    for row in read_table("speech.csv"):
         shape = shapes[row["sound"]]
         start, length = float(row["time"]), float(row["length"])
         distance = np.maximum((start - time) / AHEAD, (time - start - length) / BEHIND)

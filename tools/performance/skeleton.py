@@ -1,4 +1,4 @@
-"""The skeleton that is animated: 1.75 m, at rest in a T, facing +z, in centimetres (skeleton.csv)."""
+"""The animated skeleton: 1.75 m tall, resting in a T pose, facing +z, in centimetres (skeleton.csv)."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from performance.curves import rows
+from performance.curves import read_table
 
 Float = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Joint:
-    """offset: (3,) from the parent. channels: as "ZXY", the angles that its motion needs; "" for an end."""
+    """A joint. offset: (3,) from the parent, cm. channels: its angles, such as "ZXY"; "" for an end."""
 
     name: str
     parent: str
     offset: Float
-    places: bool
+    has_position: bool
     channels: str
 
 
 def joints() -> list[Joint]:
-    """Depth first, as BVH has them; a row with ? in the table stands for left (+x) and right."""
+    """The joints, depth first as in BVH; a row with ? in the table stands for left (+x) and right."""
     table: list[Joint] = []
-    for row in rows("skeleton.csv"):
+    for row in read_table("skeleton.csv"):
         kinds = row["channels"].split()
         for side, sign in (("Left", 1), ("Right", -1)):
             offset = np.array([float(row["x"]) * sign, float(row["y"]), float(row["z"])])
@@ -44,5 +44,5 @@ def joints() -> list[Joint]:
 
 
 def offsets() -> dict[str, Float]:
-    """Name -> offset from the parent, centimetres."""
+    """Offsets (3,) from the parent by name, centimetres."""
     return {joint.name: joint.offset for joint in joints()}
