@@ -62,13 +62,13 @@ def film_sheet(
     step = (width + SPACE, height + round(letters * 1.6) + SPACE)
     columns = choose_columns(len(frames), step)
     rows = -(-len(frames) // columns)
-    whole = (columns * step[0] + SPACE, rows * step[1] + SPACE)
-    if whole[0] * whole[1] > MOST_PIXELS:
+    sheet_size = (columns * step[0] + SPACE, rows * step[1] + SPACE)
+    if sheet_size[0] * sheet_size[1] > MOST_PIXELS:
         raise ValueError(
-            f"{len(frames)} pictures of {width}x{height} make a sheet of {whole[0]}x{whole[1]} pixels, too "
-            "large to be one: choose fewer, or a smaller size"
+            f"{len(frames)} pictures of {width}x{height} make a sheet of {sheet_size[0]}x{sheet_size[1]} "
+            "pixels, too large to be one: choose fewer, or a smaller size"
         )
-    return _draw_sheet(scene, frames, size, camera, (columns, *whole, letters), progress)
+    return _draw_sheet(scene, frames, size, camera, (columns, *sheet_size, letters), progress)
 
 
 def choose_frames(scene: Showable, count: int, start: float | None, end: float | None) -> list[int]:

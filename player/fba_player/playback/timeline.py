@@ -24,7 +24,7 @@ TURN = 2 * math.pi / 1e-5
 SHIFTS = slice(180, 183)
 """Columns of the BAPs that are millimetres, not angles."""
 BLOCK = 2048
-KEPT_BLOCKS = 4
+CACHED_BLOCKS = 4
 """Blocks of frames in memory."""
 FRAME_ROUNDING = 1e-6
 """Frame periods: a time this close to that of a frame is taken as that frame's."""
@@ -127,7 +127,7 @@ class Timeline:
         first = self._body(before).astype(np.float64)
         if share == 0.0 or not self.interpolate:
             return first
-        shown: Float64 = first + _shorter(self._body(after) - first) * share
+        shown: Float64 = first + _shorten_turns(self._body(after) - first) * share
         return shown
 
     def many(self, times: npt.ArrayLike) -> tuple[Float32, Float64]:
@@ -147,27 +147,27 @@ class Timeline:
         share = np.clip((at - index[before]) / gap, 0.0, 1.0) * self.interpolate
         faces, bodies = np.zeros((len(at), FAP_COUNT), np.float32), np.zeros((len(at), BAP_COUNT))
         if self.animation.face is not None:
-            first = self._gathered(before, self._face, self._faces_shown)
-            way = self._gathered(after, self._face, self._faces_shown) - first
+            first = self._gather_rows(before, self._face, self._faces_shown)
+            way = self._gather_rows(after, self._face, self._faces_shown) - first
             faces = first + way * share.astype(np.float32)[:, None]
         if self.animation.body is not None:
-            start = self._gathered(before, self._body, self._bodies_shown).astype(np.float64)
-            turn = self._gathered(after, self._body, self._bodies_shown) - start
-            bodies = start + _shorter(turn) * share[:, None]
+            start = self._gather_rows(before, self._body, self._bodies_shown).astype(np.float64)
+            turn = self._gather_rows(after, self._body, self._bodies_shown) - start
+            bodies = start + _shorten_turns(turn) * share[:, None]
         return faces, bodies
 
-    def _gathered(
+    def _gather_rows(
         self,
         frames: Intp,
-        look: Callable[[int], Array],
+        resolve_frame: Callable[[int], Array],
         shown: OrderedDict[int, Array],
     ) -> Array:
-        """Rows of many frames. look: resolves one frame together with its block, which is then in `shown`."""
+        """Rows of many frames. resolve_frame: resolves a frame with its block, which is then in `shown`."""
         blocks = frames // self.block
         parts = {}
         for block in np.unique(blocks).tolist():
             chosen = blocks == block
-            look(int(frames[chosen].max()))
+            resolve_frame(int(frames[chosen].max()))
             parts[block] = (chosen, shown[block][frames[chosen] - block * self.block])
         first = next(iter(parts.values()))[1]
         gathered = np.zeros((len(frames), first.shape[1]), dtype=first.dtype)
@@ -186,7 +186,7 @@ class Timeline:
                 resolver.push(track[self._rows(len(self._resolvers) - 1)])
                 self._resolvers.append(resolver)
             shown = self._resolvers[block].copy().push(track[self._rows(block)])
-            _keep(self._faces_shown, block, shown)
+            _cache_block(self._faces_shown, block, shown)
         face: Float32 = shown[row]
         return face
 
@@ -197,7 +197,7 @@ class Timeline:
             while len(self._bodies) <= block:
                 self._bodies.append(self._held_body(len(self._bodies) - 1)[-1].copy())
             shown = self._held_body(block)
-            _keep(self._bodies_shown, block, shown)
+            _cache_block(self._bodies_shown, block, shown)
         body: Int32 = shown[row]
         return body
 
@@ -214,7 +214,7 @@ class Timeline:
         return slice(block * self.block, (block + 1) * self.block)
 
 
-def _shorter(way: Float64) -> Float64:
+def _shorten_turns(way: Float64) -> Float64:
     """Changes of BAPs (..., 296), each angle the shorter way round."""
     if not way.size or max(way.max(), -way.min()) <= TURN / 2:
         return way
@@ -223,9 +223,9 @@ def _shorter(way: Float64) -> Float64:
     return shorter
 
 
-def _keep(shown: OrderedDict[int, Array], block: int, values: Array) -> None:
+def _cache_block(shown: OrderedDict[int, Array], block: int, values: Array) -> None:
     shown[block] = values
-    while len(shown) > KEPT_BLOCKS:
+    while len(shown) > CACHED_BLOCKS:
         shown.popitem(last=False)
 
 

@@ -91,8 +91,8 @@ class Transport:
 
     def share_of(self, time: float) -> float:
         """A time as a share: 0 at the start, 1 at the last frame or after."""
-        whole = self._last_time() - self.start
-        return min(max((time - self.start) / whole, 0.0), 1.0) if whole > 0 else 0.0
+        duration = self._last_time() - self.start
+        return min(max((time - self.start) / duration, 0.0), 1.0) if duration > 0 else 0.0
 
     @property
     def motion(self) -> Motion:

@@ -153,10 +153,10 @@ class Viewpoint:
             return (left - right) / 2, 1.0
         aspect = self.aspect / (1.0 - min(max(self.covered, 0.0), 0.5))
         narrow = self.scene.camera(self._preset, aspect * free).distance
-        whole = self.scene.camera(
+        full = self.scene.camera(
             self._preset, aspect
         ).distance  # last: a scene arranges its figures for the camera asked for last
-        return (left - right) / 2, max(narrow / whole, 1.0)
+        return (left - right) / 2, max(narrow / full, 1.0)
 
     def _follow_travel(self, camera: Camera, time: float, way: float) -> Camera:
         travel = self.scene.travel(time)

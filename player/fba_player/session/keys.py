@@ -81,18 +81,18 @@ def tables() -> str:
     for row in keys():
         if row.group != group:
             group = row.group
-            lines += _head(group.lower())
-        lines.append(f"| {', '.join(_marked(key) for key in row.shown.split(', '))} | {row.does} |")
-    lines += _head("switch") + [f"| {one.key} | {one.label} |" for one in SWITCHES.values() if one.key]
-    lines += _head("mouse") + [f"| {what} | {does} |" for what, does in mouse()]
+            lines += _table_head(group.lower())
+        lines.append(f"| {', '.join(_to_markdown(key) for key in row.shown.split(', '))} | {row.does} |")
+    lines += _table_head("switch") + [f"| {one.key} | {one.label} |" for one in SWITCHES.values() if one.key]
+    lines += _table_head("mouse") + [f"| {what} | {does} |" for what, does in mouse()]
     return "\n".join(lines[1:]) + "\n"
 
 
-def _head(title: str) -> list[str]:
+def _table_head(title: str) -> list[str]:
     return ["", f"| {title} | |", "|---|---|"]
 
 
-def _marked(key: str) -> str:
+def _to_markdown(key: str) -> str:
     """A key as Markdown: punctuation as code, so that it is not read as Markdown."""
     return key if re.fullmatch(r"\w+([+]\w+)*", key) else f"`{key}`"
 

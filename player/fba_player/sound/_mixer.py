@@ -101,6 +101,6 @@ class SoundMixer:
         # The mean over the samples that become one: it removes the tones that would alias.
         sums = np.concatenate([np.zeros((1, 2)), np.cumsum(samples, axis=0, dtype=np.float64)])
         rows = np.minimum(at.astype(np.intp), len(samples) - 1)
-        whole = sums[rows] + samples[rows] * (at - rows)[:, None]
-        fast: Float32 = (np.diff(whole, axis=0) / speed).astype(np.float32)
+        integral = sums[rows] + samples[rows] * (at - rows)[:, None]
+        fast: Float32 = (np.diff(integral, axis=0) / speed).astype(np.float32)
         return fast

@@ -15,7 +15,7 @@ from fba_player.sound.audio_file import CHANNELS, SoundFile
 
 SECONDS = 0.5
 """Length of a block, in seconds."""
-KEPT = 64
+CACHED_BLOCKS = 64
 """Blocks in memory, half a minute: 6 MB at 48 kHz."""
 PAUSE = 0.03
 """Seconds between checks of which samples are wanted."""
@@ -65,7 +65,7 @@ class SoundBlocks:
                     return False
                 block = self._file.read(number * self._size, self._size)
             self._blocks[number] = block
-            while len(self._blocks) > KEPT:
+            while len(self._blocks) > CACHED_BLOCKS:
                 self._blocks.popitem(last=False)
             return True
         return False

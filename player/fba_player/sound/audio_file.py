@@ -69,9 +69,11 @@ class SoundFile:
         self._open()
         self.rate = self._rate(int(self._stream.rate or 0))
         length, base = self._stream.duration, self._stream.time_base
-        whole = self._container.duration
+        container_length = self._container.duration
         if length is None or not base:
-            self.duration = None if whole is None else max(float(whole / av.time_base), 0.0)
+            self.duration = (
+                None if container_length is None else max(float(container_length / av.time_base), 0.0)
+            )
         else:
             self.duration = max(float(length * base), 0.0)
         self._first = 0  # sample that the first part since the last seek begins with
@@ -139,11 +141,11 @@ class SoundFile:
             except (self._av.error.FFmpegError, OverflowError):
                 self._open()  # it cannot seek: from its beginning
         self._first = start
-        self._parts = self._decoded()
+        self._parts = self._decode_parts()
         self._rest = next(self._parts, self._rest)
         return self._first + len(self._rest)
 
-    def _decoded(self) -> Iterator[Int16]:
+    def _decode_parts(self) -> Iterator[Int16]:
         """Parts (N, 2) from where the container is; sets `_first` to the number of the first sample."""
         stream = self._stream
         convert = _Converter(self._av, self.rate, mono=stream.channels == 1)

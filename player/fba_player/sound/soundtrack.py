@@ -63,7 +63,7 @@ class Soundtrack:
         self._silence = max(round(-start * self.rate), 0)
         self._skip = max(round(start * self.rate), 0)
         self._stream = stream
-        self._parts = self._samples()
+        self._parts = self._decode_samples()
         self._rest: Float32 = np.zeros((self.channels, 0), dtype=np.float32)
 
     def close(self) -> None:
@@ -90,20 +90,20 @@ class Soundtrack:
         taken, self._rest = self._rest[:, :samples], self._rest[:, samples:]
         return np.ascontiguousarray(taken)
 
-    def _samples(self) -> Any:
+    def _decode_samples(self) -> Any:
         while self._silence > 0:
             count = min(self._silence, BLOCK)
             self._silence -= count
             yield np.zeros((self.channels, count), dtype=np.float32)
         resampler = self._av.AudioResampler(format="fltp", layout=self.layout, rate=self.rate)
-        for frame in self._decoded(resampler):
+        for frame in self._decode_frames(resampler):
             if self._skip >= frame.samples:
                 self._skip -= frame.samples
                 continue
             yield frame.to_ndarray()[:, self._skip :]
             self._skip = 0
 
-    def _decoded(self, resampler: Any) -> Iterator[Any]:
+    def _decode_frames(self, resampler: Any) -> Iterator[Any]:
         try:
             for frame in self._container.decode(self._stream):
                 frame.pts = None  # the order counts: times in damaged files are wrong

@@ -31,7 +31,7 @@ def draw_recording(session: Session) -> float:
     x, y = EDGE + 4, EDGE + 7
     text = f"REC {clock_text(session.recording)[:-2]}"
     to.add_circle_filled((x + 6, y + 9), 6.0, theme.packed(theme.ALERT))
-    _shaded(to, (x + 20, y), theme.packed(theme.TEXT), text)
+    _draw_shadowed(to, (x + 20, y), theme.packed(theme.TEXT), text)
     return 40.0 + float(imgui.calc_text_size(text).x)
 
 
@@ -52,8 +52,8 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
         facts = ""
     while name and imgui.calc_text_size(name).x + x > room:
         name = name[: max(len(name) - 8, 0)]
-    _shaded(to, (x, y), theme.packed(theme.TEXT), name)
-    _shaded(to, (x + imgui.calc_text_size(name).x + 14, y), theme.packed(theme.TEXT, 0.72), facts)
+    _draw_shadowed(to, (x, y), theme.packed(theme.TEXT), name)
+    _draw_shadowed(to, (x + imgui.calc_text_size(name).x + 14, y), theme.packed(theme.TEXT, 0.72), facts)
 
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
@@ -137,7 +137,7 @@ def _facts(session: Session) -> str:
     return "   ".join(parts)
 
 
-def _shaded(to: imgui.ImDrawList, place: tuple[float, float], colour: int, text: str) -> None:
+def _draw_shadowed(to: imgui.ImDrawList, place: tuple[float, float], colour: int, text: str) -> None:
     """Draw text with a shadow, readable over light and dark."""
     x, y = place
     to.add_text((x + 1, y + 1), theme.packed((0, 0, 0, 0.55), (colour >> 24) / 255), text)

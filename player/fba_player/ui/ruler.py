@@ -48,9 +48,9 @@ def label(seconds: float, step: float) -> str:
     """Label of a time, with the digits that the step needs: "0:05", "0:05.2", "1:00:05"."""
     digits = 0 if step >= 1 else 1 if step >= 0.1 else 2
     parts = round(abs(seconds) * 10**digits)
-    whole, rest = divmod(parts, 10**digits)
-    minutes, whole = divmod(whole, 60)
+    seconds_shown, rest = divmod(parts, 10**digits)
+    minutes, seconds_shown = divmod(seconds_shown, 60)
     hours, minutes = divmod(minutes, 60)
-    text = f"{whole:02d}" + (f".{rest:0{digits}d}" if digits else "")
+    text = f"{seconds_shown:02d}" + (f".{rest:0{digits}d}" if digits else "")
     sign = "-" if seconds < 0 and parts else ""
     return f"{sign}{hours}:{minutes:02d}:{text}" if hours else f"{sign}{minutes}:{text}"

@@ -45,9 +45,9 @@ class Overlay:
         self._show("bar", None, bar, 0, height - bar.height, session.size)
         if "help" in session.open:
             key = (session.scale,)
-            kept = self._textures.get("help")
-            panel = None if kept is not None and kept[0] == key else help_picture(session.scale)
-            wide, high = panel.size if panel is not None else kept[1].size  # type: ignore[index]
+            cached = self._textures.get("help")
+            panel = None if cached is not None and cached[0] == key else help_picture(session.scale)
+            wide, high = panel.size if panel is not None else cached[1].size  # type: ignore[index]
             self._show(
                 "help", key, panel, max((width - wide) // 2, 0), max((height - high) // 2, 0), session.size
             )

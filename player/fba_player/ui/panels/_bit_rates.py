@@ -54,14 +54,14 @@ def measure_rates(info: StreamInfo) -> Rates | None:
     before = np.searchsorted(times, times - WINDOW + 1e-9, side="left")
     rate = (until[1:] - until[before]) / WINDOW / 1000
     first = min(int(np.searchsorted(times, times[0] + WINDOW - 1 / float(info.rate) - 1e-9)), len(times) - 1)
-    whole = max(8 * info.size, int(bits.sum()), 1)
+    all_bits = max(8 * info.size, int(bits.sum()), 1)
     rows = [
-        Total(name, int(chosen.sum()), int(bits[chosen].sum()), float(bits[chosen].sum()) / whole)
+        Total(name, int(chosen.sum()), int(bits[chosen].sum()), float(bits[chosen].sum()) / all_bits)
         for name, chosen in (("I planes", intra), ("P planes", ~intra))
     ]
     rest = 8 * info.size - int(bits.sum())
     if rest > 0:
-        rows.append(Total("around them", None, rest, rest / whole))
+        rows.append(Total("around them", None, rest, rest / all_bits))
     return Rates(times, bits, intra, rate[first:], tuple(rows), info.bits_per_second / 1000)
 
 

@@ -225,8 +225,8 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
         edges, return_index=True
     )  # of columns that begin at the same frame, the last has it
     places = np.r_[places[1:] - 1, columns - 1]
-    kept = starts < last
-    starts, places = starts[kept], places[kept]
+    in_range = starts < last
+    starts, places = starts[in_range], places[in_range]
     seen = values[: int(last)]
     least, largest = np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)
     any_sent = np.logical_or.reduceat(sent[: int(last)], starts)

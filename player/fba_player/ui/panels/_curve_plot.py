@@ -52,7 +52,7 @@ class _Lines:
     """Points of a lane relative to its upper left corner, and the height of its zero line."""
 
     made_for: tuple[object, ...]
-    whole: list[imgui.ImVec2]
+    points: list[imgui.ImVec2]
     runs: list[list[imgui.ImVec2]]
     all_sent: bool
     dense: bool
@@ -122,9 +122,9 @@ class Lanes:
         to.push_clip_rect((left, top - 1), (right, top + CURVE + 1), True)
         colour = _darken(lane.colour) if lines.dense else lane.colour
         if lines.all_sent:
-            _line(to, lines.whole, corner, colour, 1.0, THICK)
+            _line(to, lines.points, corner, colour, 1.0, THICK)
         else:
-            _line(to, lines.whole, corner, colour, 0.5, THIN)
+            _line(to, lines.points, corner, colour, 0.5, THIN)
             for run in lines.runs:
                 _line(to, run, corner, colour, 1.0, THICK)
         to.pop_clip_rect()

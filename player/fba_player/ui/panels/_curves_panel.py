@@ -104,7 +104,7 @@ class CurvesPanel(Panel):
             imgui.same_line()
             if imgui.button("All of it"):
                 self.time_zoom.reset()
-            tooltip("the whole time again; the wheel zooms, a right drag moves")
+            tooltip("the full range again; the wheel zooms, a right drag moves")
 
 
 def _timeline(session: Session, which: int = 0) -> Any:
@@ -132,10 +132,10 @@ def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tu
     if session.before_frame:
         faps, baps = session.values
     else:
-        whole: Any = session.scene.timeline
+        shown_timeline: Any = session.scene.timeline
         timeline, time = _timeline(session, which), session.transport.time
-        if timeline is not whole:
-            time = whole.own_time(which, time)
+        if timeline is not shown_timeline:
+            time = shown_timeline.own_time(which, time)
         faps = timeline.faps(time) if "fap" in kinds else session.values[0]
         baps = timeline.baps(time) if "bap" in kinds else session.values[1]
     return {(kind, n): float((faps if kind == "fap" else baps)[n - 1]) for kind, n in chosen}

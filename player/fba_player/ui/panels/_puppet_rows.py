@@ -126,7 +126,7 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
             low, high = max(low, _codable_degrees(numbers, 0)), min(high, _codable_degrees(numbers, 1))
         side = word[0] if word.startswith(("left ", "right ", "l_", "r_")) else ""
         other = _other_side(word)
-        flipped = other in words and _flipped(numbers[0])
+        flipped = other in words and _is_flipped(numbers[0])
         rows.append(
             Row("bap", _body_title(word), numbers, low, high, unit, side,
                 words.index(other) if other in words else None, flipped)
@@ -144,7 +144,7 @@ def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
     return float(np.trunc(found))
 
 
-def _flipped(number: int) -> bool:
+def _is_flipped(number: int) -> bool:
     """Whether the BAP of the other side needs the opposite sign for the mirrored motion.
 
     Mirroring left and right keeps rotations about X and reverses those about Y and Z.

@@ -168,15 +168,15 @@ class PuppetPanel(Panel):
         title = row.title
         if self.together and row.mirror is not None:
             title = title.removesuffix(" L").removesuffix(" R")
-        whole = imgui.get_content_region_avail().x
-        name_wide = min(TITLE, max(whole - RELEASE - VALUE - SLIDER, SHORTEST))
+        width = imgui.get_content_region_avail().x
+        name_wide = min(TITLE, max(width - RELEASE - VALUE - SLIDER, SHORTEST))
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.TEXT if touched else theme.FAINT, shorten(title, name_wide - 6))
         if imgui.is_item_hovered():
             tooltip(_parameter_names(row))
         imgui.same_line(name_wide)
-        right = x + whole - RELEASE
-        wide = max(whole - name_wide - RELEASE - VALUE, 16.0)
+        right = x + width - RELEASE
+        wide = max(width - name_wide - RELEASE - VALUE, 16.0)
         imgui.set_next_item_width(wide)
         if touched:
             imgui.push_style_color(imgui.Col_.slider_grab, theme.ACCENT)
