@@ -394,9 +394,8 @@ def test_a_panel_is_taken_out_of_its_column_and_brought_back(opened: Opened, tal
     hand.button(False)
     x, y = _window(studio, "camera").pos
     assert (x, y) == pytest.approx((docked[0] - 300, docked[1] + 100), abs=2)
-    assert studio.session.viewpoint.camera_at(0.0) == studio.session.viewpoint.camera_without_panels(
-        0.0
-    )  # no column is there
+    viewpoint = studio.session.viewpoint
+    assert viewpoint.camera_at(0.0) == viewpoint.camera_without_panels(0.0)  # no column is there
     hand.double_click(x + 60, y + 12)
     studio.draw(2)
     assert tuple(_window(studio, "camera").pos) == docked
