@@ -1,10 +1,10 @@
-"""What a file seems to be, from its first bytes: for errors of readers that expected something else."""
+"""Guess what a file is from its first bytes, for errors of readers that expected something else."""
 
 from __future__ import annotations
 
 import re
 
-BEGINNINGS: tuple[tuple[bytes, str], ...] = (
+SIGNATURES: tuple[tuple[bytes, str], ...] = (
     (b"\x89PNG\r\n", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"GIF8", "a GIF picture"),
@@ -43,23 +43,23 @@ BEGINNINGS: tuple[tuple[bytes, str], ...] = (
 )
 RIFF = {b"WAVE": "WAV sound", b"AVI ": "AVI video", b"WEBP": "a WebP picture"}
 HEAD_BYTES = 4096
-"""So much of a file is enough."""
+"""Bytes of a file that are enough for recognition."""
 EPF_TAGS = ("FBM", "FFR", "BFR", "ISI", "GDR", "CDM")
 """Tags with which EPF files begin."""
 MASK_BITS, BODY_BITS = 60, 100
-"""A line of so many bits is a mask; of so many, one of BAPs."""
+"""Bits from which on a line is a mask, and one of BAPs."""
 OBJ_WORDS = ("v", "vt", "vn", "f", "g", "o", "mtllib", "usemtl", "s")
 CSV_LINES = 3
-"""Fewer lines are no table."""
+"""Lines that a table has at least."""
 
 
 def recognised(head: bytes) -> str:
-    """What a file that begins with these bytes seems to be: "a PNG picture"; "" where that is not known."""
+    """Return what a file with this beginning seems to be, such as "a PNG picture"; "" if that is unknown."""
     if not head:
         return ""
     if _is_program_stream(head):
         return "an MPEG program stream (video)"
-    for beginning, kind in BEGINNINGS:
+    for beginning, kind in SIGNATURES:
         if head.startswith(beginning):
             return kind
     if head[:4] == b"RIFF":
@@ -75,21 +75,22 @@ def recognised(head: bytes) -> str:
     if b"\0" in head:
         wide = len(head) >= 8 and (not any(head[1:64:2]) or not any(head[:64:2]))
         return "UTF-16 text" if wide else "binary data"
-    return _text(head.removeprefix(b"\xef\xbb\xbf").lstrip())
+    return _recognise_text(head.removeprefix(b"\xef\xbb\xbf").lstrip())
 
 
 def but_recognised(head: bytes) -> str:
-    """The same as the end of an error: "; it seems to be a PNG picture", or ""."""
+    """Return the same as the end of an error: "; it seems to be a PNG picture", or ""."""
     kind = recognised(head)
     return f"; it seems to be {kind}" if kind else ""
 
 
 def _is_program_stream(head: bytes) -> bool:
-    """Video of MPEG-1 or 2 begins as an FBA stream does; the bits after that differ."""
+    """Whether this is video of MPEG-1 or 2, which begins like an FBA stream; the next bits differ."""
     return head.startswith(b"\0\0\1\xba") and len(head) > 4 and (head[4] >> 6 == 1 or head[4] >> 4 == 2)
 
 
-def _text(head: bytes) -> str:
+def _recognise_text(head: bytes) -> str:
+    """Return what a text file seems to be."""
     if head.startswith(b"{"):
         return "glTF" if b'"asset"' in head else "JSON"
     start = head[:2000].lower()
@@ -103,23 +104,23 @@ def _text(head: bytes) -> str:
         return "ASF motion capture"
     text = head.decode("latin-1")
     lines = [line for line in (line.partition("#")[0].strip() for line in text.splitlines()) if line]
-    return (_numbers(lines) or _table(lines)) if lines else ""
+    return (_recognise_lines(lines) or _recognise_table(lines)) if lines else ""
 
 
-def _numbers(lines: list[str]) -> str:
-    """FAP, BAP, EPF and OBJ files, by their first lines."""
+def _recognise_lines(lines: list[str]) -> str:
+    """Recognise FAP, BAP, EPF and OBJ files by their first lines."""
     if lines[0].split()[0] in EPF_TAGS:
         return "an EPF file (encoder parameters)"
     for line in lines[:2]:
         words = line.split()
         if len(words) >= MASK_BITS and set(words) <= {"0", "1"}:
             return "a BAP file" if len(words) >= BODY_BITS else "a FAP file"
-    telling = sum(line.split()[0] in OBJ_WORDS for line in lines)
-    return "an OBJ mesh" if telling > max(len(lines) // 2, 2) else ""
+    obj_lines = sum(line.split()[0] in OBJ_WORDS for line in lines)
+    return "an OBJ mesh" if obj_lines > max(len(lines) // 2, 2) else ""
 
 
-def _table(lines: list[str]) -> str:
-    """By a separator that stands equally often in each of the first lines."""
+def _recognise_table(lines: list[str]) -> str:
+    """Recognise a table by a separator that occurs equally often in each of the first lines."""
     rows = lines[:10]
     if len(rows) < CSV_LINES:
         return ""

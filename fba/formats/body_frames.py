@@ -1,4 +1,4 @@
-"""The body of an animation as its poses are shown: evenly spaced, unsent values kept."""
+"""BAPs of an animation as they are shown: at even intervals, with unsent values held."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fba.parameters import BAP_COUNT
 from fba.source import Path
 
 MOST_FRAMES = 500_000
-"""As many as the readers of motion capture take."""
+"""The limit of the readers of motion capture."""
 
 
 def shown_baps(animation: Animation, path: Path, format: str) -> Int32:
-    """int32 (T, 296): what is shown at every frame from the first to the last, gaps filled in.
+    """Return int32 (T, 296): the BAPs shown at every frame from the first to the last, gaps filled in.
 
-    Raises FormatError where there is no body or no frame, or there are more than `MOST_FRAMES`.
+    format: its name, for errors. Raises FormatError without a body or a frame, and beyond `MOST_FRAMES`.
     """
     if animation.body is None:
         raise FormatError(
@@ -30,7 +30,7 @@ def shown_baps(animation: Animation, path: Path, format: str) -> Int32:
 
 
 def check_frames(animation: Animation, path: Path, format: str) -> None:
-    """FormatError where there is no frame, or more than `MOST_FRAMES` from the first to the last."""
+    """Raise FormatError for no frame, or more than `MOST_FRAMES` from the first to the last."""
     if not len(animation):
         raise FormatError(f"{format} needs a frame at least, and this animation has none", path=path)
     count = int(animation.index[-1]) - int(animation.index[0]) + 1
@@ -43,7 +43,7 @@ def check_frames(animation: Animation, path: Path, format: str) -> None:
 
 
 def held_baps(animation: Animation) -> Int32:
-    """int32 (T, 296): at every frame the last value sent, 0 before that."""
+    """Return int32 (T, 296): the last value sent of each BAP at every frame of the animation, at first 0."""
     from fba.face.resolve import hold
 
     body = animation.body

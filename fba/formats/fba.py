@@ -23,10 +23,10 @@ _BEFORE = (b"\0\0\1\xb0", b"\0\0\1\xb5")
 
 
 def sniff_fba(head: bytes, suffix: str) -> bool:
-    """Whether a file that begins so is an FBA stream.
+    """Whether a file with this beginning is an FBA stream.
 
-    MPEG program streams begin with the same start code; there a 0 bit follows, in an FBA object the 1
-    of the first I plane, or the start code of a plane, which may have a byte of stuffing before it.
+    MPEG program streams begin with the same start code, but a 0 bit follows. In an FBA object the 1 bit of
+    the first I plane follows, or the start code of a plane, perhaps with a byte of stuffing before it.
     """
     for code in START_CODES:
         if head.startswith(code):
@@ -39,14 +39,14 @@ def sniff_fba(head: bytes, suffix: str) -> bool:
 def read_fba(path: Path, *, bap_steps: str = "iso", salvage: bool = False) -> Animation:
     """Decode an FBA file.
 
-    bap_steps: "iso" or "visage", the step table with which it was encoded. salvage: skip what is damaged,
-    with an FbaWarning, in place of raising. Raises FormatError (the file), BitstreamError and
-    UnsupportedError (the stream). The animation gets the file's name.
+    bap_steps: "iso" or "visage", the step table with which it was encoded. salvage: skip damage with an
+    FbaWarning instead of raising. The animation is named after the file. Raises FormatError for the file,
+    BitstreamError and UnsupportedError for the stream.
     """
     from fba.codec import decode
 
     data = read_whole(path)
-    with located(path):
+    with naming_file(path):
         animation = decode(data, bap_steps=bap_steps, on_error="salvage" if salvage else "raise")
     name = animation.name or os.path.splitext(os.path.basename(os.fspath(path)))[0]
     return Animation(animation.rate, animation.index, animation.face, animation.body, name)
@@ -55,11 +55,10 @@ def read_fba(path: Path, *, bap_steps: str = "iso", salvage: bool = False) -> An
 def write_fba(
     path: Path, animation: Animation, *, options: EncoderOptions | None = None, **settings: Any
 ) -> None:
-    """Encode into an FBA file.
+    """Encode an animation into an FBA file.
 
-    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Raises OptionError where
-    both are given, RangeError for values that no stream can carry, FormatError where the file cannot be
-    written.
+    options: an EncoderOptions; or its fields as keywords, e.g. `fap_quant=2`. Raises OptionError if both
+    are given, RangeError for values that no stream can carry, FormatError if the file cannot be written.
     """
     from fba.codec import EncoderOptions, encode
 
@@ -67,13 +66,14 @@ def write_fba(
         if options is not None:
             raise OptionError(f"give either options or {', '.join(settings)}, not both")
         options = EncoderOptions(**settings)
-    with located(path):
+    with naming_file(path):
         data = encode(animation, options)
     with atomic(path) as file:
         file.write(data)
 
 
 def _encoder_settings() -> tuple[str, ...]:
+    """Return the names of the keywords of `write_fba`."""
     from fba.codec import EncoderOptions
 
     return tuple(field.name for field in fields(EncoderOptions) if field.init)
@@ -83,8 +83,8 @@ write_fba.extra_options = _encoder_settings  # type: ignore[attr-defined]
 
 
 @contextlib.contextmanager
-def located(path: Path) -> Iterator[None]:
-    """Errors of the codec get the file's name in front; their type and attributes stay."""
+def naming_file(path: Path) -> Iterator[None]:
+    """Put the file's name in front of the codec's errors; their type and attributes stay."""
     try:
         yield
     except (BitstreamError, RangeError) as error:

@@ -1,4 +1,4 @@
-"""One performance from two files: a face (.fap) and a body (.bap)."""
+"""Merge a face (.fap) and a body (.bap) into one animation."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def merge(face_animation: Animation, body_animation: Animation) -> Animation:
-    """The face of one and the body of the other, joined by frame number.
+    """Return the face of one animation with the body of the other, joined by frame number.
 
-    The result has every frame number that occurs in either; where one has no such frame, nothing of
-    that part is sent. Its name is the face's, else the body's. Raises FormatError where a part is
-    missing or the frame rates differ.
+    The result has every frame number that occurs in either; a part that has no such frame is not sent in
+    it. The name is that of the face, else that of the body. Raises FormatError if a part is missing or the
+    frame rates differ.
     """
     if face_animation.face is None:
         raise FormatError(f"nothing to join: {_name(face_animation)} has no face")
@@ -36,24 +36,24 @@ def merge(face_animation: Animation, body_animation: Animation) -> Animation:
         )
     index = np.union1d(face_animation.index, body_animation.index)
     face, body = face_animation.face, body_animation.body
-    at = np.searchsorted(index, face_animation.index)
+    rows = np.searchsorted(index, face_animation.index)
     joined_face = FaceTrack(
-        _spread(face.values, at, len(index)),
-        _spread(face.mask, at, len(index)),
-        _spread(face.viseme, at, len(index)),
-        _spread(face.expression, at, len(index)),
-        _spread(face.interpolated, at, len(index)) if face.interpolated is not None else None,
+        _spread(face.values, rows, len(index)),
+        _spread(face.mask, rows, len(index)),
+        _spread(face.viseme, rows, len(index)),
+        _spread(face.expression, rows, len(index)),
+        _spread(face.interpolated, rows, len(index)) if face.interpolated is not None else None,
     )
-    at = np.searchsorted(index, body_animation.index)
-    joined_body = BodyTrack(_spread(body.values, at, len(index)), _spread(body.mask, at, len(index)))
+    rows = np.searchsorted(index, body_animation.index)
+    joined_body = BodyTrack(_spread(body.values, rows, len(index)), _spread(body.mask, rows, len(index)))
     name = face_animation.name or body_animation.name
     return Animation(face_animation.rate, index, joined_face, joined_body, name)
 
 
-def _spread(rows: npt.NDArray[Scalar], at: Intp, count: int) -> npt.NDArray[Scalar]:
-    """These rows at these places among `count`, zeros (False) elsewhere."""
-    spread = np.zeros((count, rows.shape[1]), dtype=rows.dtype)
-    spread[at] = rows
+def _spread(values: npt.NDArray[Scalar], rows: Intp, count: int) -> npt.NDArray[Scalar]:
+    """Return an array (count, columns) with values (K, columns) in rows (K,), zeros (False) elsewhere."""
+    spread = np.zeros((count, values.shape[1]), dtype=values.dtype)
+    spread[rows] = values
     return spread
 
 

@@ -1,7 +1,7 @@
-"""All file formats in one table, and `read`, `write` and `probe` over it.
+"""Table of all file formats, and `read`, `write` and `probe`, which use it.
 
-What a file is, is found in its content; the name's suffix only decides where the content leaves it
-open. Modules of formats are imported when they are used.
+The content of a file decides its format, the suffix only where several formats fit. The modules of formats
+are imported when they are used.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class Lazy:
         return f"Lazy({self._place!r})"
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """What the function returns."""
+        """Call the function."""
         return self.load()(*arguments, **options)
 
     def load(self) -> Callable[..., Any]:
-        """The function, its module imported."""
+        """Return the function; import its module on the first call."""
         if self._function is None:
             module, _, name = self._place.partition(":")
             self._function = getattr(import_module(module), name)
@@ -54,12 +54,11 @@ class Lazy:
 class Format:
     """A file format.
 
-    name: as in `format=`. suffixes: lower case, with the dot, the first is the usual one. sniff: whether
-    a file with this beginning (up to 64 KiB) and this lower-case suffix is one. read, write: file to
-    Animation and back; write is None where there is no writer. carries: the parts that it can hold.
-    read_motion: the motion of a captured skeleton,
-    for formats of motion capture, whose parameters are worked out when they are read. written: what a written
-    file is, where that is less than `description` says.
+    name: as in `format=`. suffixes: lower case, with the dot; the first is the usual one. sniff: whether a
+    file with this beginning (up to 64 KiB) and this lower-case suffix has this format. read, write: file to
+    Animation and back; write is None if there is no writer. carries: the parts that a file can hold.
+    read_motion: reads the motion of a skeleton, for formats of motion capture; `read` retargets it. written:
+    description of a written file, if `description` says more than the writer can do.
     """
 
     name: str
@@ -75,104 +74,107 @@ class Format:
     @property
     def read_options(self) -> tuple[str, ...]:
         """Names of the keyword options of `read`."""
-        return _options(self.read)
+        return _option_names(self.read)
 
     @property
     def write_options(self) -> tuple[str, ...]:
         """Names of the keyword options of `write`; empty where there is no writer."""
-        return () if self.write is None else _options(self.write)
+        return () if self.write is None else _option_names(self.write)
 
 
 @cache
 def formats() -> tuple[Format, ...]:
-    """The formats, in the order in which they are tried on a content: the quick to import first."""
+    """Return all formats, in the order in which they are tried on a content: those quick to import first."""
 
-    def at(module: str, name: str) -> Lazy:
+    def lazy(module: str, name: str) -> Lazy:
         return Lazy(f"fba.formats.{module}:{name}")
 
     return (
         Format(
             "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
-            at("fba", "sniff_fba"), at("fba", "read_fba"), at("fba", "write_fba"),
+            lazy("fba", "sniff_fba"), lazy("fba", "read_fba"), lazy("fba", "write_fba"),
         ),
         Format(
             "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
-            at("text.fap", "sniff_fap"), at("text.fap", "read_fap"), at("text.fap", "write_fap"), ("face",),
+            lazy("text.fap", "sniff_fap"), lazy("text.fap", "read_fap"), lazy("text.fap", "write_fap"),
+            ("face",),
             written="ASCII face animation parameters, version 2.2",
         ),
         Format(
             "bap", (".bap",), "ASCII body animation parameters, versions 3.1 and 3.2",
-            at("text.bap", "sniff_bap"), at("text.bap", "read_bap"), at("text.bap", "write_bap"), ("body",),
+            lazy("text.bap", "sniff_bap"), lazy("text.bap", "read_bap"), lazy("text.bap", "write_bap"),
+            ("body",),
             written="ASCII body animation parameters, version 3.2",
         ),
         Format(
             "epf", (".epf",), "encoder parameter file: how to code an animation; holds none itself",
-            at("epf.epf", "sniff_epf"), at("epf.epf", "read_animation"), None, (),
+            lazy("epf.epf", "sniff_epf"), lazy("epf.epf", "read_animation"), None, (),
         ),
         Format(
             "bvh", (".bvh",), "Biovision motion capture: a skeleton and its joint angles",
-            at("bvh.reader", "sniff"), at("bvh.reader", "read"), at("bvh.writer", "write"), ("body",),
-            read_motion=at("bvh.reader", "read_motion"),
+            lazy("bvh.reader", "sniff"), lazy("bvh.reader", "read"), lazy("bvh.writer", "write"), ("body",),
+            read_motion=lazy("bvh.reader", "read_motion"),
         ),
         Format(
             "gltf", (".glb", ".gltf"), "glTF 2.0: read, an animated skeleton; written, a skinned person",
-            at("gltf.reader", "sniff"), at("gltf.reader", "read"), at("gltf.writer", "write"),
-            read_motion=at("gltf.reader", "read_motion"), written="glTF 2.0, a skinned person",
+            lazy("gltf.reader", "sniff"), lazy("gltf.reader", "read"), lazy("gltf.writer", "write"),
+            read_motion=lazy("gltf.reader", "read_motion"), written="glTF 2.0, a skinned person",
         ),
     )  # fmt: skip
 
 
 def format_of(path: Path, format: str | None = None) -> Format:
-    """The format of a file that is to be read; format: its name, where it is known already.
+    """Return the format of a file to be read. format: its name, if it is known already.
 
-    Raises FormatError where the file cannot be read or is of no known format, OptionError for an
-    unknown name. A content that another suffix belongs to is an FbaWarning.
+    Raises FormatError if the file cannot be read or has no known format, OptionError for an unknown name.
+    Warns (FbaWarning) of content that does not fit the suffix.
     """
     if format is not None:
-        return _named(format)
+        return _find_format(format)
     head, suffix = read_head(path), _suffix(path)
     by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
     others = [entry for entry in formats() if entry not in by_suffix]
-    found = next((entry for entry in (*by_suffix, *others) if entry.sniff(head, suffix)), None)
-    if found is None and by_suffix:
-        return by_suffix[0]  # its reader says what is wrong with it
-    if found is None:
+    chosen = next((entry for entry in (*by_suffix, *others) if entry.sniff(head, suffix)), None)
+    if chosen is None and by_suffix:
+        return by_suffix[0]  # the error of its reader will say what is wrong
+    if chosen is None:
         kind = but_recognised(head)
-        error = FormatError(f"is in no format known here: {_list()}{kind}", path=path)
+        error = FormatError(f"is in no format known here: {_list_formats()}{kind}", path=path)
         raise error if kind else error.with_remedies(UNKNOWN)
-    if by_suffix and found not in by_suffix:
+    if by_suffix and chosen not in by_suffix:
         warnings.warn(
-            f"{os.fspath(path)}: is named {suffix}, but holds {found.name.upper()} content; "
-            f"read as {found.name}",
+            f"{os.fspath(path)}: is named {suffix}, but holds {chosen.name.upper()} content; "
+            f"read as {chosen.name}",
             FbaWarning,
             stacklevel=3,
         )
-    return found
+    return chosen
 
 
 def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
     """Read an animation from a file of any known format.
 
-    format: its name where the content should not be asked. options: those of the format's reader, see
+    format: its name; otherwise the content decides. options: those of the format's reader, see
     `formats()` and e.g. `fba.formats.text.fap.read_fap`. Raises FormatError, BitstreamError,
     UnsupportedError or OptionError.
     """
-    found = format_of(path, format)
-    _check_options(found.name, "reading", options, found.read_options)
-    return found.read(path, **options)
+    chosen = format_of(path, format)
+    _check_options(chosen.name, "reading", options, chosen.read_options)
+    return chosen.read(path, **options)
 
 
 def write(path: Path, animation: Animation, *, format: str | None = None, **options: Any) -> None:
-    """Write an animation; the suffix of `path` chooses the format, where `format` does not name it.
+    """Write an animation; the suffix of `path` chooses the format, unless `format` names it.
 
-    The file appears whole or not at all. What the format cannot hold is left out with an FbaWarning.
+    The file is complete or, after an error, unchanged. Parts that the format cannot hold are left out with an
+    FbaWarning.
     Raises FormatError, RangeError, UnsupportedError or OptionError.
     """
     chosen = writer_for(path, format)
     _check_options(chosen.name, "writing", options, chosen.write_options)
     present = [part for part in ("face", "body") if getattr(animation, part) is not None]
     left_out = [part for part in present if part not in chosen.carries]
-    assert chosen.write is not None  # writer_for saw to that
+    assert chosen.write is not None  # or writer_for had raised
     chosen.write(path, animation, **options)
     if left_out:
         warnings.warn(
@@ -184,25 +186,26 @@ def write(path: Path, animation: Animation, *, format: str | None = None, **opti
 
 
 def writer_for(path: Path, format: str | None = None) -> Format:
-    """The format to write a file of this name in; format: its name, where the suffix is not to say.
+    """Return the format for writing a file of this name. format: its name, used instead of the suffix.
 
     Raises FormatError for an unknown suffix, UnsupportedError for a format that can be read only.
     """
     if format is not None:
-        chosen = _named(format)
+        chosen = _find_format(format)
     else:
         suffix = _suffix(path)
         by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
         if not by_suffix:
             raise FormatError(
-                f"the suffix does not say which format to write; known: {_list(writing=True)}",
+                f"the suffix does not say which format to write; known: {_list_formats(writing=True)}",
                 path=path,
                 token=suffix or None,
             ).with_remedies(Remedy("format", "or name it with {}", "'fba'", "fba.write"))
         chosen = by_suffix[0]
     if chosen.write is None:
         raise UnsupportedError(
-            f"{os.fspath(path)}: {chosen.name.upper()} can be read only; write one of {_list(writing=True)}",
+            f"{os.fspath(path)}: {chosen.name.upper()} can be read only; write one of "
+            f"{_list_formats(writing=True)}",
             what=f"writing {chosen.name.upper()}",
         )
     return chosen
@@ -215,28 +218,30 @@ def probe(
     format: str | None = None,
     **options: Any,
 ) -> StreamInfo:
-    """What an FBA stream, in memory or in a file, or a file of another format holds.
+    """Return what an FBA stream, in memory or in a file, or a file of another format contains.
 
-    bap_steps: as for `fba.decode`; it matters to no more than what counts as damage. format: as for `read`.
-    options: those of the reader, for other formats than FBA. Values of a stream are decoded, but not kept;
-    damage is stepped over and listed. Raises FormatError, BitstreamError.
+    bap_steps: as for `fba.decode`; it only affects what counts as damage. format: as for `read`. options:
+    those of the reader, for formats other than FBA. Damage in a stream is skipped and listed.
+
+    Raises FormatError, BitstreamError.
     """
     from fba.codec import StreamInfo, probe_stream
-    from fba.formats.fba import located
+    from fba.formats.fba import naming_file
     from fba.source import read_whole
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
         return probe_stream(data_or_path, bap_steps=bap_steps)
-    found = format_of(data_or_path, format)
-    if found.name == "fba":
-        with located(data_or_path):
+    chosen = format_of(data_or_path, format)
+    if chosen.name == "fba":
+        with naming_file(data_or_path):
             return probe_stream(read_whole(data_or_path), bap_steps=bap_steps)
-    _check_options(found.name, "reading", options, found.read_options)
-    animation = found.read(data_or_path, **options)
-    return StreamInfo.of_animation(animation, found.name, os.stat(data_or_path).st_size)
+    _check_options(chosen.name, "reading", options, chosen.read_options)
+    animation = chosen.read(data_or_path, **options)
+    return StreamInfo.of_animation(animation, chosen.name, os.stat(data_or_path).st_size)
 
 
-def _named(name: str) -> Format:
+def _find_format(name: str) -> Format:
+    """Return the format with this name or suffix; OptionError if there is none."""
     wanted = str(name).lower().removeprefix(".")
     for entry in formats():
         if wanted == entry.name or f".{wanted}" in entry.suffixes:
@@ -246,6 +251,7 @@ def _named(name: str) -> Format:
 
 
 def _check_options(name: str, doing: str, options: dict[str, Any], known: tuple[str, ...]) -> None:
+    """Raise OptionError for an option that the reader or writer does not take."""
     for option in options:
         if option not in known:
             raise OptionError(
@@ -253,7 +259,8 @@ def _check_options(name: str, doing: str, options: dict[str, Any], known: tuple[
             )
 
 
-def _options(function: Callable[..., Any]) -> tuple[str, ...]:
+def _option_names(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return the names of the keyword options of a reader or writer."""
     loaded = function.load() if isinstance(function, Lazy) else function
     extra = getattr(loaded, "extra_options", None)  # names that a reader or writer takes as **settings
     names = [
@@ -268,7 +275,8 @@ def _suffix(path: Path) -> str:
     return os.path.splitext(os.fspath(path))[1].lower()
 
 
-def _list(writing: bool = False) -> str:
+def _list_formats(writing: bool = False) -> str:
+    """Return all formats, or those that can be written, with their suffixes, as text for a message."""
     return ", ".join(
         f"{entry.name.upper()} ({' '.join(entry.suffixes)})"
         for entry in formats()

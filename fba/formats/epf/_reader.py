@@ -1,9 +1,8 @@
 """Read EPF files as plane settings.
 
-One tag a line, `#` comments. `FBM` opens the block of a plane. Masks, quantisers, limits, gender,
-coding type and ISI stay in force until changed; rate, time code, skip and the four list tags count for
-the plane of their own block only. Nothing but I planes can carry masks, quantisers, lists, rates and
-time codes.
+Each line has one tag; `#` begins a comment. `FBM` opens the block of a plane. Masks, quantisers, limits,
+gender, coding type and ISI stay in force until changed; rate, time code, skip and the four list tags apply
+to the plane of their own block only. Only I planes carry masks, quantisers, lists, rates and time codes.
 """
 
 from __future__ import annotations
@@ -33,18 +32,20 @@ from fba.recognition import but_recognised
 from fba.source import Path, open_source
 
 SKIP_MAX = 1_000_000
-"""Most frames that a plane may skip: 11 hours at 25 a second, and a guard against absurd numbers."""
+"""Most frames that a plane may skip: 11 hours at 25 frames/s. More is a mistake in the file."""
 
 
 @dataclass
 class _Tag:
+    """A tag's values, and the line (1-based) that it stands on."""
+
     values: list[bytes]
     line: int
 
 
 @dataclass
 class _State:
-    """What stays in force of a part, and what its last I plane made of it."""
+    """Settings of a part that are in force, and those that its last I plane sent."""
 
     types: tuple[int, ...] | None = None
     mask: Bool | None = None
@@ -54,6 +55,8 @@ class _State:
 
 @dataclass
 class _Reader:
+    """Turns blocks of tags into `planes`; the other fields are the settings in force."""
+
     lines: Lines
     states: dict[int, _State] = field(default_factory=lambda: {part.bit: _State() for part in PARTS})
     intra: bool | None = None
@@ -61,7 +64,8 @@ class _Reader:
     coding_type: int = 0
     planes: list[PlaneSettings] = field(default_factory=list)
 
-    def plane(self, block: dict[str, _Tag]) -> None:
+    def add_plane(self, block: dict[str, _Tag]) -> None:
+        """Append the plane that a block describes. FormatError where the block contradicts itself."""
         opened = block["FBM"].line
         parts_mask = self.number(block, "FBM", 1, 3)
         if "ISI" in block:
@@ -74,7 +78,7 @@ class _Reader:
         settings: dict[int, PartSettings] = {}
         for part in PARTS:
             if not parts_mask & part.bit:
-                stray = next((tag for tag in part.own if tag in block), None)
+                stray = next((tag for tag in part.tags if tag in block), None)
                 if stray:
                     raise self.lines.error(
                         f"a {part.word} tag in a block without a {part.word} (FBM {parts_mask})",
@@ -103,7 +107,7 @@ class _Reader:
         )
 
     def part(self, part: Part, block: dict[str, _Tag], opened: int) -> PartSettings:
-        """What is in force of a part in this plane."""
+        """Return the settings of a part in this plane. opened: line on which its block begins."""
         state = self.states[part.bit]
         changed = [tag for tag in (part.mask, part.quant) if tag in block]
         if part.mask in block:
@@ -116,17 +120,17 @@ class _Reader:
             if state.quant == quant:
                 changed.remove(part.quant)
             state.quant = quant
-        listed = [tag for tag in part.lists if tag in block]
+        list_tags = [tag for tag in part.lists if tag in block]
         if not self.intra:
             if state.sent is None:
                 raise self.lines.error(
                     f"a P plane (ISI 0) with a {part.word} before any I plane with one", line=opened
                 )
-            if listed:
+            if list_tags:
                 raise self.lines.error(
                     "limits can only be sent with an I plane (ISI 1)",
-                    token=listed[0],
-                    line=block[listed[0]].line,
+                    token=list_tags[0],
+                    line=block[list_tags[0]].line,
                 )
             for tag in changed:
                 warnings.warn(
@@ -141,7 +145,7 @@ class _Reader:
                 raise self.lines.error(
                     f"an I plane with a {part.word} needs {tag}, in its block or an earlier one", line=opened
                 )
-        for tag in listed:
+        for tag in list_tags:
             if part.quant in block and block[part.quant].line > block[tag].line:
                 raise self.lines.error(
                     f"{part.quant} must stand before the limits that it scales",
@@ -161,6 +165,7 @@ class _Reader:
         return state.sent
 
     def masks(self, block: dict[str, _Tag], part: Part) -> tuple[tuple[int, ...], Bool]:
+        """Return the mask type of each group, and the mask, bool (parameters,)."""
         tag = block[part.mask]
         values = iter(self.numbers(tag, 0, 3))
         mask = np.zeros(part.count, dtype=bool)
@@ -200,7 +205,10 @@ class _Reader:
         return tuple(types), mask
 
     def limits(self, block: dict[str, _Tag], part: Part, name: str, sign: int) -> UInt8 | None:
-        """Range codes of one list tag, or None where the block has none."""
+        """Return the range codes of a list tag, uint8 (parameters,), or None if the block has no such tag.
+
+        sign: +1 for maxima, -1 for minima.
+        """
         if name not in block:
             return None
         tag = block[name]
@@ -210,32 +218,36 @@ class _Reader:
         largest = RANGE_CODE_MAX * RANGE_UNIT
         numbers = self.numbers(tag, -(2**31), 2**31 - 1)
         codes = np.zeros(part.count, dtype=np.uint8)
-        for at, value in enumerate(numbers, start=part.first - 1):
+        for column, value in enumerate(numbers, start=part.first - 1):
             code = -(-sign * value // RANGE_UNIT)  # away from 0: maxima up, minima down
             if not 0 <= code <= RANGE_CODE_MAX:
                 kind, bounds = ("maximum", f"0..{largest}") if sign > 0 else ("minimum", f"{-largest}..0")
                 raise self.lines.error(
-                    f"the {kind} of {'FAP' if part.bit == FACE else 'BAP'} {at + 1} must lie in {bounds}",
-                    token=tag.values[at - part.first + 1],
+                    f"the {kind} of {'FAP' if part.bit == FACE else 'BAP'} {column + 1} must lie in {bounds}",
+                    token=tag.values[column - part.first + 1],
                     line=tag.line,
                 )
-            codes[at] = code
+            codes[column] = code
         codes.flags.writeable = False
         return codes
 
     def time_tag(self, block: dict[str, _Tag], names: list[str]) -> tuple[str, list[int]] | None:
-        """Name and numbers of the one tag of these that the block has: a plane has one time."""
-        found = [(name, self.numbers(block[name], 0, SKIP_MAX)) for name in names if name in block]
-        if not found:
+        """Return name and numbers of the first of these tags that the block has, or None.
+
+        FormatError where two of them differ: face and body of a plane have one time.
+        """
+        present = [(name, self.numbers(block[name], 0, SKIP_MAX)) for name in names if name in block]
+        if not present:
             return None
-        if len(found) > 1 and found[0][1] != found[1][1]:
+        if len(present) > 1 and present[0][1] != present[1][1]:
             raise self.lines.error(
                 f"{names[0]} and {names[1]} of one block must agree: a plane has one time",
                 line=block[names[1]].line,
             )
-        return found[0]
+        return present[0]
 
     def frame_rate(self, block: dict[str, _Tag]) -> FrameRate | None:
+        """Return the frame rate that a block sends, or None."""
         tag = self.time_tag(block, [part.rate for part in PARTS])
         if tag is None:
             return None
@@ -246,6 +258,7 @@ class _Reader:
         return rate
 
     def time_code(self, block: dict[str, _Tag]) -> TimeCode | None:
+        """Return the time code that a block sends, or None."""
         tag = self.time_tag(block, [part.time for part in PARTS])
         if tag is None:
             return None
@@ -255,13 +268,17 @@ class _Reader:
         return TimeCode(hours, minutes, seconds, marker)
 
     def skip(self, block: dict[str, _Tag]) -> int:
+        """Return the number of frames to skip after the plane."""
         tag = self.time_tag(block, [part.skip for part in PARTS])
         return 0 if tag is None else self.fields(block, tag, ("frames to skip", SKIP_MAX))[0]
 
     def fields(
         self, block: dict[str, _Tag], tag: tuple[str, list[int]], *wanted: tuple[str, int]
     ) -> list[int]:
-        """The numbers of a tag, checked against the largest that each field can hold."""
+        """Return the numbers of a tag; FormatError where they are not as many as `wanted`, or too large.
+
+        wanted: name and largest value of each field.
+        """
         name, values = tag
         line = block[name].line
         if len(values) != len(wanted):
@@ -277,12 +294,14 @@ class _Reader:
         return values
 
     def number(self, block: dict[str, _Tag], name: str, low: int, high: int) -> int:
+        """Return the only number of a tag; FormatError if it is not in low..high."""
         tag = block[name]
         if len(tag.values) != 1:
             raise self.lines.error(f"{name} needs one number, found {len(tag.values)}", line=tag.line)
         return self.numbers(tag, low, high)[0]
 
     def numbers(self, tag: _Tag, low: int, high: int) -> list[int]:
+        """Return the numbers of a tag; FormatError if one is not in low..high."""
         try:
             values = [int(token) for token in tag.values]
         except ValueError:
@@ -296,11 +315,11 @@ class _Reader:
 
 
 def read_epf(path: Path) -> list[PlaneSettings]:
-    """The planes that an EPF file asks for, in order.
+    """Return the planes that an EPF file describes, in order.
 
-    On P planes `face` and `body` are the objects of the I plane in force. Raises FormatError with line
-    and token for unknown tags, values that the syntax cannot carry, and what contradicts itself;
-    FbaWarning for a mask or quantiser that changes in the block of a P plane.
+    `face` and `body` of a P plane are the objects of the I plane in force. Raises FormatError with line
+    and token for unknown tags, values that the syntax cannot carry, and contradictions; warns (FbaWarning)
+    of a mask or quantiser that changes in the block of a P plane.
     """
     file, size = open_source(path)
     with file:
@@ -319,7 +338,7 @@ def read_epf(path: Path) -> list[PlaneSettings]:
                 )
             if tag == "FBM":
                 if block:
-                    reader.plane(block)
+                    reader.add_plane(block)
                 block = {}
             elif not block:
                 raise lines.error("comes before FBM, which opens the block of each plane", token=tag)
@@ -328,5 +347,5 @@ def read_epf(path: Path) -> list[PlaneSettings]:
             block[tag] = _Tag(values, lines.number)
         if not block:
             raise lines.error("holds no planes, only blank lines and comments")
-        reader.plane(block)
+        reader.add_plane(block)
     return reader.planes

@@ -1,4 +1,4 @@
-"""The tags of EPF files: what stands for the face, and its twin for the body."""
+"""Tags of EPF files: those of the face and their counterparts for the body."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ FACE, BODY = 1, 2
 
 @dataclass(frozen=True)
 class Part:
-    """The tags of one half. lists: in coding order (I max, I min, P max, P min)."""
+    """Tags of the face or the body.
+
+    bit: that of fba_object_mask. word: for messages. lists: tags of the range lists in coding order (I max,
+    I min, P max, P min). groups: returns parameter numbers by group. count: of parameters.
+    """
 
     bit: int
     word: str
@@ -29,7 +33,8 @@ class Part:
     """Number of the first parameter that has limits."""
 
     @property
-    def own(self) -> tuple[str, ...]:
+    def tags(self) -> tuple[str, ...]:
+        """All tags of this part."""
         return (self.frame, self.rate, self.time, self.skip, self.mask, self.quant, *self.lists)
 
 
@@ -44,4 +49,4 @@ PARTS = (
     ),
 )  # fmt: skip
 SHARED_TAGS = ("FBM", "ISI", "GDR", "CDM")
-TAGS = frozenset(SHARED_TAGS).union(*(part.own for part in PARTS))
+TAGS = frozenset(SHARED_TAGS).union(*(part.tags for part in PARTS))

@@ -15,11 +15,11 @@ from fba.source import Path
 
 
 def write_epf(path: Path, planes: Iterable[PlaneSettings]) -> None:
-    """Write the file with which an encoder makes these planes again.
+    """Write the EPF file with which an encoder makes the same planes again.
 
-    `read_epf` gives equal settings back, but for plane start codes, which no tag carries (FbaWarning).
-    Raises FormatError for settings that contradict themselves or a disk that fails, and
-    UnsupportedError where a plane's face and body differ in gender or coding type, which have one tag.
+    `read_epf` returns equal settings, except for plane start codes, which no tag carries (FbaWarning).
+    Raises FormatError for settings that contradict themselves or if writing fails, UnsupportedError if face
+    and body of a plane differ in gender or coding type, for which there is one tag.
     """
     writer = _Writer(path)
     with atomic(path) as file:
@@ -37,14 +37,18 @@ def write_epf(path: Path, planes: Iterable[PlaneSettings]) -> None:
 
 
 class _Writer:
+    """Formats planes as blocks. planes, start_codes: numbers of those so far. in_force: part -> settings of
+    its last I plane. shared: values in force of the tags that face and body share."""
+
     def __init__(self, path: Path) -> None:
         self.path = path
         self.planes = 0
         self.start_codes = 0
-        self.force: dict[int, PartSettings] = {}
+        self.in_force: dict[int, PartSettings] = {}
         self.shared = {"GDR": 0, "CDM": 0}
 
     def block(self, number: int, plane: PlaneSettings) -> Iterator[str]:
+        """Yield the lines of a plane's block."""
         where = f"plane {number}: "
         present = [
             (part, settings, frame)
@@ -77,14 +81,15 @@ class _Writer:
         for part, settings, _ in present:
             if plane.intra:
                 yield from self._part(where, part, settings)
-                self.force[part.bit] = settings
-            elif part.bit not in self.force or not _same(self.force[part.bit], settings):
+                self.in_force[part.bit] = settings
+            elif part.bit not in self.in_force or not _same(self.in_force[part.bit], settings):
                 raise FormatError(
                     f"{where}a P plane keeps the {part.word} settings of the last I plane, but these differ",
                     path=self.path,
                 )
 
     def _shared(self, where: str, settings: list[PartSettings]) -> Iterator[str]:
+        """Yield the shared tags that change. where: names the plane in errors."""
         for tag, values in (
             ("GDR", {part.gender for part in settings}),
             ("CDM", {part.coding_type for part in settings}),
@@ -101,6 +106,7 @@ class _Writer:
                 yield f"{tag} {value}"
 
     def _part(self, where: str, part: Part, settings: PartSettings) -> Iterator[str]:
+        """Yield mask, quantiser and range lists of a part."""
         groups = part.groups()
         if len(settings.mask_types) != len(groups) or len(settings.mask) != part.count:
             raise FormatError(
@@ -132,7 +138,7 @@ class _Writer:
 
 
 def _same(one: PartSettings, other: PartSettings) -> bool:
-    """Whether two objects say the same; the lists count for the I plane that sends them only."""
+    """Whether a P plane may have these settings: range lists apply only to the I plane that sends them."""
     return one is other or (
         (one.mask_types, one.quant, one.gender, one.coding_type)
         == (other.mask_types, other.quant, other.gender, other.coding_type)

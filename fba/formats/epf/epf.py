@@ -1,6 +1,6 @@
 """EPF, the encoder parameter file of the reference encoder: which frames to code, and how.
 
-It holds no animation: `read_epf` and `write_epf` turn it into plane settings and back, for
+It contains no animation: `read_epf` and `write_epf` convert it to plane settings and back, for
 `fba encode --epf` and `fba decode --epf`.
 """
 
@@ -18,18 +18,18 @@ __all__ = ["read_animation", "read_epf", "sniff_epf", "write_epf"]
 
 
 def sniff_epf(head: bytes, suffix: str) -> bool:
-    """Whether a file that begins so is an EPF file: the first thing in it is a tag."""
+    """Whether a file with this beginning is an EPF file: its first word is a tag."""
     first = next((words[0] for line in head.splitlines() if (words := content(line).split())), b"")
     return decoded(first.removeprefix(UTF8_MARK)) in TAGS
 
 
 def read_animation(path: Path) -> Animation:
-    """Says what an EPF file is for: it holds no animation.
+    """Raise UnsupportedError, which says what an EPF file is for: it contains no animation.
 
-    Always raises: UnsupportedError, or FormatError for a file of another kind.
+    FormatError for a file of another kind.
     """
     if not sniff_epf(read_head(path), ""):
-        read_epf(path)  # says what is wrong with it
+        read_epf(path)  # raises an error that says what is wrong
     raise UnsupportedError(
         f"{path}: is an encoder parameter file (EPF): it says how to code an animation and holds none; "
         "use it with `fba encode IN.fap -o OUT.fba --epf FILE`, or fba.formats.epf.epf.read_epf",

@@ -1,4 +1,4 @@
-"""Joints that FAPs turn and shift, such as eyes and head: their motion as FAPs again."""
+"""Joints that FAPs turn and shift, such as eyes and head, and the way back from their motion to FAPs."""
 
 from __future__ import annotations
 
@@ -18,34 +18,35 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 Steps = tuple[tuple[int, Float64], ...]
 
 SQUARE = 1e-6
-"""Cosine up to which two axes count as standing square on each other."""
+"""Largest cosine of two axes that count as perpendicular."""
 LARGEST = 1e6
+"""Largest coordinate that a note may have."""
 
 
 @dataclass(frozen=True, eq=False)
 class FapJoint:
     """A node and the FAPs that move it, in its parent's frame.
 
-    place (3,), rest (3, 3): where it is and how it stands at FAPs of 0. turns: FAP, and radians a step about
-    each axis (3,); the outermost first; axes of two stand square on each other. shifts: FAP, and metres a
-    step (3,), which are independent of each other. told: FAPs to be taken from this joint.
+    position (3,), rest (3, 3): where it is and how it is turned when all FAPs are 0. turns: FAP, and its axis
+    (3,) times radians per step, the outermost first; axes are perpendicular. shifts: FAP, and metres per step
+    (3,), linearly independent. read_faps: the FAPs that are to be read from this joint's motion.
     """
 
     node: int
-    place: Float64
+    position: Float64
     rest: Float64
     turns: Steps
     shifts: Steps
-    told: frozenset[int] = frozenset()
+    read_faps: frozenset[int] = frozenset()
 
     @classmethod
-    def of_part(
+    def for_part(
         cls, model: FaceModel, part: str, node: int, frame: Float64, rest: Float64
     ) -> FapJoint | None:
-        """What the model's FAPs do to a part or to `HEAD`; None where motion does not tell them apart.
+        """Return the joint of a part or of `HEAD`; None if its motion does not determine the FAPs.
 
-        frame: (4, 4), from the face's frame into that of the node's parent, of one scale. rest: (4, 4), the
-        node at FAPs of 0.
+        frame: (4, 4), from the face's frame to that of the node's parent, scaled uniformly. rest: (4, 4), the
+        node when all FAPs are 0.
         """
         flat = flat_transforms(model)
         number = [*(part.name for part in model.parts), HEAD].index(part)
@@ -61,13 +62,13 @@ class FapJoint:
             centred = centred and np.allclose(centre, rest[:3, 3], atol=1e-9)
             if kind == "rotation":
                 turns.append((fap, turn @ flat.amount[row]))
-        if not centred:  # then turning shifts it too
+        if not centred:  # turning shifts it too
             shifts = []
         joint = cls(node, rest[:3, 3], rest[:3, :3], tuple(turns), tuple(shifts))
-        return joint if (turns or shifts) and joint._clear() else None
+        return joint if (turns or shifts) and joint._is_invertible() else None
 
-    def _clear(self) -> bool:
-        """Whether turns and shifts can be told apart."""
+    def _is_invertible(self) -> bool:
+        """Whether the motion determines every FAP."""
         faps = [fap for fap, _ in (*self.turns, *self.shifts)]
         if len(self.turns) > 3 or len(self.shifts) > 3 or len(set(faps)) != len(faps):
             return False
@@ -81,71 +82,73 @@ class FapJoint:
         ways = np.array([way for _, way in self.shifts]).reshape(-1, 3)
         return bool(not len(ways) or np.linalg.matrix_rank(ways) == len(ways))
 
-    def values(self, turned: Float64, places: Float64) -> dict[int, Float64]:
-        """FAPs (T,) by number, for rotations (T, 3, 3) and places (T, 3) of the node."""
-        found: dict[int, Float64] = {}
+    def values(self, turned: Float64, positions: Float64) -> dict[int, Float64]:
+        """Return FAPs (T,) by number, from rotations (T, 3, 3) and positions (T, 3) of the node."""
+        values: dict[int, Float64] = {}
         if self.turns:
             axes = np.array([axis for _, axis in self.turns])
             lengths = np.linalg.norm(axes, axis=1)
             angles = _angles(turned @ self.rest.T, axes / lengths[:, None])
             for column, (fap, _) in enumerate(self.turns):
-                found[fap] = angles[column] / lengths[column]
+                values[fap] = angles[column] / lengths[column]
         if self.shifts:
-            steps = (places - self.place) @ np.linalg.pinv(np.array([way for _, way in self.shifts]))
+            steps = (positions - self.position) @ np.linalg.pinv(np.array([way for _, way in self.shifts]))
             for column, (fap, _) in enumerate(self.shifts):
-                found[fap] = steps[:, column]
-        return found
+                values[fap] = steps[:, column]
+        return values
 
-    def note(self, told: Set[int]) -> dict[str, Any]:
-        """As JSON; told: the FAPs to be taken from it."""
+    def to_note(self, faps: Set[int]) -> dict[str, Any]:
+        """Return the joint as JSON. faps: those that are to be read from its motion."""
         return {
             "node": self.node,
-            "place": self.place.tolist(),
+            "place": self.position.tolist(),
             "rest": self.rest.ravel().tolist(),
             "turns": [[fap, axis.tolist()] for fap, axis in self.turns],
             "shifts": [[fap, way.tolist()] for fap, way in self.shifts],
-            "told": sorted(told),
+            "told": sorted(faps),
         }
 
     @classmethod
-    def of_note(cls, note: Value, nodes: int) -> FapJoint:
-        """From JSON; nodes: how many there are. ModelError where it is wrong."""
+    def from_note(cls, note: Value, nodes: int) -> FapJoint:
+        """Return the joint that a note describes; ModelError for a wrong one. nodes: how many there are."""
         joint = cls(
             note.member("node").index(nodes, "node"),
             np.array(note.member("place").numbers(3, -LARGEST, LARGEST)),
             np.array(note.member("rest").numbers(9, -1.01, 1.01)).reshape(3, 3),
-            _steps(note.member("turns")),
-            _steps(note.member("shifts")),
+            _read_steps(note.member("turns")),
+            _read_steps(note.member("shifts")),
             frozenset(
                 entry.integer(FIRST_LOW_LEVEL_FAP, FAP_COUNT)
                 for entry in note.member("told").elements(FAP_COUNT)
             ),
         )
         named = {fap for fap, _ in (*joint.turns, *joint.shifts)}
-        if not (joint._clear() and joint.told <= named):
-            raise note.error("FAPs cannot be told from this joint's motion")
+        if not (joint._is_invertible() and joint.read_faps <= named):
+            raise note.error("this joint's motion does not determine its FAPs")
         return joint
 
 
-def _steps(note: Value) -> Steps:
-    found = []
+def _read_steps(note: Value) -> Steps:
+    """Return the FAPs and axes in a note."""
+    steps = []
     for entry in note.elements(3):
         pair = entry.elements(2)
         if len(pair) != 2:
             raise entry.error("expected a FAP and its axis")
         fap = pair[0].integer(FIRST_LOW_LEVEL_FAP, FAP_COUNT)
-        found.append((fap, np.array(pair[1].numbers(3, -LARGEST, LARGEST))))
-    return tuple(found)
+        steps.append((fap, np.array(pair[1].numbers(3, -LARGEST, LARGEST))))
+    return tuple(steps)
 
 
 def _angles(turned: Float64, axes: Float64) -> Float64:
-    """(3, T), radians about up to three axes square on each other, outermost first; unused ones are 0.
+    """Return angles (3, T), in radians, about up to three perpendicular axes.
 
-    A product of turns about x, y and z once the axes are taken for those.
+    Outermost first; with fewer axes, the last angles are 0. In the frame of
+    the axes, each rotation is a product of turns about x, y and z.
     """
     base = np.eye(3)
     base[: len(axes)] = axes
-    if len(axes) == 1:  # any direction across; the axis that it has least of is never close to it
+    if len(axes) == 1:  # any perpendicular: the coordinate axis that it has least of is never parallel to it
         across = np.eye(3)[int(np.abs(axes[0]).argmin())]
         base[1] = np.cross(axes[0], across)
         base[1] /= np.linalg.norm(base[1])

@@ -1,7 +1,8 @@
-"""FAPs in glTF files of this project: noted beside the animation, and worked out again from its motion.
+"""FAPs in glTF files of this project: described in a note, and computed again from the animation.
 
-The note says which morph targets and joints show which FAP. FAPs that no motion tells (no face is in the
-file, the model does nothing for them, an eye is turned by more than half a circle) lie beside it as numbers.
+The note says which morph targets and joints show which FAP. FAPs that the motion does not determine (no face
+is in the file, the model has no table for them, an eye is turned by more than 180 degrees) are stored as
+numbers.
 """
 
 from __future__ import annotations
@@ -27,10 +28,11 @@ from fba.gltf.writer import Builder
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 CLOSE = 0.25
-"""Steps by which a FAP, told by motion, may miss the one shown, to be rounded to the same."""
+"""Largest error, in steps, of a FAP computed from motion: rounding then gives the exact value."""
 LARGEST = 2.0**31
+"""Bound of FAP values."""
 MOST_TARGETS = 1 << 12
-LOW = slice(FIRST_LOW_LEVEL_FAP - 1, FAP_COUNT)
+LOW_LEVEL = slice(FIRST_LOW_LEVEL_FAP - 1, FAP_COUNT)
 
 
 def face_note(
@@ -41,64 +43,67 @@ def face_note(
     targets: Sequence[Targets] = (),
     joints: Sequence[tuple[FapJoint, Mapping[int, Float64]]] = (),
 ) -> dict[str, Any]:
-    """What `read_face` needs. shown: float32 (T, 68), as `resolve` gives the track for the model.
+    """Return the note that `read_face` reads.
 
-    targets: all that are in the file. joints: those that FAPs turn, with the FAPs (T,) that their motion
-    tells.
+    shown: float32 (T, 68), FAPs as `resolve` returns them for track and model. targets: all in the file.
+    joints: those that FAPs move, with the FAPs (T,) that follow from their motion.
     """
-    told: set[int] = set()
+    covered: set[int] = set()
     names: dict[str, list[float]] = {}
-    for found in targets:
-        values = found.weights.astype(np.float64) @ np.array(found.values)
-        if _close(values, shown[:, found.fap - 1]):
-            told.add(found.fap)
-            names |= {name: [found.fap, value] for name, value in zip(found.names, found.values, strict=True)}
-    kept = []
+    for own in targets:
+        values = own.weights.astype(np.float64) @ np.array(own.values)
+        if _close(values, shown[:, own.fap - 1]):
+            covered.add(own.fap)
+            names |= {name: [own.fap, value] for name, value in zip(own.names, own.values, strict=True)}
+    joint_notes = []
     for joint, values_of in joints:
         right = {fap for fap, values in values_of.items() if _close(values, shown[:, fap - 1])}
-        if right - told:
-            kept.append(joint.note(right - told))
-            told |= right
-    rest = [fap for fap in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1) if fap not in told]
+        if right - covered:
+            joint_notes.append(joint.to_note(right - covered))
+            covered |= right
+    rest = [fap for fap in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1) if fap not in covered]
     return {
         "sent": (np.flatnonzero(_sent(track, shown, model)) + 1).tolist(),
         "targets": names,
-        "joints": kept,
+        "joints": joint_notes,
         "numbers": [[fap, builder.data(shown[:, fap - 1])] for fap in rest if shown[:, fap - 1].any()],
     }
 
 
 def _close(values: Float64, shown: Float32) -> bool:
+    """Whether values (T,) round to those shown (T,)."""
     return bool(np.abs(values - shown).max(initial=0) < CLOSE)
 
 
 def _sent(track: FaceTrack, shown: Float32, model: FaceModel) -> Bool:
-    """bool (68,): the FAPs whose values, sent from the first frame on, show the same; all where in doubt."""
+    """Return bool (68,): FAPs that show the same when sent in every frame; all low-level ones if in doubt."""
     sent: Bool = np.asarray(track.mask.any(axis=0) | shown.any(axis=0))
     sent[: FIRST_LOW_LEVEL_FAP - 1] = False
     values = np.rint(shown).astype(np.int64).clip(-(2**31), 2**31 - 1).astype(np.int32)
     again = resolve(FaceTrack(values, np.broadcast_to(sent, values.shape)), model)
     if np.abs(again - shown).max(initial=0) > 1:
-        sent[LOW] = True
+        sent[LOW_LEVEL] = True
     return sent
 
 
 def read_face(gltf: Gltf, clip: Clip, note: Value, times: Float64) -> FaceTrack:
-    """The face track of an animation with such a note, at times (T,), seconds. Raises ModelError where it
-    lies; warns (FbaWarning) where something that it names is not there any more."""
+    """Return the face track of an animation with such a note, at times (T,), seconds.
+
+    Raises ModelError if the note is wrong; warns (FbaWarning) if morph targets that it names are missing.
+    """
     values = np.zeros((len(times), FAP_COUNT))
-    lost: list[str] = []
-    _from_targets(gltf, clip, note.member("targets"), times, values, lost)
-    _from_joints(gltf, clip, note.member("joints"), times, values)
+    missing: list[str] = []
+    _add_targets(gltf, clip, note.member("targets"), times, values, missing)
+    _read_joints(gltf, clip, note.member("joints"), times, values)
     for entry in note.member("numbers").elements(FAP_COUNT):
         pair = entry.elements(2)
         if len(pair) != 2:
             raise entry.error("expected a FAP and an accessor")
         values[:, _fap(pair[0]) - 1] = gltf.accessors.floats(pair[1], "SCALAR", count=len(times))[:, 0]
-    if lost:
+    if missing:
         warnings.warn(
             f"{gltf.file}: morph targets of FAPs are missing, and count as 0: "
-            f"{', '.join(lost[:5])}{', ...' if len(lost) > 5 else ''}",
+            f"{', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}",
             FbaWarning,
             stacklevel=6,
         )
@@ -115,9 +120,10 @@ def _fap(value: Value) -> int:
     return value.integer(FIRST_LOW_LEVEL_FAP, FAP_COUNT)
 
 
-def _from_targets(
-    gltf: Gltf, clip: Clip, note: Value, times: Float64, values: Float64, lost: list[str]
+def _add_targets(
+    gltf: Gltf, clip: Clip, note: Value, times: Float64, values: Float64, missing: list[str]
 ) -> None:
+    """Add to values (T, 68) what morph targets show; append names that the file lacks to missing."""
     wanted: dict[str, tuple[int, float]] = {}
     for name, entry in note.members():
         pair = entry.elements(2)
@@ -137,17 +143,18 @@ def _from_targets(
             fap, value = wanted.pop(mesh.morph_names[column], (0, 0.0))
             if fap:  # else it has several targets of one name
                 values[:, fap - 1] += weights[:, column] * value
-    lost += wanted
+    missing += wanted
 
 
-def _from_joints(gltf: Gltf, clip: Clip, note: Value, times: Float64, values: Float64) -> None:
+def _read_joints(gltf: Gltf, clip: Clip, note: Value, times: Float64, values: Float64) -> None:
+    """Set the columns of values (T, 68) that joints show."""
     entries = note.elements(FAP_COUNT)
     if not entries:
         return
     sampler = Sampler(gltf, clip.channels, times)
     for entry in entries:
-        joint = FapJoint.of_note(entry, len(gltf.nodes))
+        joint = FapJoint.from_note(entry, len(gltf.nodes))
         turned = nearest_rotation(sampler.linear(joint.node))
         shown = joint.values(turned, sampler.translation(joint.node))
-        for fap in joint.told:
+        for fap in joint.read_faps:
             values[:, fap - 1] = shown[fap]

@@ -1,4 +1,4 @@
-"""Joints as nodes of a glTF file, and their turns as animation samplers."""
+"""Write joints as nodes of a glTF file, and their motion as animation channels."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from fba.rotations import quaternions
 from fba.source import Path
 
 STILL = 1e-7
-"""Numbers that change by no more do not move: less than 32-bit floats tell."""
+"""Numbers that change by no more count as still: 32-bit floats are not more exact."""
 
 
 class Clip:
-    """The one animation of a file: its channels share one row of key times.
+    """The animation of a file, whose channels share their key times.
 
-    times: float64 (T,), seconds from the first key. Raises FormatError where 32-bit floats cannot tell the
-    keys apart.
+    times: float64 (T,), seconds from the first key. Raises FormatError if the keys are too close to be
+    distinct as 32-bit floats.
     """
 
     def __init__(self, builder: Builder, times: Float64, path: Path) -> None:
@@ -37,7 +37,7 @@ class Clip:
         self.channels: list[dict[str, Any]] = []
 
     def animate(self, node: int, path: str, values: Float64 | Float32) -> None:
-        """A channel of a node; values: (T, width)."""
+        """Add a channel of a node. path: "rotation", "translation" or "weights". values: (T, width)."""
         flat = np.ascontiguousarray(values, dtype=np.float32)
         output = self._builder.data(flat.reshape(-1, 1) if path == "weights" else flat)
         self.samplers.append({"input": self._input, "output": output, "interpolation": "LINEAR"})
@@ -48,13 +48,13 @@ class Clip:
 def move(
     builder: Builder, clip: Clip, node: int, turns: Float64, shifts: Float64, *, always: bool = False
 ) -> None:
-    """Turn and shift a node; where it stands still, it just stands so.
+    """Pose a node as in the first frame, and animate it if it moves.
 
-    turns: (T, 3, 3), rotations relative to the parent. shifts: (T, 3), metres. always: with channels even
-    where it does not move.
+    turns: (T, 3, 3), rotations relative to the parent. shifts: (T, 3), metres. always: add channels even if
+    it does not move.
     """
     entry = builder.root["nodes"][node]
-    turned = smooth(quaternions(turns))
+    turned = continuous(quaternions(turns))
     if not np.array_equal(np.round(turned[0], 9), (0, 0, 0, 1)):
         entry["rotation"] = turned[0].tolist()
     entry["translation"] = (shifts[0] + 0.0).tolist()
@@ -64,8 +64,8 @@ def move(
         clip.animate(node, "translation", shifts)
 
 
-def smooth(turned: Float64) -> Float64:
-    """(T, 4) x, y, z, w of (T, 4) w, x, y, z: of the two signs of each, the one close to the frame before."""
+def continuous(turned: Float64) -> Float64:
+    """Return quaternions (T, 4) x, y, z, w of w, x, y, z, each of the sign closer to the one before."""
     values = np.roll(turned, -1, axis=-1)
     flips = np.where((values[1:] * values[:-1]).sum(axis=-1) < 0, -1.0, 1.0)
     signs = np.concatenate([[1.0 if values[0, 3] >= 0 else -1.0], flips])
@@ -74,7 +74,7 @@ def smooth(turned: Float64) -> Float64:
 
 
 def nest(builder: Builder, names: tuple[str, ...], parents: Int64) -> list[int]:
-    """Nodes of joints, children under their parents; their numbers."""
+    """Add a node for each joint, children below their parents; return the nodes' numbers."""
     nodes = [builder.add("nodes", {"name": name}) for name in names]
     for joint, parent in enumerate(parents.tolist()):
         if parent >= 0:
@@ -83,5 +83,5 @@ def nest(builder: Builder, names: tuple[str, ...], parents: Int64) -> list[int]:
 
 
 def adopt(builder: Builder, parent: int, child: int) -> None:
-    """Hang a node on another."""
+    """Make a node the child of another."""
     builder.root["nodes"][parent].setdefault("children", []).append(child)

@@ -1,4 +1,4 @@
-"""Morph targets that follow the piecewise linear paths of FAPs over the values that an animation shows."""
+"""Make morph targets that follow the piecewise linear motion of FAPs within the values of an animation."""
 
 from __future__ import annotations
 
@@ -16,15 +16,18 @@ from fba.face.tables import FaceDefTables
 from fba.parameters import FAP_COUNT, faps
 
 TOLERANCE = 1e-4
-"""Metres by which a target may miss a vertex's path between two of its values, for a face of natural size."""
-NATURAL = 0.25
-"""Metres: height of such a face with its hair."""
+"""Largest distance, in metres, of a vertex from its exact path, for a face of natural size."""
+NATURAL_HEIGHT = 0.25
+"""Height in metres of such a face with its hair."""
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What one FAP does. names: one a target. shifts: float32 (K, V, 3), displacements of the whole face at
-    weight 1, in the model's unit. weights: float32 (T, K). values: the FAP is the sum of weights times these.
+    """The morph targets of one FAP.
+
+    names: one for each target. shifts: float32 (K, V, 3), displacements of the whole face at weight 1, in the
+    model's unit. weights: float32 (T, K). values: K values of the FAP, those at weight 1; the FAP is the sum
+    of weights times these.
     """
 
     fap: int
@@ -34,66 +37,71 @@ class Targets:
     values: tuple[float, ...]
 
 
-def targets(model: FaceModel, shown: Float32) -> Iterator[Targets]:
-    """The targets of all FAPs that move vertices in an animation. shown: float32 (T, 68), as `resolve` gives.
+def make_targets(model: FaceModel, shown: Float32) -> Iterator[Targets]:
+    """Yield the targets of each FAP that moves vertices in an animation.
 
-    A FAP whose path is straight has one target, that of its reference value; another has one at each value
-    where its path bends by more than `TOLERANCE`, and between two of them both have a share, so that the
-    weights times the targets follow the path. What transforms do (eyes, the head's turn) is not in it.
+    shown: float32 (T, 68), FAPs as `resolve` returns them. A FAP that moves vertices along straight lines has
+    one target, at its reference value. Any other has one at each value where a path bends by more than
+    `TOLERANCE`; between two values both targets have a share, so that the weighted sum follows the path.
+    Transforms (of eyes and head) are left out.
     """
-    bare = tuple(FaceDefTables(table.fap, table.meshes) for table in model.tables if table.meshes)
-    if not bare:
+    tables = tuple(FaceDefTables(table.fap, table.meshes) for table in model.tables if table.meshes)
+    if not tables:
         return
-    move = Deformer(replace(model, tables=bare))
-    rest = move.local(np.zeros(FAP_COUNT))
-    tall = float(np.ptp(model.vertices[:, 1])) if len(model.vertices) else 0.0
-    tolerance = TOLERANCE * tall / NATURAL
-    for table in bare:
+    deformer = Deformer(replace(model, tables=tables))
+    rest = deformer.local(np.zeros(FAP_COUNT))
+    height = float(np.ptp(model.vertices[:, 1])) if len(model.vertices) else 0.0
+    tolerance = TOLERANCE * height / NATURAL_HEIGHT
+    for table in tables:
         values = shown[:, table.fap - 1].astype(np.float64)
         if values.any():
-            found = _targets(move, rest, table, values, tolerance)
-            if found is not None:
-                yield found
+            targets = _make_targets(deformer, rest, table, values, tolerance)
+            if targets is not None:
+                yield targets
 
 
-def _targets(
-    move: Deformer, rest: Float32, table: FaceDefTables, values: Float64, tolerance: float
+def _make_targets(
+    deformer: Deformer, rest: Float32, table: FaceDefTables, values: Float64, tolerance: float
 ) -> Targets | None:
+    """Return the targets of one FAP with values (T,), or None if it moves nothing."""
     low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
     borders = {float(b) for mesh in table.meshes for b in mesh.borders if low < b < high}
-    places = np.array(sorted({low, 0.0, high} | borders))
-    faces = np.zeros((len(places), FAP_COUNT))
-    faces[:, table.fap - 1] = places
-    shifts = move.local(faces) - rest
+    stops = np.array(sorted({low, 0.0, high} | borders))
+    faces = np.zeros((len(stops), FAP_COUNT))
+    faces[:, table.fap - 1] = stops
+    shifts = deformer.local(faces) - rest
     if not shifts.any():
         return None
-    kept = _bends(places, shifts, tolerance)
+    used = _find_bends(stops, shifts, tolerance)
     name = faps()[table.fap - 1].name
     reference = float(morph_values()[table.fap])
-    ends = [row for row in kept if places[row] != 0]
-    largest = max(ends, key=lambda row: abs(places[row]))
-    straight = shifts[largest] * np.float32(1 / places[largest])
-    if all(np.abs(shifts[row] - straight * np.float32(places[row])).max() <= tolerance for row in ends):
+    ends = [row for row in used if stops[row] != 0]
+    largest = max(ends, key=lambda row: abs(stops[row]))
+    straight = shifts[largest] * np.float32(1 / stops[largest])
+    if all(np.abs(shifts[row] - straight * np.float32(stops[row])).max() <= tolerance for row in ends):
         weights = (values / reference).astype(np.float32)[:, None]
         return Targets(table.fap, (name,), (straight * np.float32(reference))[None], weights, (reference,))
-    hats = np.stack([np.interp(values, places[kept], np.eye(len(kept))[kept.index(row)]) for row in ends], 1)
-    names = tuple(f"{name} {places[row]:.10g}" for row in ends)
-    values_at = tuple(float(places[row]) for row in ends)
+    hats = np.stack([np.interp(values, stops[used], np.eye(len(used))[used.index(row)]) for row in ends], 1)
+    names = tuple(f"{name} {stops[row]:.10g}" for row in ends)
+    values_at = tuple(float(stops[row]) for row in ends)
     return Targets(table.fap, names, shifts[ends], hats.astype(np.float32), values_at)
 
 
-def _bends(places: Float64, shifts: Float32, tolerance: float) -> list[int]:
-    """Rows between which straight lines are close to all others; the first, the last and 0 are among them."""
-    kept = sorted({0, int(np.flatnonzero(places == 0)[0]), len(places) - 1})
+def _find_bends(stops: Float64, shifts: Float32, tolerance: float) -> list[int]:
+    """Return the rows of stops between which straight lines come close to all others.
+
+    stops: (S,), values of the FAP. shifts: (S, V, 3). The first, the last and that of 0 are among them.
+    """
+    used = sorted({0, int(np.flatnonzero(stops == 0)[0]), len(stops) - 1})
     while True:
-        worst, at = tolerance, -1
-        for a, b in pairwise(kept):
+        worst, worst_row = tolerance, -1
+        for a, b in pairwise(used):
             for row in range(a + 1, b):
-                share = np.float32((places[row] - places[a]) / (places[b] - places[a]))
+                share = np.float32((stops[row] - stops[a]) / (stops[b] - stops[a]))
                 line = shifts[a] + share * (shifts[b] - shifts[a])
-                off = float(np.sqrt(((shifts[row] - line) ** 2).sum(axis=1).max()))
-                if off > worst:
-                    worst, at = off, row
-        if at < 0:
-            return kept
-        kept = sorted([*kept, at])
+                distance = float(np.sqrt(((shifts[row] - line) ** 2).sum(axis=1).max()))
+                if distance > worst:
+                    worst, worst_row = distance, row
+        if worst_row < 0:
+            return used
+        used = sorted([*used, worst_row])

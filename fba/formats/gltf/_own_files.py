@@ -1,6 +1,6 @@
-"""glTF files of this project read back: their joints' turns are BAPs already, nothing is retargeted.
+"""Read glTF files of this project: their joints are those of BAPs, so that nothing is retargeted.
 
-What the face shows is told by its morph targets and joints (`fba.formats.gltf._fap_tracks`).
+FAPs come from morph targets and joints (`fba.formats.gltf._fap_tracks`).
 """
 
 from __future__ import annotations
@@ -26,22 +26,26 @@ from fba.parameters import BAP_COUNT, baps
 
 VERSION = 1
 MOST_INDEX = 1 << 62
+"""Bound of frame numbers."""
 LARGEST = 1e6
+"""Largest coordinate that a note may have."""
 
 
-def note_of(gltf: Gltf, clip: Clip) -> Value | None:
-    """The note that fba writes at an animation: rate, first frame, body and face; None in files of others."""
+def find_note(gltf: Gltf, clip: Clip) -> Value | None:
+    """Return the note that fba adds to an animation (rate, first frame, body, face); None in other files."""
     entries = gltf.document.elements(1 << 18, "animations")
     entry = entries[gltf.animations.index(clip)]
     extras = entry.get("extras")
-    held = optional_member(extras, MARK) if extras is not None and isinstance(extras.data, dict) else None
-    ours = held is not None and isinstance(held.data, dict) and ("root" in held.data or "face" in held.data)
-    return held if ours else None
+    note = optional_member(extras, MARK) if extras is not None and isinstance(extras.data, dict) else None
+    ours = note is not None and isinstance(note.data, dict) and ("root" in note.data or "face" in note.data)
+    return note if ours else None
 
 
 def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
-    """The tracks of an animation with such a note. Raises ModelError where it lies; warns (FbaWarning) of
-    what is not there any more."""
+    """Return the tracks of an animation with such a note.
+
+    Raises ModelError if the note is wrong; warns (FbaWarning) of morph targets that are missing.
+    """
     if note.member("version").integer(0, 1 << 30) != VERSION:
         raise note.error(f"is version {note.member('version').data}; version {VERSION} is read here")
     text = note.member("rate")
@@ -53,18 +57,19 @@ def read_note(gltf: Gltf, clip: Clip, note: Value) -> Animation:
     nodes: dict[str, int] = {}
     channels: Sequence[Channel] = clip.channels
     if note.get("root") is not None:
-        nodes = _joints(gltf, note.member("root").index(len(gltf.nodes), "node"), Skeleton.default())
+        nodes = _find_joints(gltf, note.member("root").index(len(gltf.nodes), "node"), Skeleton.default())
         channels = [channel for channel in clip.channels if channel.node in set(nodes.values())]
     times = _times(channels, note)
     steps = np.rint(times * float(rate))
     if not (steps[-1] < MOST_INDEX and (len(steps) < 2 or (np.diff(steps) > 0).all())):
         raise text.error("the keys of the animation are closer than its frames")
     body = _body(gltf, channels, note, nodes, times) if nodes else None
-    face = read_face(gltf, clip, held, times) if (held := note.get("face")) is not None else None
+    face = read_face(gltf, clip, face_note, times) if (face_note := note.get("face")) is not None else None
     return Animation(rate, first + steps.astype(np.int64), face, body, clip.name)
 
 
 def _times(channels: Sequence[Channel], note: Value) -> Float64:
+    """Return the times of all keys (T,), seconds; ModelError if there are too many."""
     times = key_times(channels)
     if len(times) > MOST_FRAMES:
         raise note.error(f"its animation has {len(times)} keys, more than the {MOST_FRAMES} that are read")
@@ -74,6 +79,7 @@ def _times(channels: Sequence[Channel], note: Value) -> Float64:
 def _body(
     gltf: Gltf, channels: Sequence[Channel], note: Value, nodes: dict[str, int], times: Float64
 ) -> BodyTrack:
+    """Return the body track at times (T,). nodes: joint of the standard -> node."""
     axes = note.member("axes").choice(*convention_names())
     centre = np.array(note.member("centre").numbers(3, -LARGEST, LARGEST))
 
@@ -92,8 +98,8 @@ def _body(
     return BodyTrack(wrapped(values), np.broadcast_to(sent, values.shape))
 
 
-def _joints(gltf: Gltf, root: int, standard: Skeleton) -> dict[str, int]:
-    """Nodes at and below the root that are joints of the standard, by name."""
+def _find_joints(gltf: Gltf, root: int, standard: Skeleton) -> dict[str, int]:
+    """Return the nodes at and below the root that are joints of the standard, by name."""
     nodes = {standard.names[0]: root}
     below = {root}
     for number in gltf.order:
@@ -106,7 +112,10 @@ def _joints(gltf: Gltf, root: int, standard: Skeleton) -> dict[str, int]:
 
 
 def _matrices(sampler: Sampler, nodes: dict[str, int], standard: Skeleton, centre: Float64) -> Float64:
-    """(T, J, 4, 4) of the standard's joints: rotations, and the root's place."""
+    """Return (T, J, 4, 4) of the standard's joints: world rotations, and the root's position.
+
+    centre: (3,), position of the root at rest in the file.
+    """
     shift = sampler.translation(nodes[standard.names[0]])
     result = np.zeros((len(shift), len(standard), 4, 4))
     result[:, :, 3, 3] = 1.0

@@ -1,4 +1,4 @@
-"""Poses of a glTF skeleton: how it rests when its skin is bound, and its animation sampled over time."""
+"""Poses of a glTF skeleton: the bind pose of its skin, and its animation sampled over time."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from fba.errors import ModelError
 from fba.gltf import Channel, Gltf
 
 ALIKE = 0.05
-"""Radians within which joints agree on how the bind pose stands in the scene."""
+"""Radians within which joints agree on how the bind pose is turned in the scene."""
 
 
 class BindPose:
-    """Rotations and places of the joints in the bind pose, in the scene's frame.
+    """Rotations and positions of the joints in the bind pose, in the scene's frame.
 
-    Joints of no skin stand as their node says, relative to their parent.
+    nodes: those of the joints, parents first. parents: position of each joint's parent in nodes, -1 for a
+    root. A joint of no skin has the transform of its node, relative to its parent.
     """
 
     def __init__(self, gltf: Gltf, nodes: Sequence[int], parents: Sequence[int]) -> None:
@@ -29,40 +30,40 @@ class BindPose:
             for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
                 if joint in set(nodes):
                     inverse.setdefault(joint, np.asarray(matrix, dtype=np.float64))
-        bound = {joint: _inverted(gltf, joint, matrix) for joint, matrix in inverse.items()}
+        bound = {joint: _invert(gltf, joint, matrix) for joint, matrix in inverse.items()}
         if bound and np.ptp([matrix[:3, 3] for matrix in bound.values()], axis=0).max() <= 0:
-            bound = {}  # a skin without inverse bind matrices says nothing about how it was bound
+            bound = {}  # without inverse bind matrices, the bind pose is unknown
         turn, size = _to_scene(gltf, bound)
         self._turns = np.zeros((len(nodes), 3, 3))
-        self.places = np.zeros((len(nodes), 3))
+        self.positions = np.zeros((len(nodes), 3))
         self._parents = parents
         for number, node in enumerate(nodes):
             parent = parents[number]
             if node in bound:
                 self._turns[number] = turn @ nearest_rotation(bound[node][:3, :3])
-                self.places[number] = size * (turn @ bound[node][:3, 3])
+                self.positions[number] = size * (turn @ bound[node][:3, 3])
                 continue
             local = gltf.nodes[node].local
             if parent < 0:
                 world = gltf.nodes[node].world
                 self._turns[number] = nearest_rotation(world[:3, :3])
-                self.places[number] = world[:3, 3]
+                self.positions[number] = world[:3, 3]
             else:
                 above = gltf.nodes[nodes[parent]].world
                 scale = float(np.cbrt(abs(np.linalg.det(above[:3, :3]))))
                 self._turns[number] = self._turns[parent] @ nearest_rotation(local[:3, :3])
-                self.places[number] = self.places[parent] + scale * (self._turns[parent] @ local[:3, 3])
+                self.positions[number] = self.positions[parent] + scale * (self._turns[parent] @ local[:3, 3])
 
     def offsets(self) -> Float64:
-        """float64 (J, 3): from the parent in the bind pose; the root's own place."""
-        result = self.places.copy()
+        """Return float64 (J, 3): positions relative to the parent in the bind pose; absolute for roots."""
+        result = self.positions.copy()
         for number, parent in enumerate(self._parents):
             if parent >= 0:
-                result[number] -= self.places[parent]
+                result[number] -= self.positions[parent]
         return result
 
     def turned(self, number: int, linear: Float64) -> Float64:
-        """Quaternions (T, 4), w first: how far a joint is turned from the bind pose, from its (T, 3, 3)."""
+        """Return quaternions (T, 4), w first, from the bind pose to world rotations (T, 3, 3) of a joint."""
         return rotations.quaternions(nearest_rotation(linear) @ self._turns[number].T)
 
 
@@ -74,19 +75,19 @@ class Sampler:
         self._channels = {(channel.node, channel.path): channel for channel in channels}
 
     def translation(self, node: int) -> Float64:
-        """float64 (T, 3)."""
+        """Return a node's translations, float64 (T, 3)."""
         channel = self._channels.get((node, "translation"))
         if channel is not None:
             return sample(channel, self._times)
         return np.broadcast_to(self._gltf.nodes[node].local[:3, 3], (len(self._times), 3))
 
     def linear(self, node: int) -> Float64:
-        """float64 (T, 3, 3): rotation times scale."""
+        """Return a node's rotations times scales, float64 (T, 3, 3)."""
         own = self._gltf.nodes[node]
         turn, scale = (self._channels.get((node, path)) for path in ("rotation", "scale"))
         if turn is None and scale is None:
             return np.broadcast_to(own.local[:3, :3], (len(self._times), 3, 3))
-        if own.rotation is None or own.scale is None:  # given as a matrix, which is never animated in part
+        if own.rotation is None or own.scale is None:  # given as a matrix, of which no part can be animated
             lengths = np.linalg.norm(own.local[:3, :3], axis=0)
             matrix = nearest_rotation(own.local[:3, :3])
         else:
@@ -101,7 +102,7 @@ class Sampler:
 
 
 def key_times(channels: Sequence[Channel]) -> Float64:
-    """All times of keys, rising. ModelError where there are none."""
+    """Return the times of all keys, increasing. ModelError without keys."""
     times = [np.asarray(channel.times, dtype=np.float64) for channel in channels if len(channel.times)]
     if not times:
         raise ModelError("the animation has no keys")
@@ -109,8 +110,7 @@ def key_times(channels: Sequence[Channel]) -> Float64:
 
 
 def sample(channel: Channel, times: Float64) -> Float64:
-    """Values (T, width) of a channel at times (T,); before the first key and after the last they stand
-    still."""
+    """Return values (T, width) of a channel at times (T,); constant outside of its keys."""
     keys = np.asarray(channel.times, dtype=np.float64)
     values = np.asarray(channel.values, dtype=np.float64)
     turns = channel.path == "rotation"
@@ -130,15 +130,15 @@ def sample(channel: Channel, times: Float64) -> Float64:
     elif channel.interpolation == "STEP":
         result = np.where((share >= 1.0)[:, None], values[after], values[before])
     elif turns:
-        unit = _unit(values)
+        unit = _normalize(values)
         return rotations.interpolate(unit[:, None, :], before, after, share)[:, 0]
     else:
         result = values[before] * (1 - share[:, None]) + values[after] * share[:, None]
-    return _unit(result) if turns else result
+    return _normalize(result) if turns else result
 
 
 def nearest_rotation(matrices: Float64) -> Float64:
-    """The rotations (..., 3, 3) closest to matrices that also scale; ModelError where they flatten."""
+    """Return the rotations (..., 3, 3) closest to matrices that also scale; ModelError for singular ones."""
     u, s, v = np.linalg.svd(matrices)
     if (s[..., -1] <= 1e-9 * np.maximum(s[..., 0], 1e-300)).any():
         raise ModelError("a joint is scaled to nothing; its rotation is unknown")
@@ -148,7 +148,8 @@ def nearest_rotation(matrices: Float64) -> Float64:
     return result
 
 
-def _unit(values: Float64) -> Float64:
+def _normalize(values: Float64) -> Float64:
+    """Return unit quaternions; ModelError for one of length 0."""
     length = np.linalg.norm(values, axis=-1, keepdims=True)
     if (length < 1e-6).any():
         raise ModelError("an animation has a rotation that is no rotation: a quaternion of length 0")
@@ -156,7 +157,8 @@ def _unit(values: Float64) -> Float64:
     return result
 
 
-def _inverted(gltf: Gltf, joint: int, matrix: Float64) -> Float64:
+def _invert(gltf: Gltf, joint: int, matrix: Float64) -> Float64:
+    """Return the inverse (4, 4) of an inverse bind matrix; ModelError if it has none."""
     result = np.full((4, 4), np.nan)
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
         result[:] = np.linalg.inv(matrix)
@@ -166,10 +168,11 @@ def _inverted(gltf: Gltf, joint: int, matrix: Float64) -> Float64:
 
 
 def _to_scene(gltf: Gltf, bound: dict[int, Float64]) -> tuple[Float64, float]:
-    """Rotation and scale from the frame in which the skin was bound to the scene's.
+    """Return rotation (3, 3) and scale from the frame in which the skin was bound to that of the scene.
 
-    Where the nodes stand in the bind pose, they say it exactly. Where they stand otherwise, it is taken for
-    one of the 24 turns between axes, the one closest to what the first joint says.
+    bound: joint -> its matrix (4, 4) in the bind pose. If the nodes are in the bind pose, the rotation is
+    exact. Otherwise it is assumed to be one of the 24 turns between axes, the one closest to that of the
+    first joint.
     """
     if not bound:
         return np.eye(3), 1.0
@@ -181,14 +184,15 @@ def _to_scene(gltf: Gltf, bound: dict[int, Float64]) -> tuple[Float64, float]:
         sizes.append(float(np.cbrt(abs(np.linalg.det(both)))))
     size = float(np.median(sizes))
     first = turns[0]
-    apart = [np.arccos(np.clip((np.trace(first.T @ turn) - 1) / 2, -1, 1)) for turn in turns]
-    if np.median(apart) < ALIKE:
+    differences = [np.arccos(np.clip((np.trace(first.T @ turn) - 1) / 2, -1, 1)) for turn in turns]
+    if np.median(differences) < ALIKE:
         return first, size
     best = max(_axis_turns(), key=lambda turn: float(np.trace(turn.T @ first)))
     return best, size
 
 
 def _axis_turns() -> list[Float64]:
+    """Return the 24 rotations (3, 3) that map axes to axes."""
     result = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):

@@ -1,7 +1,7 @@
-"""glTF 2.0 skeletons: animated joints, as exporters write them from FBX, become BAPs.
+"""Read glTF 2.0 skeletons: animated joints, such as those that exporters write from FBX, become BAPs.
 
-A glTF skeleton rests in its bind pose, where every joint may stand turned; `SkeletonMotion` rests
-with all rotations the identity. So rotations are taken against the bind pose, in the scene's frame.
+A glTF skeleton rests in its bind pose, in which joints may be turned; in a `SkeletonMotion` at rest all
+rotations are the identity. So rotations are taken relative to the bind pose, in the scene's frame.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton, matching
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
-from fba.formats.gltf._own_files import note_of, read_note
+from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
@@ -27,7 +27,7 @@ from fba.source import Path
 USUAL_RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 DEFAULT_RATE = Fraction(30)
 STRETCH = 0.01
-"""Share of the skeleton's size by which a joint may move against its parent before it is worth a word."""
+"""Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -49,10 +49,11 @@ def read(
     joints: Mapping[str, str] | None = None,
     clip: str | int | None = None,
 ) -> Animation:
-    """A glTF skeleton's animation as BAPs (see `fba.capture.from_skeleton`, and `read_motion` for clip).
+    """Read the animation of a glTF skeleton as BAPs.
 
-    Files that this project wrote are taken as they are, BAPs and FAPs with their own frames, unless they are
-    to be retargeted by another option than clip and rate.
+    The options are those of `fba.capture.from_skeleton`; clip: see `read_motion`. BAPs and FAPs in files of
+    this project are read as they are, with their own frames, unless an option other than clip and rate asks
+    for retargeting.
 
     Raises FormatError for anything that is not glTF, or whose skeleton is not a body; warns (FbaWarning)
     of what is left out.
@@ -63,12 +64,14 @@ def read(
             None, None, "source", "floor", True, "spread",
         )  # fmt: skip
         if plain and gltf.animations:
-            own = gltf.animations[0] if clip is None else _clip(gltf, clip, set(range(len(gltf.nodes))))
-            note = note_of(gltf, own)
+            own = (
+                gltf.animations[0] if clip is None else _choose_clip(gltf, clip, set(range(len(gltf.nodes))))
+            )
+            note = find_note(gltf, own)
             if note is not None:
                 animation = read_note(gltf, own, note)
                 return animation if rate is None else animation.resample(Fraction(rate))
-        motion = motion_of(gltf, clip=clip, rate=rate)
+        motion = sample_motion(gltf, clip=clip, rate=rate)
         return from_skeleton(
             motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
         )
@@ -79,21 +82,21 @@ def read(
 def read_motion(
     path: Path, *, clip: str | int | None = None, rate: Fraction | int | str | None = None
 ) -> SkeletonMotion:
-    """The joints of a glTF file and one of its animations, sampled.
+    """Return the joints of a glTF file and one of its animations, sampled.
 
-    clip: name or number (from 0) of the animation; the first that moves the skeleton where None. rate: frames
-    a second; where None, that of the keys, if they are regular, else 30. Raises FormatError, ModelError;
-    warns (FbaWarning) where there are several animations or skeletons to choose from.
+    clip: name or number (from 0) of the animation; None for the first that moves the skeleton. rate: frames
+    per second; None for that of the keys if they are regular, else 30. Raises FormatError, ModelError; warns
+    (FbaWarning) if there are several animations or skeletons to choose from.
     """
-    return motion_of(read_gltf(path), clip=clip, rate=rate)
+    return sample_motion(read_gltf(path), clip=clip, rate=rate)
 
 
-def motion_of(
+def sample_motion(
     gltf: Gltf, *, clip: str | int | None = None, rate: Fraction | int | str | None = None
 ) -> SkeletonMotion:
-    """As `read_motion`, of a file that has been read."""
+    """Do the same as `read_motion` for a file that has been read."""
     nodes = _skeleton(gltf)
-    chosen = _clip(gltf, clip, set(nodes))
+    chosen = _choose_clip(gltf, clip, set(nodes))
     channels = [channel for channel in chosen.channels if channel.node in set(nodes)]
     times = key_times(channels)
     frames = Fraction(rate) if rate is not None else _rate(times)
@@ -106,14 +109,14 @@ def motion_of(
             f"animation {chosen.name!r}: {last - first:.0f} s at {float(frames):g} frames/s are "
             f"{count} frames, more than {MOST_FRAMES}; give a lower rate, or cut it into pieces"
         )
-    at = first + np.arange(count) / float(frames)
+    sample_times = first + np.arange(count) / float(frames)
     parents = [nodes.index(p) if (p := gltf.nodes[node].parent) in nodes else -1 for node in nodes]
     bind = BindPose(gltf, nodes, parents)
-    sampler = Sampler(gltf, channels, at)
+    sampler = Sampler(gltf, channels, sample_times)
 
-    # every node of the skeleton in the scene's frame, over time
+    # the transforms of all nodes of the skeleton in the scene's frame
     turned = np.zeros((count, len(nodes), 4))
-    places = np.zeros((count, len(nodes), 3))
+    positions = np.zeros((count, len(nodes), 3))
     linear: list[Float64] = []
     for number, node in enumerate(nodes):
         local = sampler.linear(node)
@@ -123,32 +126,35 @@ def motion_of(
             above = gltf.nodes[node].parent
             base = np.eye(4) if above is None else gltf.nodes[above].world
             linear.append(base[:3, :3] @ local)
-            places[:, number] = shift @ base[:3, :3].T + base[:3, 3]
+            positions[:, number] = shift @ base[:3, :3].T + base[:3, 3]
         else:
             linear.append(linear[parent] @ local)
-            places[:, number] = places[:, parent] + (linear[parent] @ shift[:, :, None])[:, :, 0]
+            positions[:, number] = positions[:, parent] + (linear[parent] @ shift[:, :, None])[:, :, 0]
         turned[:, number] = bind.turned(number, linear[number])
-    kept = _below(parents, _root([gltf.nodes[node].name for node in nodes]))
-    local_turns = turned[:, kept]
-    for place, number in enumerate(kept[1:], 1):
-        back = turned[:, parents[number]] * [1, -1, -1, -1]
-        local_turns[:, place] = rotations.multiply(back, turned[:, number])
+    used = _descendants(parents, _find_root([gltf.nodes[node].name for node in nodes]))
+    local_turns = turned[:, used]
+    for row, number in enumerate(used[1:], 1):
+        inverse = turned[:, parents[number]] * [1, -1, -1, -1]
+        local_turns[:, row] = rotations.multiply(inverse, turned[:, number])
     motion = SkeletonMotion(
-        names=tuple(gltf.nodes[nodes[number]].name for number in kept),
-        parents=np.array([kept.index(parents[n]) if place else -1 for place, n in enumerate(kept)]),
-        offsets=bind.offsets()[kept],
+        names=tuple(gltf.nodes[nodes[number]].name for number in used),
+        parents=np.array([used.index(parents[n]) if row else -1 for row, n in enumerate(used)]),
+        offsets=bind.offsets()[used],
         rotations=local_turns / np.linalg.norm(local_turns, axis=-1, keepdims=True),
-        positions=places[:, kept[0]],
+        positions=positions[:, used[0]],
         rate=frames,
         name=chosen.name,
     )
-    _say_stretched(motion, places[:, kept])
+    _warn_of_stretching(motion, positions[:, used])
     return motion
 
 
 def _skeleton(gltf: Gltf) -> list[int]:
-    """Nodes of the skeleton, parents first, one root: joints of skins and what animates them, or all
-    nodes."""
+    """Return the nodes of the skeleton, parents first, with one root.
+
+    They are the joints of skins, or else the animated nodes and their children, and all nodes above. Of
+    several skeletons, the one with most known joints; warns (FbaWarning) of the others.
+    """
     wanted = {joint for skin in gltf.skins for joint in skin.joints}
     if not wanted:
         wanted = {channel.node for clip in gltf.animations for channel in clip.channels}
@@ -157,7 +163,7 @@ def _skeleton(gltf: Gltf) -> list[int]:
         raise ModelError(
             f"{gltf.file}: has neither a skin with joints nor an animation; there is no skeleton"
         )
-    for number in reversed(gltf.order):  # all joints hang together, up to where they meet
+    for number in reversed(gltf.order):  # with all nodes above, so that the joints are connected
         parent = gltf.nodes[number].parent
         if number in wanted and parent is not None:
             wanted.add(parent)
@@ -181,16 +187,16 @@ def _skeleton(gltf: Gltf) -> list[int]:
     return best
 
 
-def _root(names: list[str]) -> int:
-    """The hips: what stands above them (an armature, the root of a game's figure) moves them as a whole."""
+def _find_root(names: list[str]) -> int:
+    """Return the position of the hips, or 0. Nodes above them (an armature, a game's root) only move all."""
     try:
         return matching.match(names)[1]["HumanoidRoot"]
     except ModelError:
         return 0
 
 
-def _below(parents: list[int], root: int) -> list[int]:
-    """A joint and all that hang on it, parents first."""
+def _descendants(parents: list[int], root: int) -> list[int]:
+    """Return a joint and all below it, parents first."""
     result = {root}
     for number, parent in enumerate(parents):
         if parent in result:
@@ -199,13 +205,18 @@ def _below(parents: list[int], root: int) -> list[int]:
 
 
 def _fit(gltf: Gltf, tree: list[int]) -> int:
+    """Return the number of nodes whose names are known."""
     try:
         return len(matching.match([gltf.nodes[number].name for number in tree])[1])
     except ModelError:
         return 0
 
 
-def _clip(gltf: Gltf, clip: str | int | None, nodes: set[int]) -> Clip:
+def _choose_clip(gltf: Gltf, clip: str | int | None, nodes: set[int]) -> Clip:
+    """Return the animation with this name or number, or the first that turns one of the nodes.
+
+    ModelError if there is none; warns (FbaWarning) if there are several and clip is None.
+    """
     moving = [a for a in gltf.animations if any(c.node in nodes and c.path == "rotation" for c in a.channels)]
     names = ", ".join(repr(a.name) for a in gltf.animations[:8])
     if clip is None:
@@ -221,35 +232,38 @@ def _clip(gltf: Gltf, clip: str | int | None, nodes: set[int]) -> Clip:
             )
         return moving[0]
     if isinstance(clip, int):
-        found = gltf.animations[clip] if 0 <= clip < len(gltf.animations) else None
+        chosen = gltf.animations[clip] if 0 <= clip < len(gltf.animations) else None
     else:
-        found = next((a for a in gltf.animations if a.name == clip), None)
-    if found is None or not any(channel.node in nodes for channel in found.channels):
+        chosen = next((a for a in gltf.animations if a.name == clip), None)
+    if chosen is None or not any(channel.node in nodes for channel in chosen.channels):
         raise ModelError(
             f"{gltf.file}: no animation {clip!r} moves the skeleton; there are {names or 'none'}"
         )
-    return found
+    return chosen
 
 
 def _rate(times: Float64) -> Fraction:
-    """Frames a second of regular keys: the usual rate that fits most of their distances."""
+    """Return frames per second of regular keys: the usual rate that fits most of their intervals, else 30."""
     steps = np.diff(times)
     steps = steps[steps > 1e-4]
     if not len(steps):
         return DEFAULT_RATE
     shortest = float(np.percentile(steps, 25))
     for rate in USUAL_RATES:
-        whole = steps * rate
-        if rate * shortest > 0.9 and (np.abs(whole - np.rint(whole)) < 0.02).mean() > 0.95:
+        frames = steps * rate
+        if rate * shortest > 0.9 and (np.abs(frames - np.rint(frames)) < 0.02).mean() > 0.95:
             return Fraction(rate)
     return DEFAULT_RATE
 
 
-def _say_stretched(motion: SkeletonMotion, places: Float64) -> None:
-    """Joints that move against their parents are held where they are in the bind pose."""
+def _warn_of_stretching(motion: SkeletonMotion, positions: Float64) -> None:
+    """Warn of joints that move relative to their parents: `motion` keeps them as in the bind pose.
+
+    positions: (T, J, 3), where the file has the joints.
+    """
     size = float(np.ptp(motion.rest(), axis=0).max()) or 1.0
-    kept = motion.world()[1]
-    moved = np.abs(kept - places).max(axis=(0, 2)) > STRETCH * size
+    rigid = motion.world()[1]
+    moved = np.abs(rigid - positions).max(axis=(0, 2)) > STRETCH * size
     if moved.any():
         names = [motion.names[number] for number in np.flatnonzero(moved)]
         warnings.warn(

@@ -1,8 +1,8 @@
 """Write glTF 2.0 (.glb): a skinned, animated person that Blender, three.js and game engines open.
 
-Nodes are the joints of the standard, by name, and stand as in the first frame. Every joint that moves has
-LINEAR keys at the animation's own times, counted from the first frame. A face is morph targets, with FAPs as
-their weights. docs/formats.md describes what is approximate.
+Nodes are the joints of the standard, by name, posed as in the first frame. Every joint that moves has LINEAR
+keys at the animation's own times, counted from the first frame. FAPs are weights of morph targets.
+docs/formats.md describes what is approximate.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 MOST_FRAMES = 100_000
 """Near an hour at 30 frames/s; a frame of a body takes up to 1.4 kB."""
 CHUNK = 2048
+"""Frames that are posed at once."""
 MARK = "fba"
-"""Key of this project's notes in the extras of the animation."""
+"""Key of this project's note in the extras of the animation."""
 
 
 def write(
@@ -46,14 +47,14 @@ def write(
 ) -> None:
     """Write an animation as .glb.
 
-    mesh: with the person's surface; False for the skeleton alone (then there must be a body track). model:
-    the face, by default the built-in head. body: what BAPs move, by default the built-in person. axes: which
-    way BAPs turn (`fba.body.convention_names()`).
+    mesh: with the person's surface; False for the skeleton alone, which needs a body track. model: the face,
+    by default the built-in head. body: the body that BAPs move, by default the built-in person. axes: the
+    convention of BAP axes (`fba.body.convention_names()`).
 
-    A body track gives the whole person, with a head on it; a face track alone the head by itself. Read
-    again, the file gives the same BAPs and FAPs at the same times (docs/formats.md says what is lost).
-    Raises FormatError where there is no frame, or more than 100,000, or no body for a skeleton; ModelError
-    where glTF cannot hold a model. Warns (FbaWarning) where a body has no place for a face.
+    An animation with a body is written as a whole person, one with only a face as a head. Reading the file
+    returns the same BAPs and FAPs at the same times (docs/formats.md says what is lost). Raises FormatError
+    for no frame, more than 100,000, or a skeleton without a body track; ModelError if glTF cannot hold a
+    model. Warns (FbaWarning) if a body has no place for a face.
     """
     if os.fspath(path).lower().endswith(".gltf"):
         raise FormatError("glTF is written in one file; name it .glb", path=path)
@@ -71,9 +72,9 @@ def write(
     clip = Clip(builder, times, path)
     note: dict[str, Any] = {"version": 1, "rate": str(animation.rate), "first": first}
     if animation.body is not None:
-        roots = _person(builder, clip, animation, note, mesh, model, body, axes)
+        roots = _add_person(builder, clip, animation, note, mesh, model, body, axes)
     else:
-        roots = _head(builder, clip, animation, note, model)
+        roots = _add_head(builder, clip, animation, note, model)
     builder.add("scenes", {"nodes": roots})
     builder.add(
         "animations",
@@ -87,7 +88,7 @@ def write(
     builder.save(path)
 
 
-def _person(
+def _add_person(
     builder: Builder,
     clip: Clip,
     animation: Animation,
@@ -97,6 +98,7 @@ def _person(
     body: BodyModel | None,
     axes: str,
 ) -> list[int]:
+    """Add a person or a skeleton with its animation, and complete the note; return the root nodes."""
     from fba.body import BapSolver, Skeleton
     from fba.body.model import BodyModel
     from fba.gltf.part_materials import PartWriter
@@ -105,57 +107,58 @@ def _person(
     skeleton = Skeleton.default() if person is None else person.skeleton
     solver = BapSolver(skeleton, axes)
     nodes = nest(builder, skeleton.names, skeleton.parents)
-    turns, places = _local(solver, held_baps(animation))
+    turns, positions = _local_motion(solver, held_baps(animation))
     for joint, node in enumerate(nodes):
-        shifts = places if joint == 0 else np.broadcast_to(skeleton.offsets[joint], places.shape)
+        shifts = positions if joint == 0 else np.broadcast_to(skeleton.offsets[joint], positions.shape)
         move(builder, clip, node, turns[joint], shifts, always=joint == 0)
     note |= {"axes": axes, "root": nodes[0], "centre": skeleton.centres[0].tolist()}
     if person is None:
         bind = np.tile(np.eye(4), (len(skeleton), 1, 1))
         bind[:, :3, 3] = skeleton.centres
-        _skin(builder, nodes, bind, nodes[0])
+        _add_skin(builder, nodes, bind, nodes[0])
         _note_face(builder, animation, note, model, None)
         return [nodes[0]]
 
     slots: dict[str, int] = {}
     bound = list(person.bind)
     joints = list(nodes)
-    head = _head_of(builder, clip, animation, person, model)
+    head = _make_head(builder, clip, animation, person, model)
     if head is not None:
         from fba.body.head_attachment import skull_of
 
         skull = skull_of(person)
         node = nodes[skull]
-        if head.turns:
-            node = head.turn(nodes[skull], person.bind[skull])
-            joints[skull] = node  # all that the skull carries, the neck's part too
+        if head.is_turned:
+            node = head.add_head_node(nodes[skull], person.bind[skull])
+            joints[skull] = node  # moves all that the skull moves, including part of the neck
             joints.append(nodes[skull])
             bound.append(person.bind[skull])
-        for name, eye in head.joints(node, person.bind[skull]).items():
+        for name, eye in head.add_joints(node, person.bind[skull]).items():
             slots[name] = len(joints)
             joints.append(eye)
         bound += [matrix for _, matrix in head.bound]
-    _skin(builder, joints, np.array(bound), nodes[0])
-    looks = PartWriter(builder)
+    _add_skin(builder, joints, np.array(bound), nodes[0])
+    materials = PartWriter(builder)
     roots = [nodes[0]]
     for part in person.parts:
         if part.kind == "neck" and head is not None and head.on is not None and head.on.brings_neck:
             continue
-        primitive = looks.primitive(part)
+        primitive = materials.primitive(part)
         used = np.where(part.weights > 0, part.joints, 0)
         primitive["attributes"]["JOINTS_0"] = builder.attribute(used.astype(np.uint16))
         primitive["attributes"]["WEIGHTS_0"] = builder.attribute(part.weights)
         shown = builder.add("meshes", {"name": part.name, "primitives": [primitive]})
         roots.append(builder.add("nodes", {"name": part.name, "mesh": shown, "skin": 0}))
     if head is not None:
-        roots += head.meshes(slots, looks, True, {})
+        roots += head.add_meshes(slots, materials, True, {})
     _note_face(builder, animation, note, model, head)
     return roots
 
 
-def _head_of(
+def _make_head(
     builder: Builder, clip: Clip, animation: Animation, person: BodyModel, model: FaceModel | None
 ) -> HeadParts | None:
+    """Return a person's head, without meshes yet; None with a warning if the body has no place for it."""
     from fba.face.model import FaceModel
     from fba.formats.gltf._head import HeadParts
 
@@ -171,19 +174,19 @@ def _head_of(
     return HeadParts(builder, clip, face, _shown(animation, face), person)
 
 
-def _head(
+def _add_head(
     builder: Builder, clip: Clip, animation: Animation, note: dict[str, Any], model: FaceModel | None
 ) -> list[int]:
-    """A face by itself, in its own frame."""
+    """Add a face by itself, in its own frame, and complete the note; return the scene's root nodes."""
     from fba.face.model import FaceModel
     from fba.formats.gltf._head import HeadParts
     from fba.gltf.part_materials import PartWriter
 
     face = model or FaceModel.default()
     head = HeadParts(builder, clip, face, _shown(animation, face), None)
-    node = head.turn(None, np.eye(4), always=True)
-    hang = {"": node, **head.joints(node, np.eye(4))}
-    head.meshes({}, PartWriter(builder), False, hang)
+    node = head.add_head_node(None, np.eye(4), always=True)
+    parents = {"": node, **head.add_joints(node, np.eye(4))}
+    head.add_meshes({}, PartWriter(builder), False, parents)
     _note_face(builder, animation, note, face, head)
     return [node]
 
@@ -195,7 +198,7 @@ def _note_face(
     model: FaceModel | None,
     head: HeadParts | None,
 ) -> None:
-    """Note which FAPs the head shows; without a head, their numbers."""
+    """Add to the note which FAPs the head shows; without a head, their values."""
     from fba.face.model import FaceModel
     from fba.formats.gltf._fap_tracks import face_note
 
@@ -210,6 +213,7 @@ def _note_face(
 
 
 def _shown(animation: Animation, model: FaceModel) -> Float32:
+    """Return the FAPs that a model shows, float32 (T, 68)."""
     from fba.face.resolve import resolve
     from fba.parameters import FAP_COUNT
 
@@ -218,23 +222,24 @@ def _shown(animation: Animation, model: FaceModel) -> Float32:
     return resolve(animation.face, model)
 
 
-def _local(solver: BapSolver, baps: Int32) -> tuple[Float64, Float64]:
-    """(J, T, 3, 3) turns of the joints relative to their parents, (T, 3) places of the root."""
+def _local_motion(solver: BapSolver, baps: Int32) -> tuple[Float64, Float64]:
+    """Return rotations (J, T, 3, 3) of joints relative to their parents, and positions (T, 3) of the root."""
     count, parents = len(solver.skeleton), solver.skeleton.parents
     turns = np.empty((count, len(baps), 3, 3))
-    places = np.empty((len(baps), 3))
+    positions = np.empty((len(baps), 3))
     for start in range(0, len(baps), CHUNK):
         rows = slice(start, start + CHUNK)
         world = solver.pose(baps[rows])[..., :3, :]
-        places[rows] = world[:, 0, :, 3]
+        positions[rows] = world[:, 0, :, 3]
         turns[0, rows] = world[:, 0, :, :3]
         for joint in range(1, count):
             above = world[:, parents[joint], :, :3]
             turns[joint, rows] = np.swapaxes(above, 1, 2) @ world[:, joint, :, :3]
-    return turns, places
+    return turns, positions
 
 
-def _skin(builder: Builder, joints: list[int], bind: Float64, root: int) -> None:
+def _add_skin(builder: Builder, joints: list[int], bind: Float64, root: int) -> None:
+    """Add skin 0. bind: (J, 4, 4), the joints in the bind pose."""
     inverse = np.linalg.inv(bind)
     inverse[:, 3] = (0, 0, 0, 1)
     builder.add(

@@ -1,7 +1,7 @@
 """Read the frames of FAP and BAP files: pairs of lines, a mask and `<frame number> <values>`.
 
-Numbers are parsed by NumPy, many lines at once; where anything is wrong with a batch its lines are
-gone through one by one, to name line and token.
+NumPy parses the numbers of many lines at once. If it fails on a batch, the lines of that batch are parsed
+one by one, so that the error names the line and the token.
 """
 
 from __future__ import annotations
@@ -21,13 +21,16 @@ from fba.formats.text.values import Row, ValueParser
 from fba.source import Path, open_source
 
 BATCH_LINES = 2048
+"""Most lines that are parsed at once."""
 BATCH_BYTES = 1 << 20
+"""Most bytes that are parsed at once."""
 CACHED_MASKS = 4096
+"""Most mask lines that are cached, so that a file in which each is spelt differently does not fill memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """What a file holds. index: int64 (T,); mask: bool (T, columns); slots: int32 (T, slots)."""
+    """Content of a FAP or BAP file. index: int64 (T,); mask: bool (T, columns); slots: int32 (T, slots)."""
 
     header: Header
     index: Int64
@@ -44,8 +47,10 @@ def read_frames(
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
 ) -> Frames:
-    """Everything in the file; options as `fba.formats.text.fap.read_fap`. Raises FormatError, warns with
-    FbaWarning."""
+    """Return the header and all frames of a file.
+
+    The options are those of `fba.formats.text.fap.read_fap`. Raises FormatError; warns with FbaWarning.
+    """
     rate = None if fps is None else parse_rate(fps)
     try:
         scale = float(angle_scale)
@@ -57,9 +62,9 @@ def read_frames(
     with file:
         lines = Lines(file, size, path)
         reader = _Reader(lines, layout, scale)
-        header, first = _header(lines, layout, rate, name)
+        header, first_mask = _read_header(lines, layout, rate, name)
         try:
-            reader.read(first)
+            reader.read(first_mask)
             reader.flush()
         except FormatError as error:
             reader.flush(salvage=True)
@@ -73,10 +78,11 @@ def read_frames(
     return reader.frames(header)
 
 
-def _header(
+def _read_header(
     lines: Lines, layout: Layout, rate: Fraction | None, name: str | None
 ) -> tuple[Header, bytes | None]:
-    """The header, and the first mask line where there is no header."""
+    """Return the header and None; without a header in the file, one made from the options and the first mask
+    line."""
     for line in lines:
         body = content(line)
         if not body:
@@ -88,7 +94,7 @@ def _header(
                     "the file begins with frames: it has no header, so its frame rate is unknown"
                 ).with_remedies(GIVE_RATE)
             return Header("", name or "", rate, None), line
-        # a name may hold a "#": the comment is only cut off where the line makes no sense with it
+        # a name may contain "#": cut the comment off only if the line is no header with it
         try:
             header = parse_header(line, lines, rate)
         except FormatError:
@@ -107,6 +113,8 @@ def _header(
 
 
 class _Reader:
+    """Collects the frames of a file, batch by batch. count: frames parsed so far."""
+
     def __init__(self, lines: Lines, layout: Layout, angle_scale: float) -> None:
         self.lines = lines
         self.layout = layout
@@ -114,29 +122,32 @@ class _Reader:
         self.count = 0
         self._masks: dict[bytes, int] = {}
         self._bits: list[Bool] = []  # distinct masks, each (columns,)
-        self._slots: list[Bool] = []  # what each brings to a frame line, (1 + slots,): the number first
+        self._present: list[
+            Bool
+        ] = []  # numbers on a frame line under each mask, (1 + slots,), frame number first
         self._tokens: list[int] = []  # how many numbers that is
         self._extra: list[bool] = []  # whether the superfluous column of the mask is 1
         self._pending: list[Row] = []
         self._blocks: list[tuple[Int64, Int32, Int64, Int64]] = []  # numbers, slots, masks, lines
 
-    def read(self, first: bytes | None) -> None:
-        mask = None if first is None else self._mask(first)
+    def read(self, first_mask: bytes | None) -> None:
+        """Read all lines; the last batch stays pending until `flush`. first_mask: a mask read already."""
+        mask = None if first_mask is None else self._mask_id(first_mask)
         pending_bytes = 0
         masks, tokens = self._masks, self._tokens
         for line in self.lines:
             if mask is None:
                 mask = masks.get(line)
                 if mask is None and content(line):
-                    mask = self._mask(line)
+                    mask = self._mask_id(line)
                 continue
             body = line.partition(b"#")[0] if b"#" in line else line
-            found = len(body.split())
-            if not found:
+            count = len(body.split())
+            if not count:
                 continue
-            if found != tokens[mask]:
-                body = self._unexpected(body, mask)
-            self._pending.append(Row(body, self.lines.number, mask, self._slots[mask]))
+            if count != tokens[mask]:
+                body = self._drop_extra_value(body, mask)
+            self._pending.append(Row(body, self.lines.number, mask, self._present[mask]))
             pending_bytes += len(body)
             mask = None
             if len(self._pending) >= BATCH_LINES or pending_bytes >= BATCH_BYTES:
@@ -146,19 +157,20 @@ class _Reader:
             raise self.lines.error("the last frame is cut: a mask without values").with_remedies(SALVAGE)
 
     def flush(self, salvage: bool = False) -> None:
-        """Parse the pending lines; salvage: those before the first damaged one, without raising."""
+        """Parse the pending lines. salvage: stop at the first damaged one instead of raising."""
         rows, self._pending = self._pending, []
-        if not rows or self._add(rows):
+        if not rows or self._parse(rows):
             return
         for row in rows:
-            if self._add([row]):
+            if self._parse([row]):
                 continue
             if salvage:
                 return
-            message, token = self.values.fault(row) or ("the values cannot be read", b"")
+            message, token = self.values.find_fault(row) or ("the values cannot be read", b"")
             raise self.lines.error(message, token, row.number)
 
     def frames(self, header: Header) -> Frames:
+        """Return the frames parsed, with increasing numbers; warns of rounded values and a wrong count."""
         layout, path = self.layout, self.lines.path
         if not self._blocks:
             if header.frames:
@@ -182,11 +194,11 @@ class _Reader:
                 FbaWarning,
                 stacklevel=4,
             )
-        index = _increasing(index, numbers, path)
+        index = _renumber(index, numbers, path)
         return Frames(header, index, np.stack(self._bits)[masks], slots)
 
-    def _mask(self, line: bytes) -> int:
-        """The number of this mask, of whatever spelling; FormatError where the line is none."""
+    def _mask_id(self, line: bytes) -> int:
+        """Return the position of a mask line in `_bits`; FormatError if it is no mask."""
         layout = self.layout
         tokens = content(line).split()
         wrong = next((token for token in tokens if token not in (b"0", b"1")), None)
@@ -196,44 +208,45 @@ class _Reader:
             if is_header(tokens):
                 what += "; this looks like a second header: split joined files into one each"
             raise self.lines.error(what, token=wrong)
-        # one program writes a column too many, after the last
+        # one program writes one column too many, at the end
         width = len(tokens) - 1 if len(tokens) - 1 in layout.widths else len(tokens)
         if width not in layout.widths:
-            cut = len(tokens) < max(layout.widths) and self._at_end()
-            if cut:
+            if len(tokens) < max(layout.widths) and self._at_end():
                 what = f"the last frame is cut: {len(tokens)} of {widths} mask bits"
                 raise self.lines.error(what).with_remedies(SALVAGE)
             raise self.lines.error(f"expected a mask of {widths} bits, found {len(tokens)}")
         bits = np.zeros(layout.columns, dtype=bool)
         bits[:width] = [token == b"1" for token in tokens[:width]]
-        slots = np.concatenate([[True], bits[layout.parameter]])
+        present = np.concatenate([[True], bits[layout.parameter]])
         number = len(self._bits)
         self._bits.append(bits)
-        self._slots.append(slots)
-        self._tokens.append(int(slots.sum()))
+        self._present.append(present)
+        self._tokens.append(int(present.sum()))
         self._extra.append(len(tokens) > width and tokens[-1] == b"1")
         if len(self._masks) < CACHED_MASKS:
             self._masks[line] = number
         return number
 
-    def _unexpected(self, body: bytes, mask: int) -> bytes:
-        """The line, mended where a superfluous mask column brought a value; else FormatError."""
+    def _drop_extra_value(self, body: bytes, mask: int) -> bytes:
+        """Return the line without the value of a superfluous mask column; FormatError if that is not its
+        fault."""
         tokens, wanted = body.split(), self._tokens[mask]
         if self._extra[mask] and len(tokens) == wanted + 1:
             return b" ".join(tokens[:-1])
-        found = f"{len(tokens) - 1} values"
+        count = f"{len(tokens) - 1} values"
         number = self.lines.number
         if len(tokens) < wanted and self._at_end():
             raise self.lines.error(
-                f"the last frame is cut: {found} of {wanted - 1}", line=number, token=tokens[-1]
+                f"the last frame is cut: {count} of {wanted - 1}", line=number, token=tokens[-1]
             ).with_remedies(SALVAGE)
         raise self.lines.error(
-            f"the mask above asks for {wanted - 1} values behind the frame number, found {found}",
+            f"the mask above asks for {wanted - 1} values behind the frame number, found {count}",
             line=number,
             token=tokens[min(wanted, len(tokens) - 1)],
         )
 
     def _at_end(self) -> bool:
+        """Whether no content follows."""
         number = self.lines.number
         try:
             return self.lines.ends_here()
@@ -242,8 +255,8 @@ class _Reader:
         finally:
             self.lines.number = number
 
-    def _add(self, rows: list[Row]) -> bool:
-        """Take these lines in; False, and nothing done, where anything about them is not as it should be."""
+    def _parse(self, rows: list[Row]) -> bool:
+        """Parse lines and store their frames; False, with nothing stored, if any of them has a fault."""
         parsed = self.values.parse(rows)
         if parsed is None:
             return False
@@ -257,19 +270,21 @@ class _Reader:
 SALVAGE = Remedy("salvage", "{} reads the frames before it", "True")
 
 
-def _increasing(index: Int64, lines: Int64, path: Path) -> Int64:
-    """Frame numbers as they are, or, where they stand still or start again (joined files, programs that
-    always write 0), with each such frame put one after the frame before it."""
+def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
+    """Return frame numbers that increase: a frame whose number does not is put one after the frame before.
+
+    Such files are joined from others, or written by programs that always write 0. Warns with FbaWarning.
+    """
     steps = np.diff(index)
-    back = steps <= 0
-    if not back.any():
+    repeated = steps <= 0
+    if not repeated.any():
         return index
-    at = int(np.argmax(back)) + 1
+    first = int(np.argmax(repeated)) + 1
     warnings.warn(
-        f"{path}:{int(lines[at])}: frame number {int(index[at])} comes after {int(index[at - 1])}; "
-        f"{int(back.sum())} frames whose number does not increase follow the frame before them",
+        f"{path}:{int(lines[first])}: frame number {int(index[first])} comes after {int(index[first - 1])}; "
+        f"{int(repeated.sum())} frames whose number does not increase follow the frame before them",
         FbaWarning,
         stacklevel=5,
     )
-    renumbered: Int64 = np.concatenate([index[:1], index[0] + np.cumsum(np.where(back, 1, steps))])
+    renumbered: Int64 = np.concatenate([index[:1], index[0] + np.cumsum(np.where(repeated, 1, steps))])
     return renumbered

@@ -17,12 +17,13 @@ from fba.formats.text.values import FRAME_NUMBER_MAX
 from fba.source import Path
 
 BATCH_FRAMES = 2048
+"""Frames that are formatted at once."""
 
 
 def write_frames(path: Path, layout: Layout, animation: Animation, slots: Int32, mask: Bool) -> None:
-    """Write what `read_frames` reads back unchanged. slots: int32 (T, slots); mask: bool (T, columns).
+    """Write a file that `read_frames` reads back unchanged. slots: int32 (T, slots); mask: bool (T, columns).
 
-    Raises FormatError where the file cannot be written or the text form cannot carry the times.
+    Raises FormatError if the file cannot be written or the text form cannot carry the times.
     """
     index = animation.index
     if len(index) and max(-int(index[0]), int(index[-1])) > FRAME_NUMBER_MAX:
@@ -37,30 +38,30 @@ def write_frames(path: Path, layout: Layout, animation: Animation, slots: Int32,
     except FormatError as error:
         raise FormatError("the frame rate is too long a fraction; resample", path=path, token=rate) from error
     name = _header_name(animation.name) or _header_name(os.path.basename(os.fspath(path))) or "animation"
-    known: dict[bytes, bytes] = {}
+    mask_texts: dict[bytes, bytes] = {}
     with atomic(path) as file:
         file.write(f"{layout.version} {name} {rate} {len(index)}\n".encode())
         for start in range(0, len(index), BATCH_FRAMES):
             part = slice(start, start + BATCH_FRAMES)
-            sent = np.concatenate(
+            present = np.concatenate(
                 [np.ones((len(index[part]), 1), dtype=bool), mask[part][:, layout.parameter]], axis=1
             )
             table = np.concatenate([index[part, None], slots[part]], axis=1)
-            texts = list(map(str, table[sent].tolist()))
-            ends = list(accumulate(sent.sum(axis=1).tolist(), initial=0))
+            texts = list(map(str, table[present].tolist()))
+            ends = list(accumulate(present.sum(axis=1).tolist(), initial=0))
             lines: list[bytes] = []
             for row, bits in enumerate(mask[part]):
                 key = bits.tobytes()
-                if key not in known:
-                    known.clear()  # masks change seldom: the last one is nearly always the next
-                    known[key] = " ".join(map(str, bits.astype(np.int8).tolist())).encode()
-                lines.append(known[key])
+                if key not in mask_texts:
+                    mask_texts.clear()  # masks change seldom: the last one is nearly always the next
+                    mask_texts[key] = " ".join(map(str, bits.astype(np.int8).tolist())).encode()
+                lines.append(mask_texts[key])
                 lines.append(" ".join(texts[ends[row] : ends[row + 1]]).encode())
             lines.append(b"")
             file.write(b"\n".join(lines))
 
 
 def _header_name(name: str) -> str:
-    """A name that fits a header line: no line breaks or control characters, single blanks."""
+    """Return a name that fits a header line: no line breaks or control characters, single blanks."""
     clean = "".join(c if c.isprintable() else " " for c in name)
     return " ".join(clean.split()).encode("utf-8", "replace").decode()

@@ -1,4 +1,4 @@
-"""How one frame of a FAP or BAP file is laid out: which values stand behind which mask column."""
+"""Layout of a frame in FAP and BAP files: which values belong to which mask column."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from fba.parameters import (
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """kind: "FAP" or "BAP". version: what the writer says; versions: what readers know.
+    """Layout of one kind of file.
 
-    columns: parameters of a frame. widths: mask widths met in files (the last one is written).
-    names, low, high, parameter, angle: per slot (a slot is one number of a frame line) its name, its
-    limits, the mask column (0-based) that brings it, and whether it is an angle in 1e-5 rad.
+    kind: "FAP" or "BAP". version: the one that is written. versions: those that are read. columns:
+    parameters of a frame. widths: mask widths that occur in files; the last one is written. names, low,
+    high, parameter, angle: for each slot (a slot is one number of a frame line) its name, its limits, its
+    mask column (0-based), and whether it is an angle in 1e-5 rad.
     """
 
     kind: str
@@ -43,6 +44,7 @@ class Layout:
 
     @property
     def slots(self) -> int:
+        """Number of slots."""
         return len(self.names)
 
 
@@ -51,16 +53,17 @@ INT32 = np.iinfo(np.int32)
 
 
 def _limits(name: str) -> tuple[int, int]:
+    """Return the limits of a field of FAP 1 or 2."""
     if "select" in name:
         return 0, VISEME_SELECT_MAX if name.startswith("viseme") else EXPRESSION_SELECT_MAX
     if name.endswith("_def") or name == "init_face":
         return 0, 1
-    return INT16.min, INT16.max  # blends and intensities may leave 0..63 by the quantiser's rounding
+    return INT16.min, INT16.max  # blends and intensities may leave 0..63, because the quantiser rounds
 
 
 @cache
 def fap_layout() -> Layout:
-    """Four values for FAP 1, six for FAP 2, one for each other."""
+    """Return the layout of FAP files: four values for FAP 1, six for FAP 2, one for each other FAP."""
     fields = (*VISEME_FIELDS, *EXPRESSION_FIELDS)
     limits = [*map(_limits, fields), *[(int(INT32.min), int(INT32.max))] * (FAP_COUNT - 2)]
     parameter = [0] * len(VISEME_FIELDS) + [1] * len(EXPRESSION_FIELDS) + list(range(2, FAP_COUNT))
@@ -80,7 +83,10 @@ def fap_layout() -> Layout:
 
 @cache
 def bap_layout() -> Layout:
-    """One value for each; version 3.1 has 186 columns, 3.2 has 296, or 186 in files of one program."""
+    """Return the layout of BAP files: one value for each BAP.
+
+    Version 3.1 has 186 columns, 3.2 has 296, or 186 in files of one program.
+    """
     return Layout(
         kind="BAP",
         version="3.2",

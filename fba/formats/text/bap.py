@@ -14,7 +14,7 @@ from fba.source import Path
 
 
 def sniff_bap(head: bytes, suffix: str) -> bool:
-    """Whether a file that begins so is a BAP file: by its mask width, else by its version."""
+    """Whether a file with this beginning is a BAP file: by its mask width, else by its version."""
     return sniff_layout(head, bap_layout())
 
 
@@ -26,10 +26,10 @@ def read_bap(
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
 ) -> Animation:
-    """Read a BAP file; frame numbers become the animation's index as they are.
+    """Read a BAP file; its frame numbers become the animation's index.
 
-    fps, name: in place of what the header says, or of a missing header. salvage: keep the frames
-    before a damage or a cut. angle_scale: factor on all angles (BAPs 1..186 but the three
+    fps, name: replace those of the header, or a missing header. salvage: keep the frames before damage
+    or a cut instead of raising. angle_scale: factor on all angles (BAPs 1..186 but the three
     translations), for the old files whose unit is not 1e-5 rad. Raises FormatError with line and
     token; FbaWarning as `fba.formats.text.fap.read_fap`.
     """
@@ -39,8 +39,8 @@ def read_bap(
 
 
 def write_bap(path: Path, animation: Animation) -> None:
-    """Write the body track as BAP version 3.2, 296 columns. FormatError where there is none, or on a
-    failing disk."""
+    """Write the body track as BAP version 3.2, 296 columns. FormatError without a body track, or if writing
+    fails."""
     body = animation.body
     if body is None:
         raise FormatError(

@@ -20,7 +20,7 @@ _FIELDS = _VISEME + len(EXPRESSION_FIELDS)
 
 
 def sniff_fap(head: bytes, suffix: str) -> bool:
-    """Whether a file that begins so is a FAP file: by its mask width, else by its version."""
+    """Whether a file with this beginning is a FAP file: by its mask width, else by its version."""
     return sniff_layout(head, fap_layout())
 
 
@@ -32,10 +32,10 @@ def read_fap(
     salvage: bool = False,
     angle_scale: Fraction | float = 1,
 ) -> Animation:
-    """Read a FAP file; frame numbers become the animation's index as they are.
+    """Read a FAP file; its frame numbers become the animation's index.
 
-    fps, name: in place of what the header says, or of a missing header. salvage: keep the frames
-    before a damage or a cut. angle_scale: factor on the eight FAPs in angle units, for files whose
+    fps, name: replace those of the header, or a missing header. salvage: keep the frames before damage
+    or a cut instead of raising. angle_scale: factor on the eight FAPs in angle units, for files whose
     unit is not 1e-5 rad (50 for one that took it as 5e-4). Raises FormatError with line and token;
     FbaWarning for values that had to be rounded, a wrong frame count, frame numbers that do not
     increase, an unknown version.
@@ -53,7 +53,7 @@ def read_fap(
 
 
 def write_fap(path: Path, animation: Animation) -> None:
-    """Write the face track as FAP version 2.2. FormatError where there is none, or on a failing disk."""
+    """Write the face track as FAP version 2.2. FormatError without a face track, or if writing fails."""
     face = animation.face
     if face is None:
         raise FormatError(

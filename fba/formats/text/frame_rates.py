@@ -1,4 +1,4 @@
-"""Frame rates as text: what headers say, as exact fractions, and back."""
+"""Frame rates: from the text in headers to exact fractions, and back."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ NTSC = {
     }.items()
     for text in texts
 }
-"""Rounded decimals that programs write for rates x 1000/1001."""
+"""Rounded decimals that programs write for NTSC rates, and the exact rates they mean."""
 
 _NUMBER = re.compile(r"\+?([0-9]{1,40}(\.[0-9]{0,40})?|\.[0-9]{1,40})(/[0-9]{1,40})?")
 
 
 def parse_rate(text: str | float | Fraction) -> Fraction:
-    """Frames a second: "25", "12.5", "30000/1001", and NTSC rates as "29.97" (= 30000/1001).
+    """Return frames per second: of "25", "12.5", "30000/1001", and NTSC rates such as "29.97" (= 30000/1001).
 
     Raises FormatError for anything but a positive number (no exponents, at most 40 digits).
     """
@@ -37,17 +37,17 @@ def parse_rate(text: str | float | Fraction) -> Fraction:
                 "a frame rate is a positive number without an exponent, such as 25, 29.97 or 30000/1001",
                 token=text,
             )
-        whole, _, denominator = text.partition("/")
+        numerator, _, denominator = text.partition("/")
         if denominator and not int(denominator):
             raise FormatError("a frame rate cannot be divided by 0", token=text)
-        rate = NTSC.get(text) or Fraction(whole.rstrip(".")) / int(denominator or 1)
+        rate = NTSC.get(text) or Fraction(numerator.rstrip(".")) / int(denominator or 1)
     if rate <= 0:
         raise FormatError("the frame rate must be more than 0", token=str(text))
     return rate
 
 
 def format_rate(rate: Fraction) -> str:
-    """Text that `parse_rate` takes back exactly: an integer, else a decimal, else "p/q"."""
+    """Return text that `parse_rate` turns back exactly: an integer, else a decimal, else "p/q"."""
     if rate.denominator == 1:
         return str(rate.numerator)
     for text, ntsc in NTSC.items():

@@ -1,8 +1,8 @@
-"""What ASCII FAP, BAP and EPF files share: lines with comments, names, the one-line header.
+"""Lines, comments and the one-line header of ASCII FAP, BAP and EPF files.
 
-Such files come from many programs, by way of many machines: line ends of all kinds, tabs, byte order
-marks, Latin-1 names, comments anywhere. Files are read block by block, and no line may be longer than
-any of these formats can need, so that neither a missing line end nor a false claim fills the memory.
+Such files come from many programs and machines: with line ends of all kinds, tabs, byte order marks,
+Latin-1 names and comments anywhere. They are read block by block, and a line that is longer than any of
+these formats needs is an error, so that a file without line ends does not fill the memory.
 """
 
 from __future__ import annotations
@@ -22,47 +22,48 @@ if TYPE_CHECKING:
     from fba.formats.text._layout import Layout
 
 BLOCK_BYTES = 1 << 20
+"""Bytes that are read at once."""
 MAX_LINE_BYTES = 1 << 16
-"""The longest honest line has 297 numbers: 8 KiB even where each is a float with all its digits."""
+"""The longest valid line has 297 numbers: 8 KiB even if each is a float with all its digits."""
 
 _MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"), (b"\x00\x00\xfe\xff", "UTF-32"))
 UTF8_MARK = b"\xef\xbb\xbf"
 _VERSION = re.compile(rb"\d{1,3}(\.\d{1,3})?")
 _MASK_BITS = frozenset((b"0", b"1"))
-WIDE = 100
-"""Masks of BAPs have more columns, those of FAPs fewer, whatever their exact number."""
+BODY_COLUMNS = 100
+"""Masks of BAPs have more columns than this, those of FAPs fewer, also in files of odd widths."""
 _MASK_LIKE = 60
-"""A line of at least this many 0s and 1s is taken for a mask, not for a header."""
-
+"""A line of at least this many 0s and 1s is a mask, not a header."""
 
 GIVE_RATE = Remedy("fps", "give one with {}", "25")
 
 
 class Lines:
-    """The lines of a text file, without their ends; `number` is that of the last one given out (1-based).
+    """Iterates over the lines of a text file, without line ends; `number` is that of the last one (1-based).
 
-    Raises FormatError for what is no text: NUL bytes, UTF-16, lines beyond `MAX_LINE_BYTES`.
+    Raises FormatError for anything but text: NUL bytes, UTF-16, lines beyond `MAX_LINE_BYTES`.
     """
 
     def __init__(self, file: BinaryIO, size: int, path: Path) -> None:
         self.number = 0
         self.path = path
-        self.head = b""  # how the file begins, once the first line was given out
+        self.head = b""  # the first bytes of the file, once the first line has been read
         self._lines = self._split(file, size)
 
     def __iter__(self) -> Iterator[bytes]:
         return self._lines
 
     def ends_here(self) -> bool:
-        """Whether nothing but blank lines and comments follows (they are skipped)."""
+        """Whether only blank lines and comments follow; skips them."""
         return not any(content(line) for line in self)
 
     def error(self, message: str, token: bytes | str | None = None, line: int | None = None) -> FormatError:
-        """A FormatError at this line, or the given one."""
+        """Return a FormatError that names the current line, or the given one."""
         text = decoded(token) if isinstance(token, bytes) else token
         return FormatError(message, path=self.path, line=line or self.number or None, token=text)
 
     def _split(self, file: BinaryIO, size: int) -> Iterator[bytes]:
+        """Yield the lines of the first `size` bytes of a file."""
         rest = b""
         first = True
         while size > 0:
@@ -83,10 +84,10 @@ class Lines:
                 if not block:  # nothing but the mark
                     continue
             if b"\0" in block:
-                at = self.number + (rest + block[: block.index(b"\0")]).count(b"\n") + 1
+                line_number = self.number + (rest + block[: block.index(b"\0")]).count(b"\n") + 1
                 raise self.error(
                     f"holds NUL bytes: binary data or a damaged file, not text{but_recognised(self.head)}",
-                    line=at,
+                    line=line_number,
                 )
             data = rest + block
             lines = data.splitlines()
@@ -102,6 +103,7 @@ class Lines:
             yield rest.removesuffix(b"\r")
 
     def _check(self, line: bytes, ahead: int = 0) -> None:
+        """Raise FormatError for a line that is too long. ahead: lines between the current one and it."""
         if len(line) > MAX_LINE_BYTES + 1:
             raise self.error(
                 f"a line of more than {MAX_LINE_BYTES} bytes: not a text file of this kind, "
@@ -111,12 +113,12 @@ class Lines:
 
 
 def content(line: bytes) -> bytes:
-    """The line without comment and surrounding blanks; empty where nothing is left."""
+    """Return the line without comment and surrounding blanks; empty if nothing is left."""
     return line.partition(b"#")[0].strip()
 
 
 def decoded(text: bytes) -> str:
-    """Text as UTF-8, else as Latin-1, which takes any bytes."""
+    """Return text decoded as UTF-8, or else as Latin-1, in which any bytes are valid."""
     try:
         return text.decode()
     except UnicodeDecodeError:
@@ -124,13 +126,13 @@ def decoded(text: bytes) -> str:
 
 
 def is_mask(tokens: list[bytes]) -> bool:
-    """Whether these are the bits of a mask line, of whatever width."""
+    """Whether these are the bits of a mask line, of any width."""
     return len(tokens) >= _MASK_LIKE and _MASK_BITS.issuperset(tokens)
 
 
 @dataclass(frozen=True)
 class Header:
-    """The header line of a FAP or BAP file. frames: how many the file claims, or None."""
+    """Header line of a FAP or BAP file. rate: frames per second. frames: the number stated, or None."""
 
     version: str
     name: str
@@ -139,14 +141,14 @@ class Header:
 
 
 def is_header(tokens: list[bytes]) -> bool:
-    """Whether a line may be a header: `<version> <name, with blanks> <rate> <frames>`."""
+    """Whether a line can be a header: `<version> <name, with blanks> <rate> <frames>`."""
     return len(tokens) >= 3 and bool(_VERSION.fullmatch(tokens[0])) and not is_mask(tokens)
 
 
 def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Header:
-    """Take a header line apart: first token, the last two, and what is between as the name.
+    """Return the header in a line: the version first, rate and frames last, and the name between them.
 
-    rate: counts instead of what the header says. Raises FormatError.
+    rate: replaces that of the header. Raises FormatError.
     """
     tokens = line.split()
     if not is_header(tokens):
@@ -167,18 +169,19 @@ def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Hea
 
 
 def sniff_layout(head: bytes, layout: Layout) -> bool:
-    """Whether a file that begins so has this layout: by its mask width, else by its version."""
+    """Whether a file with this beginning has this layout: by its mask width, else by its version."""
     version, width = sniff_columns(head)
     if not width:
         return version in layout.versions
     known = [w for count in layout.widths for w in (count, count + 1)]
-    wide = [columns >= WIDE for columns in (width, layout.columns)]
-    return width in known or (version in layout.versions and wide[0] == wide[1])
+    same_part = (width >= BODY_COLUMNS) == (layout.columns >= BODY_COLUMNS)
+    return width in known or (version in layout.versions and same_part)
 
 
 def sniff_columns(head: bytes) -> tuple[str, int]:
-    """What the beginning of a file shows of a FAP or BAP file: version ("" without a header) and the
-    width of its first mask (0 where there is none); ("", 0) where it is neither.
+    """Return the version ("" without a header) and the width of the first mask (0 without one).
+
+    head: the beginning of a FAP or BAP file. ("", 0) for files of other kinds.
     """
     if b"\0" in head:
         return "", 0
@@ -190,7 +193,7 @@ def sniff_columns(head: bytes) -> tuple[str, int]:
         if is_mask(content(line).split()):
             return version, len(content(line).split())
         if version or not is_header(tokens):
-            return "", 0  # the second line of neither
+            return "", 0  # neither kind has such a second line
         version = decoded(tokens[0])
         if not _is_number(tokens[-1]) or len(tokens) < 3:
             return "", 0

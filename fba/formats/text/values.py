@@ -1,4 +1,4 @@
-"""Value lines of FAP and BAP files as numbers: many lines at once, and one with its fault named."""
+"""Parse value lines of FAP and BAP files: many at once, or one to name its fault."""
 
 from __future__ import annotations
 
@@ -18,21 +18,23 @@ _NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The value line of a frame, without comment, as many numbers as its mask asks for.
+    """Value line of a frame, without comment, with as many numbers as its mask asks for.
 
-    number: of the line. mask: number of the mask. brought: bool (1 + slots,), which numbers the mask
-    brings, the frame number first.
+    number: that of the line, 1-based. mask: that of the mask. present: bool (1 + slots,), which numbers
+    are on the line, the frame number first.
     """
 
     line: bytes
     number: int
     mask: int
-    brought: Bool
+    present: Bool
 
 
 class ValueParser:
-    """Turns rows into frame numbers and slots. rounded: values so far that were no integers;
-    rounded_line: the first line with one."""
+    """Turns rows into frame numbers and slots.
+
+    rounded: how many values so far were no integers. rounded_line: the first line with one.
+    """
 
     def __init__(self, layout: Layout, angle_scale: float) -> None:
         self.layout = layout
@@ -41,13 +43,13 @@ class ValueParser:
         self.rounded_line = 0
 
     def parse(self, rows: list[Row]) -> tuple[Int64, Int32] | None:
-        """Frame numbers (n,) and slots (n, slots), or None where any row has a fault."""
-        brought = np.stack([row.brought for row in rows])
+        """Return frame numbers (n,) and slots (n, slots), or None if any row has a fault."""
+        present = np.stack([row.present for row in rows])
         flat = _numbers(b" ".join([row.line for row in rows]))
-        if flat is None or len(flat) != int(brought.sum()) or not np.isfinite(flat).all():
+        if flat is None or len(flat) != int(present.sum()) or not np.isfinite(flat).all():
             return None
-        table: Float64 = np.zeros(brought.shape)
-        table[brought] = flat
+        table: Float64 = np.zeros(present.shape)
+        table[present] = flat
         index, slots = table[:, 0], table[:, 1:]
         if (np.abs(index) > FRAME_NUMBER_MAX).any() or (index != np.trunc(index)).any():
             return None
@@ -56,7 +58,7 @@ class ValueParser:
             with np.errstate(over="ignore"):
                 slots = np.where(self.layout.angle, slots * self.scale, slots)
         if self.scale != 1 or fractions.any():
-            slots = _rounded(slots)
+            slots = _round(slots)
         if not ((slots >= self.layout.low) & (slots <= self.layout.high)).all():
             return None
         if fractions.any():
@@ -65,10 +67,10 @@ class ValueParser:
             self.rounded += int(fractions.sum())
         return index.astype(np.int64), slots.astype(np.int32)
 
-    def fault(self, row: Row) -> tuple[str, bytes] | None:
-        """What is wrong with a row, and the token that is; None where nothing is."""
-        brought = np.flatnonzero(row.brought) - 1
-        for slot, token in zip(brought.tolist(), row.line.split(), strict=True):
+    def find_fault(self, row: Row) -> tuple[str, bytes] | None:
+        """Return what is wrong with a row and the wrong token; None if nothing is."""
+        slots = np.flatnonzero(row.present) - 1
+        for slot, token in zip(slots.tolist(), row.line.split(), strict=True):
             what = "the frame number" if slot < 0 else self.layout.names[slot]
             if token.lower().lstrip(b"+-") in (b"inf", b"infinity", b"nan"):
                 return f"{what} must be a finite number", token
@@ -84,13 +86,13 @@ class ValueParser:
                 value *= self.scale
                 scaled = f" after angle_scale {self.scale:g}"
             low, high = int(self.layout.low[slot]), int(self.layout.high[slot])
-            if not low <= float(_rounded(np.array(value))) <= high:
+            if not low <= float(_round(np.array(value))) <= high:
                 return f"{what} must lie in {low}..{high}{scaled}", token
         return None
 
 
 def _numbers(text: bytes) -> Float64 | None:
-    """All numbers of a text, or None where something in it is none."""
+    """Return all numbers of a text, or None if anything in it is no number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:
@@ -99,9 +101,9 @@ def _numbers(text: bytes) -> Float64 | None:
             return None
 
 
-def _rounded(values: Float64) -> Float64:
-    """Integers, half away from zero; infinities stay what they are."""
-    whole = np.trunc(values)
+def _round(values: Float64) -> Float64:
+    """Return integers, halves rounded away from zero; infinities unchanged."""
+    truncated = np.trunc(values)
     with np.errstate(invalid="ignore"):
-        away = np.abs(values - whole) >= 0.5
-    return whole + np.where(away, np.sign(values), 0.0)
+        away = np.abs(values - truncated) >= 0.5
+    return truncated + np.where(away, np.sign(values), 0.0)
