@@ -1,9 +1,9 @@
 """Disk cache of compiled functions: numba's own cache, but with files that are checked.
 
 Numba trusts its index and its files of machine code: a truncated file breaks the program, and a flipped bit
-may crash it. Here one file holds everything for one signature, and begins with a digest of its content and of
-everything that the content depends on. A file that does not match is compiled again and replaced; where no
-file can be written, none is.
+may crash it. Here one file contains everything for one signature, and begins with a digest of its content and
+of everything that the content depends on. If the digest does not match, the function is compiled again and
+the file replaced. Failures to write are ignored.
 """
 
 from __future__ import annotations
@@ -42,50 +42,51 @@ class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
 
     @cached_property
     def _numba(self) -> Any:
-        """Numba's cache with checked files, or None where there is no folder for them."""
+        """Numba's cache with checked files, or None without a folder for them."""
         try:
-            found = FunctionCache(self._function)
+            cache = FunctionCache(self._function)
         except (OSError, RuntimeError):
             return None
-        found._cache_file = CodeFiles(found.cache_path, found._impl.filename_base, self._function)
-        return found
+        cache._cache_file = CodeFiles(cache.cache_path, cache._impl.filename_base, self._function)
+        return cache
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        """The compiled function, or None."""
-        found = None
+        """Return the compiled function, or None."""
+        loaded = None
         if self._numba is not None:
             # A file with the right digest was made by the same versions of everything, and loads. If it does
             # not, for whatever reason, the function is compiled.
             with contextlib.suppress(Exception):
-                found = self._numba.load_overload(signature, target)
-        if found is None:
+                loaded = self._numba.load_overload(signature, target)
+        if loaded is None:
             self._before_compiling()
-        return found
+        return loaded
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Save a compiled function."""
         if self._numba is not None:
             self._numba.save_overload(signature, compiled)
 
 
 class CodeFiles:
-    """The files of one function, in place of numba's `IndexDataCacheFile`: one for each key."""
+    """The files of one function, one for each key; replaces numba's `IndexDataCacheFile`."""
 
     def __init__(self, folder: str, name: str, function: FunctionType) -> None:
         self._folder, self._name, self._function = Path(folder), name, function
 
     def load(self, key: Any) -> Any:
-        """The data saved for a key, or None where it is missing or damaged."""
+        """Return the data saved for a key, or None if it is missing or damaged."""
         try:
             content = self._path(key).read_bytes()
         except OSError:
             return None
         if content[:DIGEST] != self._digest(content[DIGEST:]):
             return None
-        kept, data = pickle.loads(content[DIGEST:])
-        return data if kept == key else None
+        saved_key, data = pickle.loads(content[DIGEST:])
+        return data if saved_key == key else None
 
     def save(self, key: Any, data: Any) -> None:
-        """Saves data for a key, where there is room and permission for it."""
+        """Save data for a key; ignore a full disk and missing permission."""
         content = dumps((key, data))
         with contextlib.suppress(OSError, FormatError), atomic(self._path(key)) as file:
             file.write(self._digest(content) + content)
@@ -103,7 +104,7 @@ class CodeFiles:
     def _stamp(self) -> bytes:
         """Digest of everything that the machine code depends on, apart from the key."""
         digest = hashlib.blake2b(f"{numba.__version__} {__version__}".encode(), digest_size=DIGEST)
-        for function in _reached(self._function):
+        for function in _called_functions(self._function):
             digest.update(_source(function.__code__.co_filename))
             for name in function.__code__.co_names:
                 value = function.__globals__.get(name)
@@ -112,20 +113,20 @@ class CodeFiles:
         return digest.digest()
 
 
-def _reached(function: FunctionType) -> Iterator[FunctionType]:
-    """A function and all compiled functions that it calls, directly or not."""
-    found = [function]
-    for one in found:
-        yield one
-        for name in one.__code__.co_names:
-            called = getattr(one.__globals__.get(name), "py_func", None)
-            if called is not None and called not in found:
-                found.append(called)
+def _called_functions(function: FunctionType) -> Iterator[FunctionType]:
+    """Yield a function and all compiled functions that it calls, directly or not."""
+    functions = [function]
+    for caller in functions:
+        yield caller
+        for name in caller.__code__.co_names:
+            called = getattr(caller.__globals__.get(name), "py_func", None)
+            if called is not None and called not in functions:
+                functions.append(called)
 
 
 @cache
 def _source(path: str) -> bytes:
-    """Digest of a source file, or its path where it cannot be read, as in a zip archive."""
+    """Return a digest of a source file, or its path if it cannot be read, as in a zip archive."""
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").digest()

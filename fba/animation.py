@@ -1,8 +1,8 @@
-"""The data model that everything passes around: `Animation`, `FaceTrack`, `BodyTrack`, `Frame`.
+"""The data model: `Animation`, `FaceTrack`, `BodyTrack`, `Frame`.
 
 Parameters are numbered as in the standard; column i of an array is parameter i+1. Values are
-integers in the standard's units (FAPU fractions, 1e-5 rad, mm). A mask says what was *sent*: values
-that were not sent are stored as 0, and what a face shows in their place is `fba.face.resolve`.
+integers in the standard's units (FAPU fractions, 1e-5 rad, mm). A mask says which were *sent*: values
+that were not sent are stored as 0; `fba.face.resolve` computes what a face shows in their place.
 """
 
 from __future__ import annotations
@@ -21,19 +21,18 @@ from fba.tracks import BodyTrack, FaceTrack, freeze, integers
 __all__ = ["MAX_FRAMES", "Animation", "BodyTrack", "FaceTrack", "Frame"]
 
 _INDEX_MAX = 1 << 62
-"""Beyond this, indices are no longer counted in 64 bits."""
+"""Bound of frame indices, so that sums of two fit 64 bits."""
 
 MAX_FRAMES = 50_000_000
-"""Most frames that a resampling makes: a guard against absurd times in damaged input."""
+"""Most frames that resampling makes: a limit for absurd times in damaged input."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One frame: one plane's worth of an animation.
+    """One frame of an animation.
 
-    index: shown at index / rate seconds. face and body: tracks of length 1, or None where this frame
-    carries nothing for them. plane: how it stood in a stream (`fba.codec.PlaneInfo`), where it comes
-    from one.
+    index: shown at index / rate seconds. face and body: tracks of length 1, or None if the frame carries
+    nothing of them. plane: its plane in the stream (`fba.codec.PlaneInfo`), if it was decoded from one.
     """
 
     index: int
@@ -64,12 +63,12 @@ class Frame:
 class Animation:
     """A performance: frames at exact times, for a face, a body, or both.
 
-    rate: frames a second, an exact fraction. index: int64 (T,), strictly increasing; frame t is shown
+    rate: frames per second, an exact fraction. index: int64 (T,), strictly increasing; frame t is shown
     at index[t] / rate seconds. face, body: tracks of T frames, at least one of them. Immutable;
-    compares by content (the name does not count).
+    compared by content, without the name.
 
-    `animation[3]` is a `Frame`, `animation[10:20]` an `Animation`. Raises ValueError on construction
-    where the parts contradict each other.
+    `animation[3]` is a `Frame`, `animation[10:20]` an `Animation`. Raises ValueError if the parts contradict
+    each other.
     """
 
     rate: Fraction
@@ -86,9 +85,9 @@ class Animation:
         if index.ndim != 1:
             raise ValueError(f"Animation: index must have shape (T,), not {index.shape}")
         if len(index) > 1 and not (np.diff(index) > 0).all():
-            at = int(np.argmax(np.diff(index) <= 0)) + 1
+            back = int(np.argmax(np.diff(index) <= 0)) + 1
             raise ValueError(
-                f"Animation: index must increase, but frame {at} has {index[at]} after {index[at - 1]}"
+                f"Animation: index must increase, but frame {back} has {index[back]} after {index[back - 1]}"
             )
         if self.face is None and self.body is None:
             raise ValueError("Animation: needs a face track, a body track, or both")
@@ -99,7 +98,7 @@ class Animation:
 
     @classmethod
     def from_frames(cls, frames: Iterable[Frame], name: str = "") -> Animation:
-        """Join frames of one rate, e.g. those that a `Decoder` gave. ValueError where there is none."""
+        """Join frames of one rate, such as those from a `Decoder`. ValueError without frames."""
         frames = list(frames)
         if not frames:
             raise ValueError("Animation.from_frames: no frames")
@@ -114,9 +113,9 @@ class Animation:
 
     @staticmethod
     def concatenate(parts: Sequence[Animation]) -> Animation:
-        """Play parts one after another: each begins one frame after the last of the one before.
+        """Join animations one after another; each begins one frame after the end of the one before.
 
-        ValueError where there is none, or where rates differ (resample first).
+        ValueError without parts, or if rates differ (resample first).
         """
         if not parts:
             raise ValueError("Animation.concatenate: no parts")
@@ -136,9 +135,7 @@ class Animation:
             following = int(part.index[-1]) + offset + 1
         face = FaceTrack.join([(part.face, len(part)) for part in parts])
         body = BodyTrack.join([(part.body, len(part)) for part in parts])
-        index = (
-            np.concatenate(indices) if indices else np.empty(0, dtype=np.int64)
-        )  # zero frames, nothing to fill
+        index = np.concatenate(indices) if indices else np.empty(0, dtype=np.int64)
         return Animation(parts[0].rate, index, face, body, parts[0].name)
 
     def __len__(self) -> int:
@@ -163,7 +160,7 @@ class Animation:
                 self.body[frames] if self.body is not None else None,
                 self.name,
             )
-        position = range(len(self))[frames]  # also turns negative positions and refuses those outside
+        position = range(len(self))[frames]  # turns negative positions, raises IndexError outside
         one = slice(position, position + 1)
         face = self.face[one] if self.face is not None else None
         body = self.body[one] if self.body is not None else None
@@ -182,17 +179,17 @@ class Animation:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        """One line, not the arrays."""
-        parts = [name for name in ("face", "body") if getattr(self, name) is not None]
-        about = f"{len(self)} frames at {float(self.rate):g} frames/s, {float(self.duration):g} s"
-        named = f"{self.name}: " if self.name else ""
-        return f"<Animation {named}{', '.join([about, *parts])}>"
+        """Return one line, without the arrays."""
+        parts = [part for part in ("face", "body") if getattr(self, part) is not None]
+        summary = f"{len(self)} frames at {float(self.rate):g} frames/s, {float(self.duration):g} s"
+        name = f"{self.name}: " if self.name else ""
+        return f"<Animation {name}{', '.join([summary, *parts])}>"
 
     @property
     def times(self) -> Float64:
-        """(T,) seconds at which the frames are shown."""
-        whole, part = _scaled(self.index, 1 / self.rate)
-        return whole.astype(np.float64) + part
+        """float64 (T,): seconds at which the frames are shown."""
+        integral, fraction = _scale(self.index, 1 / self.rate)
+        return integral.astype(np.float64) + fraction
 
     @property
     def duration(self) -> Fraction:
@@ -202,7 +199,7 @@ class Animation:
         )
 
     def resample(self, rate: Fraction | int | str) -> Animation:
-        """The same performance at another frame rate, evenly spaced frames without gaps.
+        """Return the same animation at another frame rate, in evenly spaced frames without gaps.
 
         Low-level FAPs, BAPs, blends and intensities are interpolated linearly between the frames that
         sent them; selects and masks hold until the next frame; definition flags are set on the first
@@ -214,9 +211,8 @@ class Animation:
         if not len(self):
             return Animation(rate, self.index, self.face, self.body, self.name)
         ratio = rate / self.rate
-        first = -(
-            -int(self.index[0]) * ratio.numerator // ratio.denominator
-        )  # first new frame not before ours
+        # rounded up: the first new frame is not before the first old one
+        first = -(-int(self.index[0]) * ratio.numerator // ratio.denominator)
         last = int(self.index[-1]) * ratio.numerator // ratio.denominator
         count = max(last - first + 1, 1)
         if count > MAX_FRAMES or max(abs(first), abs(last)) > _INDEX_MAX:
@@ -225,15 +221,15 @@ class Animation:
                 f"(at most {MAX_FRAMES}); its times are implausible or the rate is too high"
             )
         index = np.arange(first, first + count, dtype=np.int64)
-        whole, part = _scaled(index, 1 / ratio)  # in frames of this animation
-        whole = whole.astype(np.int64)
-        before = np.clip(np.searchsorted(self.index, whole, side="right") - 1, 0, len(self) - 1)
+        integral, fraction = _scale(index, 1 / ratio)  # in frames of this animation
+        integral = integral.astype(np.int64)
+        before = np.clip(np.searchsorted(self.index, integral, side="right") - 1, 0, len(self) - 1)
         after = np.minimum(before + 1, len(self) - 1)
         gap = np.maximum(self.index[after] - self.index[before], 1)
-        weight = np.clip((whole - self.index[before] + part) / gap, 0.0, 1.0)
-        fresh = np.ones(count, dtype=bool)
-        fresh[1:] = before[1:] != before[:-1]
-        face = _resampled_face(self.face, before, after, weight, fresh) if self.face is not None else None
+        weight = np.clip((integral - self.index[before] + fraction) / gap, 0.0, 1.0)
+        is_first = np.ones(count, dtype=bool)
+        is_first[1:] = before[1:] != before[:-1]
+        face = _resample_face(self.face, before, after, weight, is_first) if self.face is not None else None
         body = None
         if self.body is not None:
             mask = self.body.mask[before]
@@ -242,14 +238,17 @@ class Animation:
         return Animation(rate, index, face, body, self.name)
 
 
-def _scaled(index: Int64, factor: Fraction) -> tuple[Array, Float64]:
-    """index x factor: whole part, exact, and the rest in 0..1. In Python's integers where 64 bits end."""
+def _scale(index: Int64, factor: Fraction) -> tuple[Array, Float64]:
+    """Return index x factor as an exact integral part and a fraction in 0..1.
+
+    Computed in Python's integers where 64 bits are not enough.
+    """
     largest = max(abs(int(index[0])), abs(int(index[-1])), 1) if len(index) else 1
     fits = largest * factor.numerator < _INDEX_MAX > factor.denominator
     product = (index if fits else index.astype(object)) * factor.numerator
-    whole = product // factor.denominator
-    rest = (product - whole * factor.denominator).astype(np.float64)
-    return whole, rest / float(factor.denominator)
+    integral = product // factor.denominator
+    rest = (product - integral * factor.denominator).astype(np.float64)
+    return integral, rest / float(factor.denominator)
 
 
 def _between(
@@ -259,18 +258,23 @@ def _between(
     weight: Float64,
     both: Bool,
 ) -> npt.NDArray[np.signedinteger]:
+    """Return values (S, columns) between frames before (S,) and after (S,), by weight (S,) in 0..1.
+
+    both: bool (S, columns), True where both frames sent the value; elsewhere that of before holds.
+    """
     start = values[before]
     change = np.where(both, values[after].astype(np.float64) - start, 0.0)
     return np.rint(start + change * weight[:, None]).astype(values.dtype)
 
 
-def _resampled_face(
+def _resample_face(
     face: FaceTrack,
     before: Intp,
     after: Intp,
     weight: Float64,
-    fresh: Bool,
+    is_first: Bool,
 ) -> FaceTrack:
+    """Return a face track resampled as by `_between`. is_first: (S,), whether an old frame begins."""
     mask = face.mask[before]
     both = mask & face.mask[after]
     fields = []
@@ -283,7 +287,7 @@ def _resampled_face(
         same = sent & (held[:, selects] == source[after][:, selects]).all(axis=1)
         blended = _between(source, before, after, weight, np.broadcast_to(same[:, None], held.shape))
         held[:, amounts] = blended[:, amounts]
-        held[:, flags] = np.where(fresh[:, None], held[:, flags], 0)
+        held[:, flags] = np.where(is_first[:, None], held[:, flags], 0)
         fields.append(held)
     interpolated = face.interpolated[before] if face.interpolated is not None else None
     values = _between(face.values, before, after, weight, both)

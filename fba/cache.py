@@ -1,4 +1,4 @@
-"""What takes long to work out and depends on its input alone, kept on disk for the next time."""
+"""Disk cache for slow, deterministic results."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ import numpy.typing as npt
 
 from fba.arrays import Array
 
-Kept = TypeVar("Kept", bound=Array)
+Cached = TypeVar("Cached", bound=Array)
 
 MOST_FILES = 96
-"""So many are kept; the longest unused goes first."""
+"""Most files in the cache; those that were not used for longest are deleted first."""
 DIGEST = 32
-"""Bytes at the start of a file that tell whether the rest is as it was written."""
+"""Bytes of the digest at the start of a file, which shows whether the rest is undamaged."""
 
 
-def key_of(name: str, *parts: npt.ArrayLike) -> str:
-    """A key for `kept`: the name, and a digest of these arrays and numbers, their kinds and shapes."""
+def make_key(name: str, *parts: npt.ArrayLike) -> str:
+    """Return a key for `load_or_make`: the name and a digest of arrays or numbers, with dtypes and shapes."""
     digest = hashlib.sha256()
     for part in parts:
         array = np.ascontiguousarray(part)
@@ -34,22 +34,23 @@ def key_of(name: str, *parts: npt.ArrayLike) -> str:
     return f"{name}-{digest.hexdigest()[:32]}"
 
 
-def kept(
-    key: str, shapes: tuple[tuple[int, ...], ...], make: Callable[[], list[Kept]], kind: Any = np.float16
-) -> list[Kept]:
-    """The arrays of `shapes` that `make` gave for this key, now or some time before.
+def load_or_make(
+    key: str, shapes: tuple[tuple[int, ...], ...], make: Callable[[], list[Cached]], kind: Any = np.float16
+) -> list[Cached]:
+    """Return the arrays that `make` returned for this key, from the disk if they are there.
 
-    key: names everything that they depend on; letters and digits. kind: the dtype of all, or a list with that
-    of each. Where nothing can be kept (no home, no room, a file that somebody damaged) they are made anew,
-    silently. What is found may have been tampered with: numbers of rows are to be checked.
+    key: of letters and digits, different for different input, see `make_key`. shapes: of the arrays. kind:
+    the dtype of all, or a list with that of each. If the cache cannot be used (no home folder, full disk,
+    damaged file) the arrays are made anew, silently. Loaded arrays have the right shapes and finite numbers,
+    but a file may have been tampered with: check indices before using them.
     """
     kinds = [np.dtype(one) for one in (kind if isinstance(kind, list) else [kind] * len(shapes))]
     folder = _folder()
     path = None if folder is None else folder / f"{key}.fbk"
     if path is not None:
-        found: list[Kept] | None = _read(path, shapes, kinds)
-        if found is not None:
-            return found
+        cached: list[Cached] | None = _read(path, shapes, kinds)
+        if cached is not None:
+            return cached
     made = make()
     if path is not None:
         _write(path, made)
@@ -57,7 +58,7 @@ def kept(
 
 
 def _folder() -> Path | None:
-    """The user's folder for what may be thrown away."""
+    """Return the folder of the cache in the user's cache folder; None if there is no home folder."""
     named = os.environ.get("FBA_CACHE") or os.environ.get("XDG_CACHE_HOME")
     try:
         if named:
@@ -76,38 +77,38 @@ def _folder() -> Path | None:
 def _read(
     path: Path, shapes: tuple[tuple[int, ...], ...], kinds: Sequence[np.dtype[Any]]
 ) -> list[Any] | None:
+    """Return the arrays of a file, or None if it is missing or damaged."""
     size = DIGEST + sum(kind.itemsize * math.prod(shape) for shape, kind in zip(shapes, kinds, strict=True))
     try:
         if path.stat().st_size != size:
             return None
         content = path.read_bytes()
-        with contextlib.suppress(
-            OSError
-        ):  # the longest unused goes first: somebody else's file stays as it is
+        with contextlib.suppress(OSError):  # another user's file cannot be marked as used
             os.utime(path)
     except OSError:
         return None
     if content[:DIGEST] != _digest(content[DIGEST:], path.stem, kinds, shapes):
         return None
-    found, place = [], DIGEST
+    arrays, offset = [], DIGEST
     for shape, kind in zip(shapes, kinds, strict=True):
         count = math.prod(shape)
-        found.append(np.frombuffer(content, kind, count, place).reshape(shape).copy())
-        place += kind.itemsize * count
-        if not np.isfinite(found[-1]).all():
+        arrays.append(np.frombuffer(content, kind, count, offset).reshape(shape).copy())
+        offset += kind.itemsize * count
+        if not np.isfinite(arrays[-1]).all():
             return None
-    return found
+    return arrays
 
 
 def _digest(
     content: bytes, key: str, kinds: Sequence[np.dtype[Any]], shapes: Sequence[tuple[int, ...]]
 ) -> bytes:
-    """Of the numbers of all arrays, and of what they are."""
+    """Return a digest of the content of a file: numbers, key, dtypes and shapes."""
     about = f"{key} {[kind.str for kind in kinds]} {list(shapes)} "
     return hashlib.blake2b(about.encode() + content, digest_size=DIGEST).digest()
 
 
-def _write(path: Path, arrays: list[Kept]) -> None:
+def _write(path: Path, arrays: list[Cached]) -> None:
+    """Write arrays to a file, and delete the files that were not used for longest; ignore failures."""
     from fba.atomic import atomic
     from fba.errors import FormatError
 

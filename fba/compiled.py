@@ -1,7 +1,7 @@
-"""The only module that imports numba: `compiled` turns a plain function over NumPy arrays into machine code.
+"""Compile plain functions over NumPy arrays to machine code, with numba.
 
-Where numba is missing, or `NUMBA_DISABLE_JIT=1` is set, the same source runs as Python: slower, with
-the same results. Compiled functions therefore cast NumPy scalars with `int()` before they do arithmetic
+If numba is missing, or `NUMBA_DISABLE_JIT=1` is set, the same source runs as Python: slower, with the same
+results. Compiled functions therefore cast NumPy scalars with `int()` before they do arithmetic
 on them: NumPy's integers overflow differently in Python.
 """
 
@@ -20,7 +20,7 @@ _listeners: list[Callable[[], None]] = []
 
 @cache
 def _numba() -> Any:
-    """The package numba, imported at the first function; None where it is missing.
+    """Return the package numba, imported for the first function; None if it is missing.
 
     `fba --help` imports this module and compiles nothing: numba would double its time.
     """
@@ -57,7 +57,7 @@ def _compiled(function: Function, **options: bool) -> Function:
 
 
 def _call_by_type(dispatcher: Any, arguments: Any, named: Any) -> Any:
-    """The template by which another compiled function calls this one, chosen by the arguments' types alone.
+    """Return the template by which another compiled function calls this one, chosen by argument types alone.
 
     Numba would compile it once more for each constant that is passed to it.
     """
@@ -77,7 +77,7 @@ def is_compiled() -> bool:
 
 @contextmanager
 def compilation_listener(listener: Callable[[], None] | None) -> Iterator[None]:
-    """Calls the listener, where there is one, before each function that is compiled while the block runs."""
+    """Call the listener, unless it is None, before each function that is compiled while the block runs."""
     if listener is None:
         yield
         return
@@ -89,6 +89,6 @@ def compilation_listener(listener: Callable[[], None] | None) -> Iterator[None]:
 
 
 def announce_compilation() -> None:
-    """Calls every listener: a function is about to be compiled, which takes seconds the first time."""
+    """Call every listener: a function is about to be compiled, which takes seconds the first time."""
     for listener in tuple(_listeners):
         listener()

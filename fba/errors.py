@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions that say where, what was found, what was expected and what to do.
+"""Exceptions, which say where something is wrong, what was found, what was expected and what to do.
 
 ::
 
@@ -11,10 +11,10 @@
     ├── ModelError                          also ValueError   a face or body model is unusable
     └── DisplayError                        also OSError      no window, no OpenGL, no video encoder
 
-Something read with doubts, but read, is an `FbaWarning`.
+Input that is odd, but can be read, is an `FbaWarning`.
 
-What an argument of the called function can do about it is a `Remedy` of its own, so that the command line can
-name its option in place of the argument.
+If an argument of the called function helps, the error has a `Remedy`, so that the command line can name its
+option in place of the argument.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from typing import Any, Self
 
 @dataclass(frozen=True)
 class Remedy:
-    """What an argument of the called function can do about an error.
+    """An argument that helps against an error.
 
-    argument: its name. text: what to do, with `{}` where the argument stands. value: how it could be given,
-    as Python. call: the function, where it is another than the one that was called.
+    argument: its name. text: what to do, with `{}` in place of the argument. value: an example, as Python.
+    call: the function that takes the argument, if it is not the one that was called.
     """
 
     argument: str
@@ -39,17 +39,17 @@ class Remedy:
     call: str = ""
 
     def __str__(self) -> str:
-        """In Python's words: "give one with fps=25"."""
+        """Return the text for Python: "give one with fps=25"."""
         given = f"{self.argument}={self.value}"
-        return self.said(f"{self.call}({given})" if self.call else given)
+        return self.fill_in(f"{self.call}({given})" if self.call else given)
 
-    def said(self, given: str) -> str:
-        """The text with this in the place of the argument; without an argument, the text as it is."""
+    def fill_in(self, given: str) -> str:
+        """Return the text with this in place of the argument; without an argument, the text as it is."""
         return self.text.replace("{}", given) if self.argument else self.text
 
 
 class _Remediable:
-    """An exception with remedies; its text ends in them."""
+    """An exception with remedies, which its text ends with."""
 
     remedies: tuple[Remedy, ...] = ()
 
@@ -59,7 +59,7 @@ class _Remediable:
         return super().__str__()
 
     def with_remedies(self, *remedies: Remedy) -> Self:
-        """The same exception, with these remedies."""
+        """Set the remedies; return the same exception."""
         self.remedies = remedies
         return self
 
@@ -76,7 +76,7 @@ class FbaWarning(_Remediable, UserWarning):
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """For an error about an unknown word: " (did you mean 'joy'?)", or "" where nothing comes near."""
+    """Return " (did you mean 'joy'?)" for an error about an unknown word, or "" if no known word is close."""
     from difflib import get_close_matches
 
     near = get_close_matches(word.lower(), list(known), n=1)
@@ -86,10 +86,9 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 class BitstreamError(FbaError, ValueError):
     """Damage in an FBA stream.
 
-    message: the text without the place. plane: number of the plane (0-based, in stream order) in which
-    it was found.
-    bit: position of the offending bit, counted from the start of the stream.
-    blocks: what `Decoder.finish` decoded before it, of what no earlier call had returned.
+    message: the text without plane and bit. plane: number (0-based, in stream order) of the damaged plane.
+    bit: position of the damage, from the start of the stream. blocks: what `Decoder.finish` decoded before
+    it and no earlier call returned.
     """
 
     blocks: Sequence[Any] = ()
@@ -159,7 +158,7 @@ class RangeError(FbaError, ValueError):
 
 
 class UnsupportedError(FbaError, NotImplementedError):
-    """Correct input that this implementation does not handle; `what` names the feature."""
+    """Correct input that this implementation does not support; `what` names the feature."""
 
     def __init__(self, message: str, *, what: str | None = None, **details: Any) -> None:
         self.blocks: Sequence[Any] = ()

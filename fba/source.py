@@ -1,4 +1,4 @@
-"""Open a file for reading, with a clear error for everything that is not a plain, filled, readable file."""
+"""Open a file for reading, with a clear error for anything but a regular, readable file with content."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from fba.errors import FormatError
 Path = str | os.PathLike[str]
 
 HEAD_BYTES = 65536
-"""How much of a file is looked at to find its format."""
+"""Bytes of a file that are read to find its format."""
 MAX_WHOLE_FILE = 1 << 31
-"""Largest file that is read in one piece; at FBA bit rates, months of performance."""
+"""Largest file, in bytes, that is read in one piece; at FBA bit rates, months of animation."""
 
 
 def open_source(path: Path) -> tuple[BinaryIO, int]:
-    """The file, opened for binary reading, and its size in bytes when it was opened.
+    """Return the file, opened for binary reading, and its size in bytes when it was opened.
 
-    Readers stop at that size, so a file that grows meanwhile ends too. Raises FormatError for a missing
+    Readers stop at that size, even if the file grows meanwhile. Raises FormatError for a missing
     file, a folder, a pipe or device, an empty or unreadable file.
     """
     name = os.fspath(path)
     try:
-        # a pipe that nobody writes to must not block the opening
+        # opening a pipe that nobody writes to would block
         mode = os.stat(name).st_mode
         if stat.S_ISDIR(mode):
             raise FormatError("is a folder; give the name of a file in it", path=name)
@@ -48,14 +48,14 @@ def open_source(path: Path) -> tuple[BinaryIO, int]:
 
 
 def read_head(path: Path) -> bytes:
-    """Up to `HEAD_BYTES` from the beginning; FormatError as `open_source`."""
+    """Return up to `HEAD_BYTES` from the beginning of a file; FormatError as `open_source`."""
     file, _ = open_source(path)
     with file:
         return _read(file, HEAD_BYTES, path)
 
 
 def read_whole(path: Path) -> bytes:
-    """All bytes of a file of at most `MAX_WHOLE_FILE`; FormatError as `open_source`, or beyond that."""
+    """Return all bytes of a file; FormatError as `open_source`, or beyond `MAX_WHOLE_FILE` bytes."""
     file, size = open_source(path)
     with file:
         if size > MAX_WHOLE_FILE:

@@ -1,4 +1,4 @@
-"""What is sent over time: `FaceTrack` and `BodyTrack`, checked once and immutable afterwards."""
+"""Parameters sent over time: `FaceTrack` and `BodyTrack`, checked once and immutable afterwards."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class FaceTrack:
     viseme: int16 (T, 4): viseme_select1, viseme_select2, viseme_blend, viseme_def.
     expression: int16 (T, 6): expression_select1, expression_intensity1, expression_select2,
         expression_intensity2, init_face, expression_def.
-    interpolated: bool (T, 68), True where the parameter is not sent and the sender asks to have it
-        estimated instead of kept (mask type 2), or None where that is asked for nowhere. A frame that
-        sends nothing and asks for nothing leaves this as it was.
+    interpolated: bool (T, 68), True where the parameter is not sent and the decoder shall interpolate it
+        instead of holding its value (mask type 2); None if there is no such parameter. A frame that sends
+        nothing and asks for no interpolation does not change what is interpolated.
 
     Arrays are copied if they must be changed, and read-only afterwards. Raises ValueError on a wrong
-    shape, a non-integer dtype, or a select or flag outside its range. Tracks are equal where they send
-    the same, whatever they ask to have interpolated: a text file of FAPs does not tell that.
+    shape, a non-integer dtype, or a select or flag outside its range. Tracks are equal if they send the
+    same; interpolated is not compared, because FAP files do not contain it.
     """
 
     values: Int32
@@ -45,15 +45,15 @@ class FaceTrack:
     interpolated: Bool | None = None
 
     def __post_init__(self) -> None:
-        values, mask = _checked_values(self.values, self.mask, FAP_COUNT, "FaceTrack")
+        values, mask = _check_values(self.values, self.mask, FAP_COUNT, "FaceTrack")
         if values[:, :2].any():
             raise ValueError(
                 "FaceTrack: columns 0 and 1 of values (FAP 1 viseme, FAP 2 expression) must be 0; "
                 "their content goes into viseme and expression"
             )
         count = len(values)
-        viseme = _checked_fields(self.viseme, count, VISEME_FIELDS, "viseme", mask[:, 0])
-        expression = _checked_fields(self.expression, count, EXPRESSION_FIELDS, "expression", mask[:, 1])
+        viseme = _check_fields(self.viseme, count, VISEME_FIELDS, "viseme", mask[:, 0])
+        expression = _check_fields(self.expression, count, EXPRESSION_FIELDS, "expression", mask[:, 1])
         for fields, names in ((viseme, VISEME_FIELDS), (expression, EXPRESSION_FIELDS)):
             for column, name in enumerate(names):
                 if "select" in name:
@@ -61,37 +61,38 @@ class FaceTrack:
                 elif name.endswith("_def") or name == "init_face":
                     limit = 1
                 else:
-                    continue  # blends and intensities may leave 0..63 by the quantiser's rounding
+                    continue  # blends and intensities may leave 0..63, because the quantiser rounds
                 low, high = (int(fields[:, column].min()), int(fields[:, column].max())) if count else (0, 0)
                 if low < 0 or high > limit:
                     raise ValueError(
                         f"FaceTrack: {name} must lie in 0..{limit}, found {low if low < 0 else high}"
                     )
-        interpolated = _checked_interpolated(self.interpolated, mask)
+        interpolated = _check_interpolated(self.interpolated, mask)
         freeze(
             self, values=values, mask=mask, viseme=viseme, expression=expression, interpolated=interpolated
         )
 
     @classmethod
     def empty(cls, count: int) -> FaceTrack:
-        """A track of that many frames that send nothing."""
+        """Return a track of `count` frames that send nothing."""
         return cls(np.zeros((count, FAP_COUNT), dtype=np.int32), np.zeros((count, FAP_COUNT), dtype=bool))
 
     @classmethod
     def join(cls, parts: Iterable[tuple[FaceTrack | None, int]]) -> FaceTrack | None:
-        """Tracks one after another; each with its count of frames, None where it sends nothing."""
+        """Return tracks joined one after another; None if all are None.
+
+        parts: each a track and its number of frames; None for a track that sends nothing.
+        """
         parts = list(parts)
         if all(track is None for track, _ in parts):
             return None
         tracks = [track if track is not None else cls.empty(count) for track, count in parts]
         return cls(
-            _stacked([t.values for t in tracks]),
-            _stacked([t.mask for t in tracks]),
-            _stacked([t.viseme for t in tracks]),
-            _stacked([t.expression for t in tracks]),
-            _stacked(
-                [t.interpolated if t.interpolated is not None else np.zeros_like(t.mask) for t in tracks]
-            )
+            _stack([t.values for t in tracks]),
+            _stack([t.mask for t in tracks]),
+            _stack([t.viseme for t in tracks]),
+            _stack([t.expression for t in tracks]),
+            _stack([t.interpolated if t.interpolated is not None else np.zeros_like(t.mask) for t in tracks])
             if any(t.interpolated is not None for t in tracks)
             else None,
         )
@@ -101,10 +102,10 @@ class FaceTrack:
 
     def __getitem__(self, frames: slice) -> FaceTrack:
         names = ("values", "mask", "viseme", "expression")
-        taken = {name: getattr(self, name)[frames] for name in names}
+        arrays = {name: getattr(self, name)[frames] for name in names}
         return trusted(
             FaceTrack,
-            **taken,
+            **arrays,
             interpolated=self.interpolated[frames] if self.interpolated is not None else None,
         )
 
@@ -128,29 +129,32 @@ class BodyTrack:
     values: int32 (T, 296), BAP i+1 in column i: 1e-5 rad, millimetres for BAPs 181..183.
     mask: bool (T, 296), True where the parameter was sent.
 
-    Same rules as `FaceTrack`.
+    The same rules apply as for `FaceTrack`.
     """
 
     values: Int32
     mask: Bool
 
     def __post_init__(self) -> None:
-        values, mask = _checked_values(self.values, self.mask, BAP_COUNT, "BodyTrack")
+        values, mask = _check_values(self.values, self.mask, BAP_COUNT, "BodyTrack")
         freeze(self, values=values, mask=mask)
 
     @classmethod
     def empty(cls, count: int) -> BodyTrack:
-        """A track of that many frames that send nothing."""
+        """Return a track of `count` frames that send nothing."""
         return cls(np.zeros((count, BAP_COUNT), dtype=np.int32), np.zeros((count, BAP_COUNT), dtype=bool))
 
     @classmethod
     def join(cls, parts: Iterable[tuple[BodyTrack | None, int]]) -> BodyTrack | None:
-        """Tracks one after another; each with its count of frames, None where it sends nothing."""
+        """Return tracks joined one after another; None if all are None.
+
+        parts: each a track and its number of frames; None for a track that sends nothing.
+        """
         parts = list(parts)
         if all(track is None for track, _ in parts):
             return None
         tracks = [track if track is not None else cls.empty(count) for track, count in parts]
-        return cls(_stacked([t.values for t in tracks]), _stacked([t.mask for t in tracks]))
+        return cls(_stack([t.values for t in tracks]), _stack([t.mask for t in tracks]))
 
     def __len__(self) -> int:
         return len(self.values)
@@ -170,13 +174,14 @@ Track = TypeVar("Track", FaceTrack, BodyTrack)
 
 
 def trusted(kind: type[Track], **arrays: Array | None) -> Track:
-    """A track of arrays that are known to be right, such as parts of another's, without any check."""
+    """Return a track without checking its arrays, for arrays that are known to be valid."""
     track: Track = object.__new__(kind)
     freeze(track, **arrays)
     return track
 
 
-def _checked_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:
+def _check_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:
+    """Return values, 0 where not sent, and mask, both as a track holds them. ValueError if they are wrong."""
     array = integers(values, np.int32, f"{what}: values")
     sent = np.asarray(mask)
     if array.ndim != 2 or array.shape[1] != columns:
@@ -192,7 +197,8 @@ def _checked_values(values: object, mask: object, columns: int, what: str) -> tu
     return array, sent
 
 
-def _checked_interpolated(interpolated: object, mask: Bool) -> Bool | None:
+def _check_interpolated(interpolated: object, mask: Bool) -> Bool | None:
+    """Return interpolated, False where sent, or None if nothing is. ValueError if it is wrong."""
     if interpolated is None:
         return None
     asked = np.asarray(interpolated)
@@ -207,7 +213,8 @@ def _checked_interpolated(interpolated: object, mask: Bool) -> Bool | None:
     return asked if asked.any() else None
 
 
-def _checked_fields(fields: object, count: int, names: tuple[str, ...], what: str, sent: Bool) -> Int16:
+def _check_fields(fields: object, count: int, names: tuple[str, ...], what: str, sent: Bool) -> Int16:
+    """Return the fields of viseme or expression, 0 where not sent. ValueError if they are wrong."""
     if fields is None:
         return np.zeros((count, len(names)), dtype=np.int16)
     array = integers(fields, np.int16, f"FaceTrack: {what}")
@@ -219,7 +226,7 @@ def _checked_fields(fields: object, count: int, names: tuple[str, ...], what: st
 
 
 def integers(values: object, dtype: type[np.signedinteger], what: str) -> npt.NDArray[np.signedinteger]:
-    """An array of this dtype that no caller can change; refuses what would lose information."""
+    """Return an array of this dtype that no caller can change. ValueError if that would lose information."""
     array = np.asarray(values)
     if array.size == 0 and array.dtype == np.float64:
         array = array.astype(dtype)
@@ -238,12 +245,12 @@ def freeze(instance: object, **fields: object) -> None:
     """Set the fields of a frozen dataclass; arrays among them become read-only."""
     for name, value in fields.items():
         if isinstance(value, np.ndarray):
-            value.flags.writeable = False  # ours by now: whatever a caller could still change was copied
+            value.flags.writeable = False  # safe: arrays that a caller could change were copied before
         object.__setattr__(instance, name, value)
 
 
-def _stacked(arrays: list[Array]) -> Array:
-    """One array of all, read-only, so that a track takes it over without a copy."""
+def _stack(arrays: list[Array]) -> Array:
+    """Return all arrays as one, read-only, so that a track need not copy it."""
     stacked = np.concatenate(arrays)
     stacked.flags.writeable = False
     return stacked

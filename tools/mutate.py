@@ -101,7 +101,7 @@ MUTANTS = (
     Mutant(MATCHING, "FEWEST = 5", "FEWEST = 6", CAPTURE_TEST),
     Mutant(MATCHING, "FEWEST = 5", "FEWEST = 4", CAPTURE_TEST),
     Mutant(MATCHING, "2 * count >= len(names) > 1", "2 * count > len(names) > 1", CAPTURE_TEST),
-    Mutant(MATCHING, "found.setdefault(joint, number)", "found[joint] = number", CAPTURE_TEST),
+    Mutant(MATCHING, "mapped.setdefault(joint, number)", "mapped[joint] = number", CAPTURE_TEST),
     Mutant(PLANTING, "STEPS = 4", "STEPS = 3", CAPTURE_TEST),
     Mutant(PLANTING, "ROUNDS = 2", "ROUNDS = 0", CAPTURE_TEST),
     Mutant(RETARGET, "FOREARM_SHARE = 0.5", "FOREARM_SHARE = 0.0", CAPTURE_TEST),

@@ -9,7 +9,7 @@ import numpy as np
 from fba.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from fba.body.model import BodyPart
 from fba.body.skin.skin_weights import INFLUENCES, strongest_weights
-from fba.cache import kept, key_of
+from fba.cache import load_or_make, make_key
 from fba.easing import smoothstep
 
 NEAR, FAR = 0.010, 0.030
@@ -60,10 +60,10 @@ def blend_with_neck(neck: list[BodyPart], joints: int, skull: int, placed: Float
         arrays = make()
     else:
         of_neck = [array for p in neck for array in (p.vertices, p.triangles, p.joints, p.weights)]
-        key = key_of("neck", CACHE_VERSION, joints, skull, placed, free, *of_neck)
+        key = make_key("neck", CACHE_VERSION, joints, skull, placed, free, *of_neck)
         count = int(free.sum())
         shapes = ((3,), (count, INFLUENCES), (count, INFLUENCES), (len(placed),), (1,))
-        arrays = kept(key, shapes, make, [np.float64, np.int32, np.float32, np.bool_, np.bool_])
+        arrays = load_or_make(key, shapes, make, [np.float64, np.int32, np.float32, np.bool_, np.bool_])
     offset, which, weights, hidden, brings = arrays
     return NeckBlend(offset, which, weights, hidden, bool(brings[0]))
 

@@ -1,4 +1,4 @@
-"""How close body animation parameters come to the captured motion that they were made from."""
+"""Measure how close BAPs come to the captured motion that they were made from."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 
 CHUNK = 2048
-"""Frames posed at a time."""
+"""Frames that are posed at once."""
 CLOSE = 0.01
-"""Metres above the source's ground within which a foot stands on it; also how well feet are to match."""
+"""Height in metres up to which a foot is on the ground; also the largest error that `within` counts."""
 
 
 @dataclass(frozen=True)
 class BoneError:
-    """The angle between a bone of the source and the body's, in degrees over all frames.
+    """Angles in degrees between a bone of the source and that of the body.
 
-    joint, aim: joints of the standard at its ends. source: name of the source's joint. frame: of the worst.
+    joint, aim: joints of the standard at its ends. source: name of the source's joint. mean, worst: over all
+    frames. frame: that of the worst.
     """
 
     joint: str
@@ -39,10 +40,11 @@ class BoneError:
 
 @dataclass(frozen=True)
 class FeetError:
-    """Heights of soles above the ground, in metres, where the source's foot is on its ground.
+    """Errors in metres of the heights of soles above the ground, while the source's foot is on it.
 
-    ground: the source's own. frames: feet on the ground, both counted. mean and worst: of the magnitude of
-    the difference between the source, scaled, and the body. within: share that differs by 1 cm or less.
+    ground: height of the source's. frames: number of those with a foot on the ground, both feet counted.
+    mean, worst: of the differences between the source, scaled, and the body. within: share of differences up
+    to 1 cm.
     """
 
     ground: float
@@ -54,11 +56,11 @@ class FeetError:
 
 @dataclass(frozen=True)
 class RetargetReport:
-    """What became of a captured skeleton.
+    """Result of retargeting a captured skeleton.
 
-    family: of joint names, empty where they were given. bones: in the body's order. feet: None where the
-    source has no ankles, or feet that are never on the ground. unused: joints of the source that move no
-    joint of the body. missing: joints that BAPs could turn, but the source has not.
+    family: that of the joint names, empty if they were given. bones: in the body's order. feet: None if the
+    source has no ankles, or its feet are never on the ground. unused: joints of the source that move no joint
+    of the body. missing: joints that BAPs can turn, but the source lacks.
     """
 
     family: str
@@ -87,11 +89,11 @@ def retarget_report(
     scale: float | None = None,
     solver: BapSolver | None = None,
 ) -> RetargetReport:
-    """Compares an animation, say what came out of a stream, with the motion it was made from.
+    """Compare an animation, such as a decoded one, with the motion it was made from.
 
-    joints, scale, solver: as they were given to `from_skeleton`. Where frame rates differ, the motion is
-    resampled; frames that only one of both has are left out. ModelError where the animation has no body, no
-    frame in common, or no family of names fits.
+    joints, scale, solver: as they were given to `from_skeleton`. If frame rates differ, the motion is
+    resampled; frames that only one of the two has are left out. ModelError if the animation has no body or no
+    frame in common with the motion, or no family of names fits.
     """
     solver = solver if solver is not None else BapSolver()
     skeleton = solver.skeleton
@@ -108,8 +110,8 @@ def retarget_report(
         raise ModelError("retarget_report: the motion and the animation have no frame in common")
 
     alignment = rest_alignment.align(motion, mapped, skeleton)
-    turned, places = motion.world()
-    places = places @ alignment.upright.T
+    turned, positions = motion.world()
+    positions = positions @ alignment.upright.T
     order = {name: number for number, name in enumerate(skeleton.names)}
     aims = sorted(alignment.aims.items(), key=lambda pair: order[pair[0]])
     angles = np.zeros((count, len(aims)))
@@ -121,7 +123,7 @@ def retarget_report(
         matrices = solver.pose(animation.body.values[begin:end])
         for column, (joint, aim) in enumerate(aims):
             ours = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
-            theirs = places[begin:end, mapped[aim]] - places[begin:end, mapped[joint]]
+            theirs = positions[begin:end, mapped[aim]] - positions[begin:end, mapped[joint]]
             angles[begin:end, column] = _between(ours, theirs)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
         own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3], toes)
@@ -142,7 +144,7 @@ def retarget_report(
     metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
     standing = None
     if has_feet and metres:
-        source = soles.source_soles(motion, mapped, alignment.upright, turned, places, metres)
+        source = soles.source_soles(motion, mapped, alignment.upright, turned, positions, metres)
         standing = _feet(source, heights) if source is not None else None
     used = set(mapped.values())
     return RetargetReport(
@@ -156,25 +158,26 @@ def retarget_report(
 
 
 def _between(a: Float64, b: Float64) -> Float64:
-    """Degrees (T,) between vectors (T, 3)."""
+    """Return degrees (T,) between vectors (T, 3)."""
     sine = np.linalg.norm(np.cross(a, b), axis=1)
     result: Float64 = np.degrees(np.arctan2(sine, np.sum(a * b, axis=1)))
     return result
 
 
 def _feet(source: soles.Soles, body: Float64) -> FeetError | None:
+    """Return the errors of the soles' heights, body (2, T); None if no foot is on the ground."""
     middles = source.points.mean(axis=1)
-    level = ground.found(source.lowest, middles).under(middles)[:, : body.shape[1]]
+    level = ground.find(source.lowest, middles).under(middles)[:, : body.shape[1]]
     above = source.lowest[:, : body.shape[1]] - level
-    on = above < CLOSE
-    if not on.any():
+    standing = above < CLOSE
+    if not standing.any():
         return None
-    # the body's ground is height 0, or where the source's is: whichever its feet say
-    errors = [np.abs(body - floor - above)[on] for floor in (np.zeros_like(level), level)]
+    # the body's ground is at height 0, or at the source's: whichever its feet fit better
+    errors = [np.abs(body - floor - above)[standing] for floor in (np.zeros_like(level), level)]
     error = min(errors, key=lambda e: float(np.median(e)))
     return FeetError(
-        float(np.median(level[on])),
-        int(on.sum()),
+        float(np.median(level[standing])),
+        int(standing.sum()),
         float(error.mean()),
         float(error.max()),
         float((error <= CLOSE).mean()),

@@ -111,7 +111,7 @@ def _in_option(remedy: Remedy, context: click.Context) -> str:
         name = "to"
     given = _option(context.command, name, remedy.value)
     if given is not None:
-        return remedy.said(given)
+        return remedy.fill_in(given)
     for words in OTHERS if name is not None else ():
         command: click.Command | None = context.find_root().command
         for word in words:
@@ -119,10 +119,10 @@ def _in_option(remedy: Remedy, context: click.Context) -> str:
             command = command.get_command(context, word)
         given = None if command is None else _option(command, name, remedy.value)
         if given is not None:
-            return remedy.said(f"{given} of `fba {' '.join(words)}`")
+            return remedy.fill_in(f"{given} of `fba {' '.join(words)}`")
     call = remedy.call or "fba.read"
     python = f"{call}(FILE, {remedy.argument}={remedy.value})"
-    return f"{remedy.said(python)} in Python; the command line has no option for it"
+    return f"{remedy.fill_in(python)} in Python; the command line has no option for it"
 
 
 def _option(command: click.Command, name: str | None, value: str) -> str | None:

@@ -1,4 +1,4 @@
-"""When planes are shown: frame rate, skips and time codes, in exact fractions."""
+"""Times of planes from frame rate, skips and time codes, as exact fractions."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fba.arrays import Int64
 from fba.codec.settings import FrameRate, TimeCode
 
 DEFAULT_RATE = Fraction(25)
-"""Assumed, with a warning, where the first I plane says none."""
+"""Frames per second, assumed with a warning if the first I plane states no rate."""
 
 
 class StreamClock:
-    """Gives planes their times: `index` / `rate` of the next plane, and its exact `time`.
+    """Computes the times of planes: `index`, `rate` and exact `time` of the next one.
 
-    A plane comes one frame period, and as many more as the plane before it skips, after that plane. A
-    time code sets the clock; where it falls between two frames, the index is that of the nearer one.
+    A plane follows the one before it after one frame period, and as many more as that one skips. A time code
+    sets the clock; between two frames, the index is that of the nearer one.
     """
 
     def __init__(self) -> None:
@@ -35,32 +35,32 @@ class StreamClock:
         return self._anchor + Fraction(self.index - self._anchor_index) / self.rate
 
     def begin_intra(self, frame_rate: FrameRate | None, time_code: TimeCode | None) -> list[str]:
-        """Take in what an I plane says of time; what was odd about it."""
-        odd = []
+        """Apply the frame rate and time code of an I plane; return warnings about them."""
+        problems = []
         rate = frame_rate.fraction if frame_rate is not None else self.rate
         if rate is None:
             rate = DEFAULT_RATE
-            odd.append(f"the first I plane says no frame rate; {rate} frames/s assumed")
+            problems.append(f"the first I plane says no frame rate; {rate} frames/s assumed")
         now = self.time
         if rate != self.rate:
             if self.rate is not None:
-                odd.append(f"the frame rate changes from {self.rate} to {rate}")
+                problems.append(f"the frame rate changes from {self.rate} to {rate}")
             self._anchor, self.rate = now, rate
             self.index = self._anchor_index = math.ceil(now * rate)
         if time_code is not None:
-            said = f"time code {time_code.hours}:{time_code.minutes:02}:{time_code.seconds:02}"
+            text = f"time code {time_code.hours}:{time_code.minutes:02}:{time_code.seconds:02}"
             if not time_code.marker:
-                odd.append(f"the marker bit of {said} is 0; that time code was not used")
+                problems.append(f"the marker bit of {text} is 0; that time code was not used")
             elif time_code.total_seconds < now:
-                odd.append(f"{said} lies before the previous plane; it was not used")
+                problems.append(f"{text} lies before the previous plane; it was not used")
             else:
                 self._anchor = Fraction(time_code.total_seconds)
                 nearest = math.floor(self._anchor * rate + Fraction(1, 2))
                 self.index = self._anchor_index = max(nearest, self.index)
-        return odd
+        return problems
 
     def advance(self, skips: Int64) -> Int64:
-        """Indices of planes with these skips, int64 (T,); the clock moves on behind them."""
+        """Return the indices of planes with these skips, int64 (T,), and advance the clock past them."""
         steps = np.cumsum(skips + 1)
         index = self.index + np.concatenate([[0], steps[:-1]])
         self.index += int(steps[-1])

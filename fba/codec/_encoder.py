@@ -1,4 +1,4 @@
-"""From an animation to bits: the incremental `Encoder`, and `encode`, which drives one to its end."""
+"""Encode animations: the incremental `Encoder`, and `encode` for a complete animation."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from fba.errors import RangeError
 from fba.parameters import INTENSITY_MAX
 
 _CHUNK = 4096
-"""Frames that `encode` hands over at a time: what bounds its memory."""
+"""Frames that `encode` passes to the encoder at once, which limits its memory."""
 
 _PARTS = (slots.FACE_BIT, slots.BODY_BIT)
 
 
 @dataclass
 class EncoderStatistics:
-    """planes, intra_planes: written so far. clamped: values that were brought into range."""
+    """Counts of an encoder: planes and I planes written, and values clamped to their range."""
 
     planes: int = 0
     intra_planes: int = 0
@@ -39,13 +39,13 @@ class EncoderStatistics:
 class Encoder:
     """Encodes frames as they come; `push` and `finish` return the bytes that are complete.
 
-    A frame leaves when the next one is there, since its plane says how many frames are skipped after it.
-    Ranges start from the standard's tables (or from `ranges`, as `encode` fits them) and grow: a frame
-    that does not fit them becomes an I plane with wider ones. Masks may change from frame to frame; every
-    change makes an I plane too, except that a part may be left out of a plane for nothing.
+    A frame is encoded when the next one comes, because its plane states how many frames are skipped after it.
+    Ranges start from the standard's tables (or from `ranges`, as `encode` fits them) and grow: a frame that
+    does not fit them becomes an I plane with wider ones. Masks may change from frame to frame; a change needs
+    an I plane, unless it only leaves a part out.
 
-    Raises RangeError for a value that no range can carry (unless options.clamp), for a frame rate that
-    cannot be coded, and ValueError for frames of another rate or that go back in time.
+    Raises RangeError for a value that no range can carry (unless options.clamp) and for a frame rate that
+    cannot be coded, ValueError for frames of another rate or with an index that does not increase.
     """
 
     def __init__(
@@ -56,19 +56,21 @@ class Encoder:
         self._writer = PlaneWriter(self.options.bap_steps)
         self._ranges = dict(ranges or {})
         self._stale = dict.fromkeys(_PARTS, True)  # ranges that the reader does not know yet
-        self._joined: set[int] = set()  # parts that a reader who joined at the last start code knows
-        self._held: Animation | None = None
+        self._joined: set[int] = (
+            set()
+        )  # parts whose settings a decoder knows that started at the last start code
+        self._last: Animation | None = None
         self._rate: Fraction | None = None
         self._last_intra = 0  # index of the last I plane
         self._position = 0  # frames pushed before the one being coded
         self._finished = False
 
     def push(self, frame: Frame) -> bytes:
-        """Take in a frame; the bytes that are complete."""
+        """Add a frame; return the bytes that are complete."""
         return self.push_animation(Animation.from_frames([frame]))
 
     def push_animation(self, animation: Animation) -> bytes:
-        """Take in consecutive frames: what to use for speed."""
+        """Add consecutive frames, faster than one by one; return the bytes that are complete."""
         if self._finished:
             raise ValueError("this encoder is finished; make a new one for another stream")
         if not len(animation):
@@ -78,43 +80,45 @@ class Encoder:
                 f"the stream has {self._rate} frames/s, this frame {animation.rate}; resample it first"
             )
         frames = animation
-        if self._held is not None:
-            if animation.index[0] <= self._held.index[0]:
+        if self._last is not None:
+            if animation.index[0] <= self._last.index[0]:
                 raise ValueError(
-                    f"frame index {animation.index[0]} comes after {self._held.index[0]}; they must increase"
+                    f"frame index {animation.index[0]} comes after {self._last.index[0]}; they must increase"
                 )
-            frames = _followed(self._held, animation)
+            frames = _join(self._last, animation)
         self._check_skips(frames)
         if self._rate is None:
-            headers.frame_rate(animation.rate)  # refuses what cannot be coded before anything is written
+            headers.frame_rate(
+                animation.rate
+            )  # raises before anything is written if the rate cannot be coded
             self._rate = animation.rate
-        self._held = frames[len(frames) - 1 :]
+        self._last = frames[len(frames) - 1 :]
         self._encode(frames, len(frames) - 1)
         return self._writer.take_bytes()
 
     def finish(self) -> bytes:
-        """Say that no more frames come; the last bytes, with alignment and end code. ValueError where
-        there was no frame at all."""
+        """End the stream; return the last bytes, with alignment and end code. ValueError without a frame."""
         if self._finished:
             return b""
-        if self._held is None:
+        if self._last is None:
             raise ValueError("there is no frame to encode")
-        self._encode(self._held, 1)
+        self._encode(self._last, 1)
         self._finished = True
         self._writer.end_object()
         return self._writer.take_bytes()
 
     def _check_skips(self, frames: Animation) -> None:
+        """Raise RangeError if more frames are skipped than a plane can skip."""
         gaps = np.diff(frames.index)
         if len(gaps) and int(gaps.max()) - 1 > SKIP_MAX:
-            at = int(np.argmax(gaps))
+            largest = int(np.argmax(gaps))
             raise RangeError(
-                f"{int(gaps[at]) - 1} frames are skipped before the next; a plane can skip {SKIP_MAX}",
-                frame=self._position + at,
+                f"{int(gaps[largest]) - 1} frames are skipped before the next; a plane can skip {SKIP_MAX}",
+                frame=self._position + largest,
             )
 
     def _encode(self, frames: Animation, count: int) -> None:
-        """Encode the first `count` frames; one after them, where there is one, says the last skip."""
+        """Encode the first `count` frames; the frame after them, if any, determines the last skip."""
         if not count:
             return
         rows = np.zeros((count, slots.row_width(body=frames.body is not None)), dtype=np.int32)
@@ -131,10 +135,10 @@ class Encoder:
         self._position += count
 
     def _clip_amounts(self, rows: Int32) -> None:
-        """Bring blends and intensities into 0..63. Raises RangeError for those that no quantiser makes."""
-        wrong = range_fitting.clip_amounts(rows)
-        if len(wrong) and not self.options.clamp:
-            frame, slot, value = wrong[0]
+        """Limit blends and intensities to 0..63. Raises RangeError for those that no quantiser explains."""
+        invalid = range_fitting.clip_amounts(rows)
+        if len(invalid) and not self.options.clamp:
+            frame, slot, value = invalid[0]
             raise RangeError(
                 f"the value {value} cannot be carried: it lies outside 0..{INTENSITY_MAX}; correct it",
                 parameter=slots.label(slot),
@@ -142,10 +146,10 @@ class Encoder:
                 limits=(0, INTENSITY_MAX),
                 frame=self._position + frame,
             ).with_remedies(range_fitting.CLAMP)
-        self.statistics.clamped += len(wrong)
+        self.statistics.clamped += len(invalid)
 
     def _encode_run(self, frames: Animation, start: int, stop: int, rows: Int32, skips: Int64) -> None:
-        """Encode frames start..stop, which all send the same."""
+        """Encode frames start..stop, which send the same parameters."""
         masks = _masks(frames, start)
         interpolated = _interpolated(frames, start)
         types = {
@@ -157,16 +161,16 @@ class Encoder:
         present = [part for part in masks if any(types[part])] or [min(masks)]
         same = all(
             part in self._joined
-            and (force := self._writer.mask_in_force(part)) is not None
-            and np.array_equal(force, masks[part])
+            and (in_force := self._writer.mask_in_force(part)) is not None
+            and np.array_equal(in_force, masks[part])
             and self._writer.types_in_force(part) == types[part]
             for part in present
         )
         position = start
         if not same:
-            # The first plane carries every track there is, even where it sends nothing yet.
+            # The first plane carries every track, even one that sends nothing yet.
             carried = present if self.statistics.planes else list(masks)
-            self._intra(frames, position, carried, masks, types, rows, int(skips[position]))
+            self._encode_intra(frames, position, carried, masks, types, rows, int(skips[position]))
             position += 1
         while position < stop:
             due = self._intra_due(frames, position, stop)
@@ -185,7 +189,7 @@ class Encoder:
                     self.options.clamp
                     and ranges.is_widest(error.slot)
                     and not self._stale[part]
-                    and not self._carried_by_intra(rows[position], masks, present)
+                    and not self._fits_intra(rows[position], masks, present)
                 ):
                     rows[position, error.slot] = self._writer.nearest(error.slot, error.level)
                     self.statistics.clamped += 1
@@ -193,17 +197,17 @@ class Encoder:
                 wanted = np.array([[0], [0], [error.level], [-error.level]])
                 if ranges.widen(np.array([error.slot]), wanted):
                     self._stale[part] = True
-            self._intra(frames, position, present, masks, types, rows, int(skips[position]))
+            self._encode_intra(frames, position, present, masks, types, rows, int(skips[position]))
             position += 1
 
     def _intra_due(self, frames: Animation, start: int, stop: int) -> int:
-        """First of the frames start..stop at which the intra period is over."""
+        """Return the first of the frames start..stop at which the intra period is over, else stop."""
         if self.options.intra_period is None:
             return stop
         next_intra = self._last_intra + float(self.options.intra_period * frames.rate)
         return start + int(np.searchsorted(frames.index[start:stop], next_intra - 1e-9))
 
-    def _intra(
+    def _encode_intra(
         self,
         frames: Animation,
         position: int,
@@ -213,6 +217,7 @@ class Encoder:
         rows: Int32,
         skip: int,
     ) -> None:
+        """Encode a frame as an I plane with these parts."""
         first = self.statistics.planes == 0
         if first:
             self._writer.begin_object()
@@ -237,14 +242,15 @@ class Encoder:
         self._last_intra = index
 
     def _levels(self, part: int, mask: Bool, row: Int32) -> tuple[Int64, Int64]:
-        """Slots (K,) and levels (K,) of what an I plane codes of a part, without viseme and expression."""
-        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
-        base = 0 if part == slots.FACE_BIT else place.start
-        coded = np.flatnonzero(mask[2:] if part == slots.FACE_BIT else mask) + place.start
+        """Return slots (K,) and levels (K,) of a part in an I plane, without viseme and expression."""
+        columns = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        base = 0 if part == slots.FACE_BIT else columns.start
+        coded = np.flatnonzero(mask[2:] if part == slots.FACE_BIT else mask) + columns.start
         step = quantiser.steps(part, self.options.quant(part), self.options.bap_steps)[coded - base]
         return coded, quantiser.levels(row[coded], step)
 
-    def _carried_by_intra(self, row: Int32, masks: dict[int, Bool], present: list[int]) -> bool:
+    def _fits_intra(self, row: Int32, masks: dict[int, Bool], present: list[int]) -> bool:
+        """Whether an I plane can carry all values of a row (columns,)."""
         return all(
             bool(self._ranges[part].fits(self._levels(part, masks[part], row)[1]).all()) for part in present
         )
@@ -252,14 +258,14 @@ class Encoder:
     def _part_settings(
         self, part: int, mask: Bool, types: tuple[int, ...], row: Int32, position: int
     ) -> PartSettings:
-        """Settings for an I plane, with ranges that hold its values. Raises RangeError where none do."""
+        """Return settings for an I plane, with ranges that hold its values; RangeError if none can."""
         options = self.options
         if part not in self._ranges:
             self._ranges[part] = Ranges(part, options.quant(part))
             self._ranges[part].start_from_tables()
         ranges = self._ranges[part]
-        force = self._writer.mask_in_force(part)
-        new_mask = force is None or not np.array_equal(force, mask)
+        in_force = self._writer.mask_in_force(part)
+        new_mask = in_force is None or not np.array_equal(in_force, mask)
         coded, levels = self._levels(part, mask, row)
         beyond = ~ranges.fits(levels)
         if beyond.any():
@@ -268,8 +274,8 @@ class Encoder:
                 raise range_fitting.does_not_fit(slot, int(row[slot]), self._position + position, options)
             ranges.widen_to_catch_up(coded[beyond], levels[beyond])
             self._stale[part] = True
-        none = np.zeros_like(levels)
-        if ranges.widen(coded, np.stack([levels, -levels, none, none])):
+        zeros = np.zeros_like(levels)
+        if ranges.widen(coded, np.stack([levels, -levels, zeros, zeros])):
             self._stale[part] = True
         send = self._stale[part] or new_mask or options.start_codes
         self._stale[part] = False
@@ -294,7 +300,7 @@ def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes
 def encode_with_statistics(
     animation: Animation, options: EncoderOptions | None = None
 ) -> tuple[bytes, EncoderStatistics]:
-    """Like `encode`, and what the encoder counted."""
+    """Return the result of `encode`, and what the encoder counted."""
     options = options or EncoderOptions()
     encoder = Encoder(options, ranges=range_fitting.fitting_ranges(animation, options))
     starts = range(0, len(animation), _CHUNK)
@@ -304,19 +310,19 @@ def encode_with_statistics(
 
 
 def _masks(frames: Animation, position: int) -> dict[int, Bool]:
-    """What a frame sends, by part; a part without a track is missing."""
+    """Return by part the mask of a frame; parts without a track are missing."""
     tracks = ((slots.FACE_BIT, frames.face), (slots.BODY_BIT, frames.body))
     return {part: track.mask[position] for part, track in tracks if track is not None}
 
 
 def _interpolated(frames: Animation, position: int) -> Bool | None:
-    """What a frame asks to have interpolated: bool (68,), or None."""
-    asked = frames.face.interpolated if frames.face is not None else None
-    return asked[position] if asked is not None else None
+    """Return the FAPs that a frame asks to interpolate, bool (68,), or None."""
+    interpolated = frames.face.interpolated if frames.face is not None else None
+    return interpolated[position] if interpolated is not None else None
 
 
 def _runs(frames: Animation, count: int) -> list[tuple[int, int]]:
-    """Stretches of the first `count` frames that send the same, and ask for the same."""
+    """Return (start, stop) of runs of the first `count` frames with the same masks and interpolation."""
     changes = np.zeros(count, dtype=bool)
     masks = [track.mask for track in (frames.face, frames.body) if track is not None]
     if frames.face is not None and frames.face.interpolated is not None:
@@ -327,8 +333,8 @@ def _runs(frames: Animation, count: int) -> list[tuple[int, int]]:
     return list(pairwise(borders))
 
 
-def _followed(first: Animation, second: Animation) -> Animation:
-    """Two pieces of one animation, the second with the later indices, as one."""
+def _join(first: Animation, second: Animation) -> Animation:
+    """Return two parts of an animation as one; the second has the later indices."""
     return Animation(
         first.rate,
         np.concatenate([first.index, second.index]),

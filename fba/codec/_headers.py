@@ -1,4 +1,4 @@
-"""Header fields that an encoder chooses: mask types, frame rate and time code."""
+"""Choose header fields for the encoder: mask types, frame rate and time code."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _HOURS = 32
 
 
 def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) -> tuple[int, ...]:
-    """Mask type of every group: none, all, or masked (BAPs are always kept).
+    """Return the mask type of every group: none, all, or masked.
 
-    interpolated: bool (68,), the FAPs that the animation wants interpolated, or None. A group has one type:
-    that of interpolation where the animation wants it for all unsent FAPs of the group, else `unsent`
-    decides.
+    mask: bool (68,) or (296,), what is sent. interpolated: bool (68,), the FAPs that the animation wants
+    interpolated, or None. unsent: "keep" or "interpolate", for groups in which the animation does not want
+    all unsent FAPs interpolated. Unsent BAPs always keep their values.
     """
     return _mask_types(
         part, mask.tobytes(), interpolated.tobytes() if interpolated is not None else b"", unsent
@@ -29,8 +29,10 @@ def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) ->
 
 @lru_cache(maxsize=64)
 def _mask_types(part: int, mask: bytes, interpolated: bytes, unsent: str) -> tuple[int, ...]:
-    """The same from bytes, which can be cached: an encoder asks with every frame."""
-    some = syntax.MASK_INTERPOLATE if unsent == "interpolate" and part == slots.FACE_BIT else syntax.MASK_KEEP
+    """Do the same with bytes, so that results can be cached: an encoder asks for every frame."""
+    masked = (
+        syntax.MASK_INTERPOLATE if unsent == "interpolate" and part == slots.FACE_BIT else syntax.MASK_KEEP
+    )
     types = []
     for group in syntax.groups(part):
         sent = [mask[number - 1] for number in group]
@@ -39,12 +41,12 @@ def _mask_types(part: int, mask: bytes, interpolated: bytes, unsent: str) -> tup
         elif interpolated and all(mask[number - 1] or interpolated[number - 1] for number in group):
             types.append(syntax.MASK_INTERPOLATE)
         else:
-            types.append(some if any(sent) else syntax.MASK_NONE)
+            types.append(masked if any(sent) else syntax.MASK_NONE)
     return tuple(types)
 
 
 def frame_rate(rate: Fraction) -> FrameRate:
-    """The header fields for a rate. Raises RangeError where the syntax cannot carry it."""
+    """Return the header fields for a rate. Raises RangeError if the syntax cannot carry it."""
     fields = FrameRate.from_fraction(rate)
     if fields is None:
         nearest = max(Fraction(round(rate * 16), 16), Fraction(1, 16))
@@ -60,9 +62,9 @@ def frame_rate(rate: Fraction) -> FrameRate:
 
 
 def time_code(index: int, rate: Fraction) -> TimeCode | None:
-    """The time code that makes a decoder show the first plane at this index; None where index is 0.
+    """Return the time code with which a decoder shows the first plane at this index; None for index 0.
 
-    Time codes count whole seconds below 32 hours. Returns None with an FbaWarning where none gives the index.
+    Time codes are whole seconds below 32 hours. If none gives the index, returns None with an FbaWarning.
     """
     if index == 0:
         return None

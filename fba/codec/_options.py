@@ -21,12 +21,12 @@ class EncoderOptions:
 
     fap_quant, bap_quant: 0..31. A FAP's quantiser step is the standard's table step times fap_quant, a
         BAP's the table step times bap_pred_scale[bap_quant]; 0 sends values unquantised. Default 1.
-    intra_period: the most seconds from one I plane to the next; None: I planes only where one is needed.
+    intra_period: most seconds from one I plane to the next; None for I planes only where one is needed.
     start_codes: write a plane start code before every I plane after the first, and all ranges with each, so
         that a decoder can start there or resume after damage.
     bap_steps: "iso" or "visage", the table of BAP steps; the decoder must be given the same.
     preset: "reference", ranges that fit the data.
-    unsent: what a decoder does with a FAP that is not sent, where the animation does not say so itself
+    unsent: what a decoder does with an unsent FAP, unless the animation says so itself
         (`FaceTrack.interpolated`): "keep" its last value (mask type 1) or "interpolate" it from others
         (mask type 2).
     gender: suggested_gender, 1 male.
@@ -60,9 +60,9 @@ class EncoderOptions:
             ("gender", (0, 1)),
         ):
             if getattr(self, name) not in allowed:
-                said = ", ".join(map(str, allowed))
-                raise ValueError(f"{name} must be one of {said}, not {getattr(self, name)!r}")
+                choices = ", ".join(map(str, allowed))
+                raise ValueError(f"{name} must be one of {choices}, not {getattr(self, name)!r}")
 
     def quant(self, part: int) -> int:
-        """The quantiser of a part: `slots.FACE_BIT` or `slots.BODY_BIT`."""
+        """Return the quantiser of a part: `slots.FACE_BIT` or `slots.BODY_BIT`."""
         return self.fap_quant if part == slots.FACE_BIT else self.bap_quant

@@ -1,4 +1,4 @@
-"""Ranges of the values that planes carry: fitted to an animation, widened, and exceeded."""
+"""Ranges of values in planes: fit them to an animation, widen them, report values beyond them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fba.errors import RangeError, Remedy
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, Bap, Fap, baps, faps
 
 _ROUNDED_AMOUNT_MAX = max((INTENSITY_MAX + quant // 2) // quant * quant for quant in range(1, QUANT_MAX + 1))
-"""Largest blend or intensity that any quantiser makes a decoder give: 75, by fap_quant 25."""
+"""Largest blend or intensity that a decoder returns for any quantiser: 75, with fap_quant 25."""
 
 
 class Ranges:
@@ -31,7 +31,7 @@ class Ranges:
         self.codes = np.zeros((4, FAP_COUNT if part == slots.FACE_BIT else BAP_COUNT), dtype=np.uint8)
 
     def start_from_tables(self) -> None:
-        """Sets the standard's own limits: the start where the data is not known yet."""
+        """Set the standard's own limits, for data that is not known in advance."""
         table: tuple[Fap | Bap, ...] = faps() if self._part == slots.FACE_BIT else baps()
         for column, one in enumerate(table):
             if one.i_limits is not None and one.p_limits is not None:
@@ -39,7 +39,7 @@ class Ranges:
                 self.codes[:, column] = [-(-limit // RANGE_UNIT) for limit in limits]
 
     def widen(self, slots_: Int64, levels: Int64) -> bool:
-        """Widens the ranges of slots (K,) to hold these levels, if any can. Returns whether any changed.
+        """Widen the ranges of slots (K,) to hold these levels as far as possible; return whether any changed.
 
         levels: (4, K): I max, I min, P max, P min, the minima negated.
         """
@@ -52,7 +52,7 @@ class Ranges:
         return wider
 
     def widen_to_catch_up(self, slots_: Int64, levels: Int64) -> None:
-        """Widens the ranges of P planes, which make up for an I plane that fell short of these levels."""
+        """Widen the ranges of P planes, which catch up after an I plane could not carry these levels."""
         columns = slots_ - self._first
         missing = np.maximum(self._codes(np.abs(levels)) - RANGE_CODE_MAX, 0) + 1
         self.codes[2:, columns] = np.minimum(self.codes[2:, columns] + missing, RANGE_CODE_MAX)
@@ -62,23 +62,23 @@ class Ranges:
         return bool((self.codes[2:, slot - self._first] == RANGE_CODE_MAX).all())
 
     def fits(self, levels: Int64) -> Bool:
-        """Which of the levels any range can hold."""
+        """Return bool (K,): whether the widest range can hold each level."""
         fitting: Bool = self._codes(np.abs(levels)) <= RANGE_CODE_MAX
         return fitting
 
     def lists(self) -> RangeLists:
-        """A copy of all four lists."""
+        """Return a copy of all four lists."""
         copies: list[UInt8] = [row.copy() for row in self.codes]
         return RangeLists(*copies)
 
     def _codes(self, levels: Int64) -> Int64:
-        """Smallest codes whose limits, 60 x code / scale rounded down, reach the levels (0 and up)."""
+        """Return the smallest codes whose limits, 60 x code / scale rounded down, reach levels from 0 up."""
         codes: Int64 = -(-levels * self._scale // RANGE_UNIT)
         return codes
 
 
 def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, Ranges]:
-    """The ranges that hold a whole animation, as far as any do, by part."""
+    """Return by part the ranges that hold all values of an animation, as far as any can."""
     result = {}
     for part, track in ((slots.FACE_BIT, animation.face), (slots.BODY_BIT, animation.body)):
         if track is None:
@@ -98,7 +98,7 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
 
 @compiled
 def _extremes(values: Int32, mask: Bool, step: Int64, extremes: Int64) -> None:
-    """Largest and negated smallest levels of I and P planes, per column, were each frame coded as both."""
+    """Fill extremes (4, columns): largest and negated smallest levels of frames as I and as P planes."""
     for column in range(values.shape[1]):
         one_step = int(step[column])
         last = 0
@@ -125,7 +125,7 @@ CLAMP = Remedy("clamp", "or bring what does not fit as near as can be with {}", 
 
 
 def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) -> RangeError:
-    """The error for a value that no range can carry: names frame, parameter, limits and a remedy."""
+    """Return the error for a value that no range can carry, with frame, parameter, limits and a remedy."""
     part = slots.FACE_BIT if slot < slots.FAPS.stop else slots.BODY_BIT
     column = slot if part == slots.FACE_BIT else slot - slots.BAPS.start
     name = "fap_quant" if part == slots.FACE_BIT else "bap_quant"
@@ -158,14 +158,14 @@ def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) 
 
 
 def _largest(part: int, column: int, quant: int, table: str) -> int:
-    """Largest value that an I plane carries in a slot at a quantiser."""
+    """Return the largest value that an I plane can carry in a column with this quantiser."""
     step = int(quantiser.steps(part, quant, table)[column])
     limit = RANGE_CODE_MAX * RANGE_UNIT // quantiser.scale(part, quant)
     return limit * step + (step - 1) // 2
 
 
 def clip_amounts(rows: Int32) -> list[tuple[int, int, int]]:
-    """Limits blends and intensities to 0..63; a coarse quantiser makes a decoder round them past that.
+    """Limit blends and intensities to 0..63, in place: a coarse quantiser makes a decoder round beyond that.
 
     Returns row, slot and value of those that no quantiser explains, in order.
     """

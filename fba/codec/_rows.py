@@ -1,4 +1,4 @@
-"""Arrays that grow at their end: rows of numbers, and masks that are mostly the same from frame to frame."""
+"""Arrays that grow at their end: rows of numbers, and masks that rarely change between frames."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from fba.arrays import Array, Bool
 class Rows:
     """An array (T, *shape) that grows by an eighth at a time.
 
-    count: rows there are from the start, all zeros. in_place: the memory is enlarged where it lies, which
-    needs half as much of it, but makes older views invalid; else they stay as they are.
+    count: rows at the start, all zeros. in_place: resize the memory itself, which needs half as much of it,
+    but invalidates older views; otherwise these do not change.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class Rows:
         self.count = need
 
     def view(self) -> Array:
-        """All rows, read-only, without a copy."""
+        """Return all rows, read-only, without a copy."""
         if self._in_place and self.count < len(self._array):
             self._resize(self.count)
         view = self._array[: self.count]
@@ -39,6 +39,7 @@ class Rows:
         return view
 
     def _resize(self, count: int) -> None:
+        """Make room for `count` rows in all."""
         shape = (count, *self._array.shape[1:])
         if self._in_place:
             self._array.resize(shape, refcheck=False)
@@ -49,7 +50,7 @@ class Rows:
 
 
 class Masks:
-    """Masks bool (T, columns): one row for all frames until a block has another, as most streams never do."""
+    """Masks bool (T, columns); stored as one row until a block has another, which is rare."""
 
     def __init__(self, columns: int, count: int, *, in_place: bool) -> None:
         self.any = False
@@ -60,7 +61,7 @@ class Masks:
         self._rows: Rows | None = None
 
     def append(self, mask: Bool | None, count: int) -> None:
-        """Append `count` times one row, bool (columns,), or zeros."""
+        """Append a row, bool (columns,), `count` times; None for zeros."""
         row = mask if mask is not None else np.zeros_like(self._row)
         self.any = self.any or bool(row.any())
         if not self._count:
@@ -73,7 +74,7 @@ class Masks:
         self._count += count
 
     def view(self) -> Bool:
-        """All masks, read-only."""
+        """Return all masks, read-only."""
         if self._rows is not None:
             return self._rows.view()
         return np.broadcast_to(self._row, (self._count, len(self._row)))

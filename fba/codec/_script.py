@@ -1,4 +1,4 @@
-"""Encoding as a list of `PlaneSettings` says, such as an EPF file gives: nothing is decided here."""
+"""Encode planes with given `PlaneSettings`, such as those of an EPF file; no decisions are made here."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from fba.errors import RangeError
 
 
 def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_steps: str = "iso") -> bytes:
-    """Encode the frames of an animation plane by plane.
+    """Return the stream of an animation, encoded plane by plane as `planes` say.
 
-    Each plane says which frames it codes: `face_frame` and `body_frame` are frame numbers, as in
-    `animation.index`. Its masks override those of the animation: what was not sent there is coded as 0.
+    `face_frame` and `body_frame` of a plane are the frame numbers that it codes, as in `animation.index`. Its
+    masks override those of the animation: values that were not sent there are coded as 0.
 
-    Raises RangeError where a value does not fit the ranges in force or a frame is missing, ValueError
-    where the first plane is no I plane or a plane codes a part that has no settings yet.
+    Raises RangeError if a value does not fit the ranges in force or a frame is gap, ValueError if the
+    first plane is no I plane or a plane codes a part that has no settings yet.
     """
     if not planes:
         raise ValueError("encode_planes: no planes to encode")
@@ -64,6 +64,7 @@ def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_
 
 
 def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> Int32:
+    """Return the values of the planes, int32 (planes, columns), see `slots`."""
     rows = np.zeros((len(planes), slots.SLOTS), dtype=np.int32)
     if any(one.face is not None for one in planes):
         track = animation.face
@@ -82,28 +83,29 @@ def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> Int32:
 
 
 def _frames(animation: Animation, numbers: Sequence[int | None]) -> tuple[Intp, Intp]:
-    """Which planes want a frame, and where in the animation it is."""
+    """Return the planes that code a frame, and the positions of these frames in the animation."""
     chosen = np.array([i for i, number in enumerate(numbers) if number is not None], dtype=np.intp)
     wanted = np.array([number for number in numbers if number is not None], dtype=np.int64)
     positions = np.searchsorted(animation.index, wanted)
-    found = animation.index[np.minimum(positions, len(animation) - 1)] == wanted
-    if not found.all():
-        at = int(np.argmin(found))
+    exists = animation.index[np.minimum(positions, len(animation) - 1)] == wanted
+    if not exists.all():
+        gap = int(np.argmin(exists))
         raise RangeError(
-            f"plane {chosen[at]} codes frame {wanted[at]}, but the animation has no frame of that number "
+            f"plane {chosen[gap]} codes frame {wanted[gap]}, but the animation has no frame of that number "
             f"(it has {animation.index[0]}..{animation.index[-1]})",
-            frame=int(wanted[at]),
+            frame=int(wanted[gap]),
         )
     return chosen, positions
 
 
 def _object_mask(settings: PlaneSettings) -> int:
+    """Return fba_object_mask."""
     face = slots.FACE_BIT if settings.face is not None else 0
     return face | (slots.BODY_BIT if settings.body is not None else 0)
 
 
 def _run_length(planes: Sequence[PlaneSettings], position: int) -> int:
-    """How many P planes from here on carry the same parts, without a start code between them."""
+    """Return how many P planes from a position on carry the same parts, without a start code between them."""
     mask = _object_mask(planes[position])
     stop = position + 1
     while stop < len(planes) and not (planes[stop].intra or planes[stop].start_code):

@@ -1,4 +1,4 @@
-"""The frame rate and the frame indices of a whole stream, which may change its rate and set its clock."""
+"""One frame rate and its frame indices for a stream that may change its rate and set its clock."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from fba.codec._clock import DEFAULT_RATE
 from fba.codec._rows import Rows
 
 COMMON_RATE_MAX = 1_000_000
-"""Frames a second; where only a higher rate would hold all times exactly, the stream's highest is taken."""
+"""Highest rate, in frames per second, that is chosen to make all times exact."""
 _INT64_MAX = 2**63 - 1
 
 
 @dataclass(frozen=True)
 class _Run:
-    """Frames from position `first` on: one that the clock gave `index` is shown at
-    start + (index - first_index) / rate seconds."""
+    """Frames of one rate, from position `first` on.
+
+    A frame with the clock's index i is shown at start + (i - first_index) / rate seconds.
+    """
 
     first: int
     first_index: int
@@ -31,9 +33,9 @@ class _Run:
 class TimeBase:
     """Collects the times of blocks in stream order; `index` / `rate` are the times of their frames.
 
-    Where the stream keeps one frame rate, that is the rate. Where it changes, it is the lowest rate at which
-    all frames have whole indices; beyond `COMMON_RATE_MAX`, the highest of the stream's rates, and times are
-    rounded to the nearest frame. The result does not depend on where a run of planes is cut into blocks.
+    If the stream has one frame rate, that is the rate. Otherwise it is the lowest rate at which all frames
+    have integer indices; beyond `COMMON_RATE_MAX`, it is the highest of the stream's rates, and times are
+    rounded to the nearest frame. The result does not depend on how planes are divided into blocks.
 
     in_place: see `fba.codec.frame_buffer.FrameBuffer`.
     """
@@ -42,11 +44,13 @@ class TimeBase:
         self._in_place = in_place
         self._runs: list[_Run] = []
         self._rates: set[Fraction] = set()
-        self._exact: Fraction | None = Fraction(1)  # lowest rate that holds all times; None beyond the limit
+        self._exact: Fraction | None = Fraction(
+            1
+        )  # lowest rate at which all times are exact; None beyond the limit
         self._clock_index = Rows((), np.int64, in_place=in_place)
         self._index = self._clock_index
         self._index_rate = DEFAULT_RATE  # the rate of `_index`
-        self._runs_placed = 0  # runs that are in `_index`, the last one perhaps in part
+        self._runs_placed = 0  # runs in `_index`, the last one perhaps not completely
 
     def add(self, index: Int64, start: Fraction, rate: Fraction) -> None:
         """Append frames shown at start + (index - index[0]) / rate; index int64 (T,), T >= 1."""
@@ -54,30 +58,31 @@ class TimeBase:
             self._runs.append(_Run(self._clock_index.count, int(index[0]), start, rate))
             self._rates.add(rate)
             for part in (rate, 1 / start) if start else (rate,):
-                self._refine(part)
+                self._extend_exact(part)
         self._clock_index.append(index, len(index))
 
     @property
     def rate(self) -> Fraction:
-        """Frames a second; 25 while there is no frame."""
+        """Frames per second; 25 before the first frame."""
         if len(self._rates) > 1:
             return self._exact or max(self._rates)
         return self._runs[0].rate if self._runs else DEFAULT_RATE
 
     def index(self) -> Int64:
-        """int64 (T,), read-only, strictly rising where the clock's indices are."""
+        """Return int64 (T,), read-only, strictly increasing if the clock's indices are."""
         if len(self._rates) > 1:
-            self._place(self.rate)
+            self._update_index(self.rate)
         return self._index.view()
 
     def _continues(self, index: int, start: Fraction, rate: Fraction) -> bool:
+        """Whether a frame continues the last run."""
         if not self._runs:
             return False
         run = self._runs[-1]
         return rate == run.rate and start == run.start + Fraction(index - run.first_index) / rate
 
-    def _refine(self, rate: Fraction) -> None:
-        """Make `_exact` a multiple of a rate."""
+    def _extend_exact(self, rate: Fraction) -> None:
+        """Make `_exact` a multiple of a rate, or None beyond the limit."""
         if not self._clock_index.count:
             self._exact = self._runs[0].rate
         if self._exact is not None:
@@ -87,30 +92,32 @@ class TimeBase:
             )
             self._exact = common if common <= COMMON_RATE_MAX else None
 
-    def _place(self, rate: Fraction) -> None:
-        """Bring `_index` up to date."""
+    def _update_index(self, rate: Fraction) -> None:
+        """Append the indices of new frames to `_index`; compute all of it anew if the rate has changed."""
         if self._index is self._clock_index or rate != self._index_rate:
-            self._index = Rows((), np.int64, in_place=self._in_place)  # arrays that were given out stay
+            self._index = Rows(
+                (), np.int64, in_place=self._in_place
+            )  # arrays that were returned must not change
             self._index_rate, self._runs_placed = rate, 0
         clock, placed = self._clock_index.view(), self._index
         runs = self._runs[max(self._runs_placed - 1, 0) :]
         for run, stop in zip(runs, [*(after.first for after in runs[1:]), len(clock)], strict=True):
             part = clock[max(run.first, placed.count) : stop]
             if len(part):
-                piece = _rounded(run.start * rate, part - run.first_index, rate / run.rate)
+                piece = _round_index(run.start * rate, part - run.first_index, rate / run.rate)
                 following = int(placed.view()[-1]) + 1 if placed.count else 0
                 placed.append(piece + max(following - int(piece[0]), 0), len(piece))
         self._runs_placed = len(self._runs)
 
 
-def _rounded(offset: Fraction, steps: Int64, factor: Fraction) -> Int64:
-    """int64 (T,) nearest to offset + steps x factor; halves are rounded up."""
+def _round_index(offset: Fraction, steps: Int64, factor: Fraction) -> Int64:
+    """Return int64 (T,), nearest to offset + steps x factor; halves are rounded up."""
     offset += Fraction(1, 2)
-    whole = math.floor(offset)
-    rest = offset - whole
+    integral = math.floor(offset)
+    rest = offset - integral
     divisor = rest.denominator * factor.denominator
     scale = factor.numerator * rest.denominator
     fits = abs(int(steps[-1])) * scale + divisor < _INT64_MAX
     scaled = (steps if fits else steps.astype(object)) * scale + rest.numerator * factor.denominator
-    result: Int64 = (scaled // divisor).astype(np.int64) + whole
+    result: Int64 = (scaled // divisor).astype(np.int64) + integral
     return result

@@ -15,8 +15,9 @@ from fba.codec.settings import PlaneInfo, PlaneSettings
 class Block:
     """Consecutive planes that share their settings.
 
-    index: int64 (T,), frame t is shown at start + (index[t] - index[0]) / rate. borders: int64 (T + 1,),
-    absolute bit positions. skips: int64 (T,).
+    index: int64 (T,); frame t is shown at start + (index[t] - index[0]) / rate seconds. number: that of the
+    first plane. borders: int64 (T + 1,), absolute bit positions of the planes, and the end of the last.
+    skips: int64 (T,).
     """
 
     index: Int64
@@ -30,9 +31,9 @@ class Block:
     settings: PlaneSettings
 
     def frames(self) -> Iterator[Frame]:
-        """The frames one by one."""
+        """Yield the frames one by one."""
         for position, index in enumerate(self.index.tolist()):
-            one = slice(position, position + 1)
+            frame = slice(position, position + 1)
             bit, after = int(self.borders[position]), int(self.borders[position + 1])
             settings = replace(
                 self.settings,
@@ -44,7 +45,7 @@ class Block:
             yield Frame(
                 index,
                 self.rate,
-                self.face[one] if self.face is not None else None,
-                self.body[one] if self.body is not None else None,
+                self.face[frame] if self.face is not None else None,
+                self.body[frame] if self.body is not None else None,
                 PlaneInfo(self.number + position, bit, after - bit, settings),
             )

@@ -140,14 +140,14 @@ def test_ground_from_points() -> None:
     points = np.stack([x, 0.05 + 0.02 * z, z], axis=1)
     points[::3, 1] += generator.uniform(0, 0.1, len(points[::3]))
     feet = np.stack([points, points + np.array([0.0, 0.2, 0.0])])
-    found = ground.found(feet[..., 1], feet)
+    found = ground.find(feet[..., 1], feet)
     assert found.slope[1] == pytest.approx(0.02, abs=0.003)
     assert found.under(np.array([0.0, 9.0, 1.0])) == pytest.approx(0.07, abs=0.006)
     stairs = feet.copy()
     stairs[..., 1] = 0.5 * stairs[..., 2]
-    assert ground.found(stairs[..., 1], stairs).slope == (0.0, 0.0)
+    assert ground.find(stairs[..., 1], stairs).slope == (0.0, 0.0)
     still = feet * [0.1, 1.0, 0.1]
-    assert ground.found(still[..., 1], still).slope == (0.0, 0.0)
+    assert ground.find(still[..., 1], still).slope == (0.0, 0.0)
 
 
 def test_leg_reaches_by_the_law_of_cosines() -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Array, Float32, Float64, Int32, Int64, Integer
-from fba.cache import kept, key_of
+from fba.cache import load_or_make, make_key
 
 FLATTEST = 0.05
 """Smallest sine between the two lines across a vertex that still defines a normal."""
@@ -32,8 +32,8 @@ def normal_rings(vertices: Float32, normals: Float32, triangles: Integer) -> tup
     def make() -> list[Array]:
         return list(_find_rings(vertices, normals, triangles))
 
-    key = key_of("rings", CACHE_VERSION, vertices, normals, triangles)
-    around, numbers = kept(key, ((count, 4), (count, 3)), make, [np.int32, np.float32])
+    key = make_key("rings", CACHE_VERSION, vertices, normals, triangles)
+    around, numbers = load_or_make(key, ((count, 4), (count, 3)), make, [np.int32, np.float32])
     if around.min() < -1 or around.max() >= count:
         around, numbers = make()
     return around, numbers

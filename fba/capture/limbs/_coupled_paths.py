@@ -1,4 +1,4 @@
-"""Courses over time whose frames are coupled with their neighbours: the compiled solution."""
+"""Solve for paths over time in which each frame is coupled with its neighbours; compiled."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from fba.compiled import compiled
 
 @compiled
 def chain(own: Float64, bonds: Float64, pull: Float64, course: Float64) -> None:
-    """Fills course (T,): least sum of own[t] x[t]^2 + bonds[t] (x[t + 1] - x[t])^2 - 2 pull[t] x[t].
+    """Fill course (T,) with x, minimising sum own[t] x[t]^2 + bonds[t] (x[t+1] - x[t])^2 -2 pull[t] x[t].
 
-    own: (T,), positive; bonds: (T - 1,), not negative; pull: (T,). own and pull are overwritten. Thomas's
+    own: (T,), positive. bonds: (T - 1,), not negative. pull: (T,). own and pull are overwritten. Thomas's
     algorithm.
     """
     count = own.shape[0]

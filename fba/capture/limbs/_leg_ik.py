@@ -1,8 +1,8 @@
-"""Legs moved by as little as possible, so that the foot goes where it is wanted.
+"""Move legs as little as possible, so that feet reach their targets.
 
-The knee bends or stretches until hip and ankle are as far apart as they need to be, then the whole leg swings
-about the hip. A leg that is almost straight cannot change its length without bending by a lot: it changes it
-by less the straighter it is, smoothly, and what is left stays as it was.
+The knee bends or stretches until hip and ankle have the right distance, then the leg swings about the hip. A
+leg that is almost straight cannot change its length without bending a lot: the straighter it is, the less it
+changes its length, and the rest of the error remains.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from fba import rotations
 from fba.arrays import Float64
 
 STIFF = 0.05
-"""Metres of length a radian of the knee changes: below this, the leg counts as almost straight."""
+"""Change of length in metres per radian of the knee, below which a leg counts as almost straight."""
 ROUNDS = 3
+"""Iterations that find the bend of the knee."""
 
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """Places (T, 3) of hip, knee and ankle, and the axis (T, 3), unit, about which the knee turns."""
+    """Positions (T, 3) of hip, knee and ankle, and unit axes (T, 3) of the knee."""
 
     hip: Float64
     knee: Float64
@@ -30,21 +31,21 @@ class Leg:
 
 
 def pliancy(leg: Leg) -> Float64:
-    """(T,), 0 for a straight leg, close to 1 for a bent one: which share of a change of length it follows."""
+    """Return (T,), the share of a change of length that a leg makes: 0 if straight, close to 1 if bent."""
     slope = _lengths(leg)[1]
     result: Float64 = slope * slope / (slope * slope + STIFF * STIFF)
     return result
 
 
 def reach(leg: Leg, move: Float64) -> tuple[Float64, Float64]:
-    """World turns (T, 3, 3) of the thigh, and of the shank, that move the ankle by move (T, 3), metres."""
+    """Return world turns (T, 3, 3) of thigh and shank that move the ankle by move (T, 3), in metres."""
     target = leg.ankle + move - leg.hip
     wanted = np.linalg.norm(target, axis=1)
     bend = np.zeros(len(move))
     shank = leg.ankle - leg.knee
     length, slope = _lengths(leg)
     share = slope / (slope * slope + STIFF * STIFF)
-    goal = length + (wanted - length) * slope * share  # what a leg as straight as this may do
+    goal = length + (wanted - length) * slope * share  # less for straighter legs
     ankle = leg.ankle
     for _ in range(ROUNDS):
         bend += (goal - length) * share
@@ -55,7 +56,7 @@ def reach(leg: Leg, move: Float64) -> tuple[Float64, Float64]:
 
 
 def _lengths(leg: Leg) -> tuple[Float64, Float64]:
-    """(T,) each: from hip to ankle, and by how much a radian more of the knee changes that."""
+    """Return the distances (T,) from hip to ankle, and their changes (T,) per radian of the knee."""
     line = leg.ankle - leg.hip
     length = np.maximum(np.linalg.norm(line, axis=1), 1e-9)
     moved = np.cross(leg.axis, leg.ankle - leg.knee)

@@ -1,4 +1,4 @@
-"""Feet of the retargeted body: joints that turn them, and legs that take them where the source's stand."""
+"""Turn the feet of the retargeted body, and move its legs so that feet stand where the source's do."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from fba.capture.limbs import bone_ik, ground, soles
 from fba.capture.limbs.targets import Targets
 
 STEPS = 4
-"""Steps of the search for the ankle and the roll that point a foot exactly."""
+"""Iterations that find the rotations of ankle and subtalar joint with which a foot points exactly."""
 ROUNDS = 2
-"""How often the legs move to close the gap that their feet have left."""
+"""Iterations that move the legs: turning a foot moves its sole again."""
 STIFFEST = 1.1
-"""Weight of a straight leg in the height of the body; a bent leg, which can give way, has less."""
+"""Weight of a straight leg in the height of the body; a bent leg, which can adapt, has less."""
 
 
 def turn_foot(targets: Targets, side: str) -> None:
-    """Shares the target of a foot out over its ankle and subtalar joint.
+    """Divide the target rotation of a foot between its ankle and subtalar joint.
 
     The ankle has no roll; the subtalar joint, a little lower, has.
     """
@@ -40,7 +40,7 @@ def turn_foot(targets: Targets, side: str) -> None:
 
 
 def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float64) -> None:
-    """Sets both joints so that together they turn the foot: flexion, twist and roll reach any rotation."""
+    """Set both joints so that together they turn the foot: flexion, twist and roll reach any rotation."""
     above = targets.parent_rotation(ankle)
     own = targets.axes(ankle)[0]
     axes = np.concatenate([own, targets.axes(subtalar)[0]])
@@ -55,10 +55,10 @@ def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float64) -> N
 
 
 def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant: bool) -> Float64:
-    """Positions of the root (T, 3), metres, at which the feet stand as the source's do.
+    """Return positions of the root (T, 3), in metres, at which the feet stand as the source's do.
 
-    root: positions to start from. scale: metres for one unit of the source. floor: "floor" where the ground
-    is at height 0, else it is at the source's. plant: legs, too, move, which changes the targets.
+    root: positions to start from. scale: metres for one unit of the source. floor: "floor" for a ground at
+    height 0, else it is that of the source. plant: also move the legs, which changes the targets.
     """
     root = root.copy()
     toes = "l_metatarsal" in targets.mapped
@@ -75,7 +75,7 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
     if source is None or body is None:
         return root
     middles = source.points.mean(axis=1)
-    level = ground.found(source.lowest, middles).under(middles)
+    level = ground.find(source.lowest, middles).under(middles)
     above = source.lowest - level
     under = np.zeros_like(level) if floor == "floor" else level
     stiff = np.ones_like(above)
@@ -83,8 +83,8 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
         pliant = np.array([leg_ik.pliancy(_leg(targets, side, root)) for side in "lr"])
         stiff = STIFFEST - pliant
         raised = soles.lift(above, body.lowest - under, stiff, rate)
-        whole, along = soles.slips(source.points, body.points, level, rate)
-        root[:, [0, 2]] += whole
+        common, along = soles.slips(source.points, body.points, level, rate)
+        root[:, [0, 2]] += common
         ups = soles.heights(above, body.lowest - under + raised, rate)
         for side, pitch in zip("lr", soles.pitches(body.points, ups), strict=True):
             targets.feet[side] = pitch @ targets.feet[side]
@@ -101,7 +101,7 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
 
 
 def _move_foot(targets: Targets, side: str, root: Float64, move: Float64) -> None:
-    """Bends a leg so that its foot moves by move (T, 3), metres."""
+    """Bend a leg so that its foot moves by move (T, 3), metres."""
     thigh, shank = leg_ik.reach(_leg(targets, side, root), move)
     targets.rotations[f"{side}_hip"] = thigh @ targets.rotations[f"{side}_hip"]
     targets.rotations[f"{side}_knee"] = shank @ targets.rotations[f"{side}_knee"]
@@ -109,11 +109,11 @@ def _move_foot(targets: Targets, side: str, root: Float64, move: Float64) -> Non
 
 
 def _leg(targets: Targets, side: str, root: Float64) -> leg_ik.Leg:
-    """World positions of a leg's joints, and the axis of its knee."""
+    """Return the world positions of a leg's joints, and the axis of its knee."""
     knee = f"{side}_knee"
     frames = {
         name: (position, frame)
-        for name, position, frame in soles.followed(
+        for name, position, frame in soles.joint_frames(
             targets.skeleton, targets.rotations, root, f"{side}_ankle"
         )
     }

@@ -1,4 +1,4 @@
-"""The ground that the source's feet stand on: level, or, where a capture was not levelled, sloping."""
+"""Find the ground that the source's feet stand on: level, or sloping if a capture was not levelled."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from fba.arrays import Float64
 
 LOWEST = 20
-"""Percentile of the lower foot's height that is the ground: single frames may dip through it."""
+"""Percentile of the lower foot's height that is taken for the ground: single frames may be below it."""
 FAR = 0.15
-"""Metres: a ground further than this from height 0 is no ground, but a chair, or a leap cut out."""
+"""Largest height in metres of the ground above or below 0; beyond, feet stand on a chair, or leap."""
 STEEPEST = 0.08
-"""Rise over run: a steeper ground is none, but stairs, or a climb."""
+"""Largest rise over run of the ground; beyond, the source climbs or uses stairs."""
 LONG = 1.0
-"""Metres that feet must have walked for a slope to be seen, and the shortest way that it is sought over."""
+"""Least extent in metres of the feet's positions from which a slope is estimated."""
 SLIGHT = 0.015
-"""Metres by which a slope must rise under the feet to count."""
+"""Least rise in metres of a slope under the feet."""
 UPPER = 0.05
-"""Weight of feet above the sought plane against that of feet below: it is to lie under them."""
+"""Weight of feet above the plane relative to feet below it: the plane shall be under them."""
 NEAR = 0.03
-"""Metres beyond which a foot above or below the plane says no more about it."""
+"""Distance in metres from the plane beyond which feet count less."""
 STEPS = 20
 
 
@@ -33,23 +33,24 @@ class Ground:
     slope: tuple[float, float] = (0.0, 0.0)
 
     def under(self, points: Float64) -> Float64:
-        """Heights (...) of the ground under points (..., 3)."""
+        """Return the heights (...) of the ground under points (..., 3)."""
         result: Float64 = self.height + points[..., 0] * self.slope[0] + points[..., 2] * self.slope[1]
         return result
 
 
-def found(lowest: Float64, points: Float64) -> Ground:
-    """The ground under feet that stand on it now and then; at height 0 where they never do.
+def find(lowest: Float64, points: Float64) -> Ground:
+    """Return the ground under feet that stand on it now and then; at height 0 if they are never near it.
 
-    lowest: (2, T), heights of the lowest points of the feet, points: (2, T, 3), where the feet are, metres.
+    lowest: (2, T), heights of the lowest points of the feet. points: (2, T, 3), positions of the feet.
+    Metres.
     """
     lower = lowest.argmin(axis=0)
     frames = np.arange(len(lower))
-    heights, places = lowest[lower, frames], points[lower, frames]
+    heights, positions = lowest[lower, frames], points[lower, frames]
     level = float(np.percentile(heights, LOWEST))
     flat = Ground(level if abs(level) <= FAR else 0.0)
-    middle = places[:, [0, 2]].mean(axis=0)
-    across = places[:, [0, 2]] - middle
+    middle = positions[:, [0, 2]].mean(axis=0)
+    across = positions[:, [0, 2]] - middle
     if np.ptp(across, axis=0).max() < LONG:
         return flat
     plane = _plane(heights, across)
@@ -58,7 +59,7 @@ def found(lowest: Float64, points: Float64) -> Ground:
         return flat
     over = heights - rise
     sloping = float(np.percentile(over, LOWEST))
-    # feet stand at one height above a plane that is the ground
+    # if the plane is the ground, standing feet are all at one height above it
     spread = [np.ptp(np.percentile(values, [LOWEST / 2, 60])) for values in (over, heights)]
     if abs(sloping) > FAR or spread[0] > 0.6 * spread[1]:
         return flat
@@ -66,7 +67,7 @@ def found(lowest: Float64, points: Float64) -> Ground:
 
 
 def _plane(heights: Float64, across: Float64) -> Float64:
-    """Height and slopes (3,) of the plane under most points: least squares, those above counting little."""
+    """Return height and slopes (3,) of the plane under most points: least squares, with less weight above."""
     columns = np.column_stack([np.ones(len(heights)), across])
     hold = np.diag([0.0, 1.0, 1.0]) * len(heights) * (0.3 * LONG) ** 2 * UPPER
     plane = np.array([np.percentile(heights, 30), 0.0, 0.0])

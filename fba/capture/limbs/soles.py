@@ -1,10 +1,10 @@
-"""Soles: where the source's and the body's touch the ground, and how far they are to be moved to agree.
+"""Find the soles of source and body, and how far feet must move so that they stand like the source's.
 
-Bones point where the source's point, but thigh, shank and foot have other proportions: so at the same leg
-length and the same angles, soles end up millimetres to centimetres higher or lower than the source's, slip a
-little where the source's stand, and sources differ in where their ground is. First the body is raised or
-lowered as a whole, frame by frame, such that the foot on the ground is as high above it as the source's is;
-what then is still lacking, legs make up for (`fba.capture.limbs._leg_ik`).
+Bones point in the directions of the source's, but thigh, shank and foot have other proportions. So soles end
+up millimetres to centimetres higher or lower than the source's, and slip a little where the source's stand
+still; and the ground of each source is at another height. First the body is raised or lowered as a common,
+frame by frame, so that the foot on the ground is as high above it as the source's; legs correct the rest
+(`fba.capture.limbs._leg_ik`).
 """
 
 from __future__ import annotations
@@ -23,41 +23,42 @@ from fba.capture.motion import SkeletonMotion
 TOES = 0.06
 """Metres from the metatarsal joint to the tip of the toes of the default body."""
 HEEL = 0.045
-"""Metres by which a heel stands behind its ankle."""
+"""Metres from an ankle back to the heel."""
 ON_GROUND = 0.015
-"""Metres over which a foot above the ground loses its say in how high the body is."""
+"""Height in metres at which the influence of a foot on the height of the body falls to 1/e."""
 SETTLED = 0.02
-"""The say of neither foot being on the ground."""
+"""Weight of the usual height, which counts while no foot is on the ground."""
 SMOOTH = 0.03
 """Seconds over which corrections are averaged."""
 WITHIN = 0.012
-"""Metres above the ground up to which a leg moves its foot by all that is needed."""
+"""Height in metres up to which a leg moves its foot all the way."""
 TOLERATED = 0.005
-"""Metres by which a sole may be off before its leg moves for it."""
+"""Error in metres of a sole's height below which its leg does not move."""
 PITCH_SHARE = 0.8
-"""Of the height that a foot on its ball lacks, what the foot itself makes up for by its pitch."""
+"""Share of the height correction of a foot on its ball that its own pitch makes."""
 MOST_PITCH = np.radians(3.0)
+"""Largest change of a foot's pitch, in radians."""
 TIPTOE = 0.02
-"""Metres by which a heel is above the ball of a foot that stands on the ball only."""
+"""Metres from ball up to heel at which a foot stands mostly on its ball."""
 LEVER = 0.1
-"""Metres from ankle to ball, seen from above, at least."""
+"""Least horizontal distance in metres from heel to ball that is assumed."""
 FARTHEST = 0.03
-"""Metres: no leg moves its foot by more."""
+"""Most metres by which a leg moves its foot."""
 SWING = 0.002
-"""Weight of a foot in the air keeping its course, against that of one on the ground keeping its place."""
+"""Weight of a foot in the air moving as it did, relative to one on the ground not slipping."""
 RETURN = 0.3
-"""Weight of being where the retargeted leg alone would be, per second squared: a foot in the air comes back
-within a sixth of a second, one on the ground drifts back over seconds."""
-
-
+"""Weight, per second squared, of the position without correction: a foot in the air comes back to it within
+a sixth of a second, one on the ground drifts back over seconds."""
 RETURN_BODY = 1.0
-"""The same for the body as a whole, which is to stay where the source's is."""
+"""The same for the body as a common."""
 
 
 @dataclass(frozen=True, eq=False)
 class Soles:
-    """Of the left and the right foot, metres: lowest (2, T), the height of the lowest point. points: (2, 2,
-    T, 3), the heel, and the ball or the tip, whatever the source has.
+    """Soles of the left and the right foot, in metres.
+
+    lowest: (2, T), height of the lowest point. points: (2, 2, T, 3), heel, and ball or tip, whichever the
+    source has.
     """
 
     lowest: Float64
@@ -65,13 +66,13 @@ class Soles:
 
 
 def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Float64, turned: Float64,
-                 places: Float64, metres: float) -> Soles | None:  # fmt: skip
-    """The source's soles. None where it has not both ankles.
+                 positions: Float64, metres: float) -> Soles | None:  # fmt: skip
+    """Return the source's soles, or None if it lacks an ankle.
 
-    turned: (T, J, 4) world rotations of the source's own frame, places: (T, J, 3), upright, in its units.
-    metres: of the body for one of them. A sole's points are the ankle's and its descendants' joints and ends,
-    and a heel: where the source has none behind the ankle, as far behind as the body's, and as deep below as
-    the lowest of them in the rest pose.
+    turned: (T, J, 4), world rotations in the source's frame. positions: (T, J, 3), upright, in its unit.
+    metres: of the body for one unit. The points of a sole are ankle, joints and bone ends below it, and a
+    heel. If no point is behind the ankle, the heel is as far behind it as the body's, and as far below it as
+    the lowest point of the rest pose.
     """
     if "l_ankle" not in mapped or "r_ankle" not in mapped:
         return None
@@ -84,12 +85,12 @@ def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Flo
             if int(parent) in foot:
                 foot.append(joint)
         at_rest = [(rest[joint] - rest[ankle]) @ upright.T for joint in foot]
-        moving = [places[:, joint] for joint in foot]
+        moving = [positions[:, joint] for joint in foot]
         for parent, offset in zip(motion.end_parents, motion.end_offsets, strict=True):
             if int(parent) in foot:
                 at_rest.append((rest[parent] + offset - rest[ankle]) @ upright.T)
                 turn = upright @ rotations.matrices(turned[:, parent])
-                moving.append(places[:, parent] + turn @ offset)
+                moving.append(positions[:, parent] + turn @ offset)
         ahead = max(at_rest, key=lambda point: float(np.hypot(point[0], point[2]))) * [1.0, 0.0, 1.0]
         ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
         along = [float(point @ ahead) * metres for point in at_rest]
@@ -98,20 +99,20 @@ def source_soles(motion: SkeletonMotion, mapped: Mapping[str, int], upright: Flo
         else:
             behind = [0.0, min(float(point[1]) for point in at_rest), 0.0] - ahead * (HEEL / metres)
             turn = upright @ rotations.matrices(turned[:, ankle]) @ upright.T
-            heel = places[:, ankle] + turn @ behind
+            heel = positions[:, ankle] + turn @ behind
             moving.append(heel)
         ball = mapped.get(f"{side}_metatarsal")
-        front = moving[int(np.argmax(along))] if ball is None else places[:, ball]
+        front = moving[int(np.argmax(along))] if ball is None else positions[:, ball]
         lows.append(np.min([point[:, 1] for point in moving], axis=0))
         points.append([heel, front])
     return Soles(np.array(lows) * metres, np.array(points) * metres)
 
 
 def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, toes: bool) -> Soles | None:
-    """The body's soles: heel, ball, and tip of the toes where toes. None where it lacks parts of feet.
+    """Return the body's soles, or None if it lacks a joint of the feet.
 
-    wanted: joint -> world rotations (T, 3, 3); joints that are not there turn with their parents. root: (T,
-    3).
+    wanted: joint -> world rotations (T, 3, 3); other joints turn with their parents. root: (T, 3), metres.
+    toes: whether the tips of the toes count, besides heel and ball.
     """
     lows, points = [], []
     for side in "lr":
@@ -126,66 +127,70 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64,
         }
         if toes:
             soles[parts[3]] = np.array([ball[0], 0.0, ball[2] + TOES])
-        found = []
-        for name, place, frame in followed(skeleton, wanted, root, parts[3]):
+        own = []
+        for name, position, frame in joint_frames(skeleton, wanted, root, parts[3]):
             if name in soles:
-                found.append(place + frame @ (soles[name] - centres[skeleton.number(name)]))
-        lows.append(np.min([point[:, 1] for point in found], axis=0))
-        points.append(found[:2])
+                own.append(position + frame @ (soles[name] - centres[skeleton.number(name)]))
+        lows.append(np.min([point[:, 1] for point in own], axis=0))
+        points.append(own[:2])
     return Soles(np.array(lows), np.array(points))
 
 
-def followed(
+def joint_frames(
     skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, last: str
 ) -> list[tuple[str, Float64, Float64]]:
-    """From the root down to a joint: name, place (T, 3) and rotation (T, 3, 3); see `body_soles`."""
+    """Return (name, position (T, 3), rotation (T, 3, 3)) of the joints from the root to `last`.
+
+    wanted, root: as for `body_soles`.
+    """
     path = [skeleton.number(last)]
     while skeleton.parents[path[-1]] >= 0:
         path.append(int(skeleton.parents[path[-1]]))
-    place, frame = root, np.broadcast_to(np.eye(3), (len(root), 3, 3))
+    position, frame = root, np.broadcast_to(np.eye(3), (len(root), 3, 3))
     result = []
     for number in reversed(path):
         name, parent = skeleton.names[number], int(skeleton.parents[number])
         if parent >= 0:
-            place = place + frame @ (skeleton.centres[number] - skeleton.centres[parent])
+            position = position + frame @ (skeleton.centres[number] - skeleton.centres[parent])
         frame = wanted.get(name, frame)
-        result.append((name, place, frame))
+        result.append((name, position, frame))
     return result
 
 
 def lift(above: Float64, body: Float64, stiff: Float64, rate: float) -> Float64:
-    """(T,), metres to raise the body by, so that feet are as high as the source's.
+    """Return (T,), metres to raise the body by, so that feet are as high as the source's.
 
-    above: (2, T), heights wanted, in metres above the ground; body: (2, T), those that are. stiff: (2, T), by
-    how much each foot's say counts. The foot closer to the ground has the say.
+    above: (2, T), target heights in metres above the ground. body: (2, T), heights without correction. stiff:
+    (2, T), weight of each foot. The foot closer to the ground counts most.
     """
     lacking = above - body
-    say = grounded(above)
-    usual = float(np.median(lacking[say > 0.5])) if (say > 0.5).any() else float(np.median(lacking))
-    say = say * stiff
-    result = usual + (say * (lacking - usual)).sum(axis=0) / (say.sum(axis=0) + SETTLED * stiff.mean(axis=0))
-    return smoothed(result, rate)
+    contact = grounded(above)
+    usual = float(np.median(lacking[contact > 0.5])) if (contact > 0.5).any() else float(np.median(lacking))
+    weight = contact * stiff
+    correction = (weight * (lacking - usual)).sum(axis=0)
+    result = usual + correction / (weight.sum(axis=0) + SETTLED * stiff.mean(axis=0))
+    return smooth(result, rate)
 
 
 def grounded(above: Float64) -> Float64:
-    """The say of feet at heights above the ground, 0 to 1."""
-    say: Float64 = np.exp(-((np.maximum(above, 0.0) / ON_GROUND) ** 2))
-    return say
+    """Return the contact of feet with the ground at these heights: 1 on the ground, less above."""
+    contact: Float64 = np.exp(-((np.maximum(above, 0.0) / ON_GROUND) ** 2))
+    return contact
 
 
 def heights(above: Float64, body: Float64, rate: float) -> Float64:
-    """(2, T), metres to raise each foot by, after the body was: no more than needed, nothing in the air."""
+    """Return (2, T), metres to raise each foot by after the body was: as little as needed, 0 in the air."""
     lacking = above - body
     needed = np.sign(lacking) * np.maximum(np.abs(lacking) - TOLERATED, 0.0)
-    moves = np.array([smoothed(foot, rate) for foot in needed * grounded(above - WITHIN)])
+    moves = np.array([smooth(foot, rate) for foot in needed * grounded(above - WITHIN)])
     result: Float64 = np.clip(moves, -FARTHEST, FARTHEST)
     return result
 
 
 def pitches(body: Float64, ups: Float64) -> Float64:
-    """(2, T, 3, 3), world turns of the feet: what stands on its ball raises or lowers that, by some of ups.
+    """Return (2, T, 3, 3), world turns of the feet: those on their balls pitch to correct their heights.
 
-    body: (2, 2, T, 3), points of the soles; ups: (2, T), metres to raise the feet by. Legs do the rest.
+    body: (2, 2, T, 3), points of the soles. ups: (2, T), metres to raise the feet by; legs make the rest.
     """
     sole = body[:, 1] - body[:, 0]
     length = np.maximum(np.hypot(sole[..., 0], sole[..., 2]), LEVER)
@@ -196,30 +201,34 @@ def pitches(body: Float64, ups: Float64) -> Float64:
 
 
 def tiptoe(body: Float64) -> Float64:
-    """(2, T), 0 for feet on their heels, 1 on their balls, of points of the soles (2, 2, T, 3)."""
+    """Return (2, T): 0 for feet on their heels, 1 on their balls. body: (2, 2, T, 3), points of the soles."""
     result: Float64 = 0.5 - 0.5 * np.tanh((body[:, 1, :, 1] - body[:, 0, :, 1]) / TIPTOE)
     return result
 
 
 def slips(source: Float64, body: Float64, level: Float64, rate: float) -> tuple[Float64, Float64]:
-    """Metres along x and z to move the body by, (T, 2), and then each foot, (2, T, 2), so that feet move on
-    the ground as the source's do.
+    """Return corrections in metres along x and z, so that feet on the ground move as the source's do.
 
-    source, body: (2, 2, T, 3), points of the soles. level: (2, T), the ground under the source's. The courses
-    that are sought differ from the body's own by as little as can be; their velocity is the source's where
-    a point is on the ground. As much as it can, the body moves, which turns no bone.
+    (T, 2) for the body, and (2, T, 2) for each foot after that. source, body: (2, 2, T, 3), points of the
+    soles. level: (2, T), height of the ground under the source's. Where a point is on the ground, its
+    velocity becomes the source's; otherwise corrections are as small as possible. The body moves as far as
+    that helps, because that turns no bone.
     """
-    say = grounded(source[..., 1] - level[:, None])
-    say = np.minimum(say[..., 1:], say[..., :-1])
-    drift = -(say[..., None] * np.diff(body - source, axis=2)[..., [0, 2]]).sum(axis=1)
-    firm = say.sum(axis=1)
-    whole = _course(drift.sum(axis=0), firm.sum(axis=0), RETURN_BODY, rate)
-    left = drift - firm[..., None] * np.diff(whole, axis=0)
-    return whole, np.array([_course(left[foot], firm[foot], RETURN, rate) for foot in range(2)])
+    contact = grounded(source[..., 1] - level[:, None])
+    contact = np.minimum(contact[..., 1:], contact[..., :-1])
+    drift = -(contact[..., None] * np.diff(body - source, axis=2)[..., [0, 2]]).sum(axis=1)
+    firm = contact.sum(axis=1)
+    common = _course(drift.sum(axis=0), firm.sum(axis=0), RETURN_BODY, rate)
+    remaining = drift - firm[..., None] * np.diff(common, axis=0)
+    return common, np.array([_course(remaining[foot], firm[foot], RETURN, rate) for foot in range(2)])
 
 
 def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
-    """(T, 2): aim (T - 1, 2), changes from frame to frame times their weights firm (T - 1,)."""
+    """Return a correction over time (T, 2), whose changes come close to given ones.
+
+    aim: (T - 1, 2), changes from frame to frame times their weights. firm: (T - 1,), the weights. back:
+    weight of 0.
+    """
     count = len(firm) + 1
     bonds = (firm + SWING) * rate
     result = np.zeros((2, count))
@@ -234,8 +243,8 @@ def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
     return bounded
 
 
-def smoothed(values: Float64, rate: float) -> Float64:
-    """Moving average, twice over."""
+def smooth(values: Float64, rate: float) -> Float64:
+    """Return values (T,) smoothed by a moving average, applied twice."""
     half = max(1, round(SMOOTH * rate))
     for _ in range(2):
         sums = np.concatenate([[0.0], np.cumsum(np.pad(values, half, mode="edge"))])

@@ -2,21 +2,20 @@
 
 A 16-bit integer coder in the style of H.263 Annex E. A symbol s of a model with counts c[0], c[1], ...
 owns the part of the interval [low, high] between the cumulative counts C[s+1] and C[s], where C[s] is
-the sum of c[s], c[s+1], ...: symbol 0 sits at the top. What bits the interval has in common go out;
-two more bits at the end of a segment pick a quarter that lies inside it. Inside a segment, a 1 is
-slipped in after every 22 zero bits in a row, so that no start code can appear.
+the sum of c[s], c[s+1], ...: symbol 0 is at the top. Leading bits that low and high share are written;
+two more bits at the end of a segment select a quarter inside the interval. Inside a segment, a 1 is
+inserted after every 22 zero bits in a row, so that no start code can appear.
 
 All counts start at 1 and grow by 1 each time their symbol is coded; at a total of 16383 they are
-halved. A model therefore keeps only what was *added* to the initial ones: `added[s]`, and a Fenwick
-tree of partial sums over them, in which a symbol is found and a count raised in log2(size) steps:
-alphabets reach 3721 symbols. One symbol of each model stands outside its tree and costs no search at
-all, `usual`: that of no change, which is most of what a predictive codec sends.
+halved. A model therefore stores only what was *added* to the initial counts: `added[s]`, and a Fenwick
+tree of partial sums, in which finding a symbol and raising a count take log2(size) steps: alphabets reach
+3721 symbols. One symbol of each model, `usual`, is outside its tree and needs no search: that of no change,
+the most frequent one in a predictive codec.
 
-The models of all slots stand side by side in arrays (slots, STRIDE). Coding a plane only reads them;
-`learn` updates them afterwards: a model is used at most once in a plane, so a plane that proves
-incomplete or damaged leaves no trace.
+The models of all slots are rows of arrays (slots, STRIDE). Coding a plane only reads them; `learn` updates
+them afterwards: a model is used at most once in a plane, so an incomplete or damaged plane changes nothing.
 
-All functions work on NumPy arrays and plain integers, check every bound, and run uncompiled too.
+All functions work on NumPy arrays and plain integers, check every bound, and also run uncompiled.
 """
 
 from __future__ import annotations
@@ -45,15 +44,17 @@ TREE_TOP = 2048
 OK = 0
 OUT_OF_DATA = 1
 BAD_GUARD = 2
-"""A 0 where the 1 after 22 zeros must stand."""
+"""A 0 in place of the 1 after 22 zeros."""
 BAD_FLUSH = 3
-"""The two closing bits are not those that the final interval asks for."""
+"""The two closing bits do not fit the final interval."""
 
 
 class Counts(NamedTuple):
-    """The models of all slots. int64 (slots,): size of the alphabet, usual symbol, total of the counts, sum
-    of those of the symbols below the usual one. uint16 (slots, STRIDE): what was added to the counts, and
-    the Fenwick tree over that."""
+    """The models of all slots.
+
+    int64 (slots,): size of the alphabet, usual symbol, total of the counts, and sum of the counts of symbols
+    below the usual one. uint16 (slots, STRIDE): additions to the counts, and the Fenwick tree over them.
+    """
 
     size: Int64
     usual: Int64
@@ -75,12 +76,11 @@ def decode_segment(
 ) -> tuple[int, int]:
     """Decode one segment that starts at `bit`: symbols[k] becomes the symbol of slot slots[k].
 
-    data: the stream; `end` bits of it are there, zeros are assumed beyond.
-    Not adaptive: all counts are 1 (I planes).
-    Returns (status, bit): OK and the bit after the segment; OUT_OF_DATA where it needs bits beyond
-    `end`; or the kind and place of the damage.
+    data: the stream, valid up to bit `end`; zeros are assumed beyond. adaptive: P planes; in I planes all
+    counts are 1. Returns OK and the bit after the segment, OUT_OF_DATA if it needs bits beyond `end`, or the
+    kind of damage and its bit.
     """
-    low = high = code = 0  # renormalising from here reads the first 16 bits
+    low = high = code = 0  # so that renormalising reads the first 16 bits
     zeros = 0  # in a row, up to `bit`
     taken = 0  # logical bits: those read, without the inserted ones
     guard_at = -1  # value of `taken` at the last inserted one
@@ -119,8 +119,8 @@ def decode_segment(
 
         slot = int(slots[position])
         span = high - low + 1
-        whole = int(models.total[slot]) if adaptive else int(models.size[slot])
-        target = whole - 1 - ((code - low + 1) * whole - 1) // span  # counted from symbol 0 upwards
+        total = int(models.total[slot]) if adaptive else int(models.size[slot])
+        target = total - 1 - ((code - low + 1) * total - 1) // span  # counted from symbol 0 upwards
         if adaptive:
             symbol = int(models.usual[slot])
             below = int(models.below_usual[slot])
@@ -135,11 +135,11 @@ def decode_segment(
         else:
             symbol, below, share = target, target, 1
         symbols[position] = symbol
-        above = whole - below  # C[symbol]; C[symbol + 1] is less by the symbol's own count
-        high = low - 1 + span * above // whole
-        low = low + span * (above - share) // whole
-    # Of the 16 bits in the register, the first two close the segment; the other 14 are not ours, nor is
-    # a 1 that was taken for an inserted one among them.
+        above = total - below  # C[symbol]; C[symbol + 1] is less by the symbol's own count
+        high = low - 1 + span * above // total
+        low = low + span * (above - share) // total
+    # Of the 16 bits in the register, the first two close the segment; the other 14 follow it, and so does
+    # a 1 among them that was counted as inserted.
     used = taken - 14
     if bad_guard >= 0 and bad_guard_at < used:
         return BAD_GUARD, bad_guard
@@ -147,7 +147,7 @@ def decode_segment(
     if after > end:
         return OUT_OF_DATA, end
     if code >> 14 != (1 if low < QUARTER else 2):
-        # With bits missing, this is no damage yet: they may still change what was decoded.
+        # With bits missing, this need not be damage: they may still change what was decoded.
         return (OUT_OF_DATA, end) if bit > end else (BAD_FLUSH, after - 2)
     return OK, after
 
@@ -161,13 +161,13 @@ def encode_segment(
     adaptive: bool,
     symbols: Int64,
 ) -> int:
-    """Encode symbols[k] for slot slots[k] into one segment that starts at `bit`; the bit after it.
+    """Encode symbols[k] for slot slots[k] into one segment that starts at `bit`; return the bit after it.
 
     data: zeroed from `bit` on, with room for 16 bits for each symbol and 16 more.
     """
     low = 0
     high = TOP
-    pending = 0  # bits that wait for the one that decides them all
+    pending = 0  # bits whose value the next one decides
     zeros = 0
     count = len(slots)
     for position in range(count + 1):
@@ -176,21 +176,21 @@ def encode_segment(
             symbol = int(symbols[position])
             span = high - low + 1
             if adaptive:
-                whole = int(models.total[slot])
+                total = int(models.total[slot])
                 if symbol == models.usual[slot]:
-                    above = whole - int(models.below_usual[slot])
+                    above = total - int(models.below_usual[slot])
                 else:
-                    above = whole - _sum_below(models.tree, slot, symbol)
+                    above = total - _sum_below(models.tree, slot, symbol)
                     if symbol > models.usual[slot]:
                         above -= int(models.added[slot, models.usual[slot]])
                 share = 1 + int(models.added[slot, symbol])
             else:
-                whole = int(models.size[slot])
-                above = whole - symbol
+                total = int(models.size[slot])
+                above = total - symbol
                 share = 1
-            high = low - 1 + span * above // whole
-            low = low + span * (above - share) // whole
-        else:  # the end: two bits (and those pending) name a quarter inside the interval
+            high = low - 1 + span * above // total
+            low = low + span * (above - share) // total
+        else:  # the end: two bits, and those pending, select a quarter inside the interval
             pending += 1
             low, high = (QUARTER, HALF - 1) if low < QUARTER else (HALF, THREE_QUARTERS - 1)
         while True:
@@ -229,7 +229,7 @@ def encode_segment(
 
 @compiled
 def learn(slots: Int64, symbols: Int64, models: Counts) -> None:
-    """Raise the count of symbols[k] in the model of slots[k], halving the model's counts where it is full."""
+    """Raise the count of symbols[k] in the model of slots[k], halving the counts of full models."""
     for position in range(len(slots)):
         slot = int(slots[position])
         if models.total[slot] == TOTAL_MAX:
@@ -247,7 +247,7 @@ def learn(slots: Int64, symbols: Int64, models: Counts) -> None:
 
 @compiled
 def _find(tree: UInt16, slot: int, size: int, target: int) -> tuple[int, int]:
-    """The symbol whose share of the counts, added up from symbol 0, holds `target`; the sum below it."""
+    """Return the symbol at position `target` of the counts added up from symbol 0, and the sum below it."""
     symbol = 0
     remaining = target
     step = TREE_TOP
@@ -264,7 +264,7 @@ def _find(tree: UInt16, slot: int, size: int, target: int) -> tuple[int, int]:
 
 @compiled
 def _sum_below(tree: UInt16, slot: int, symbol: int) -> int:
-    """Sum of the counts of the symbols below this one."""
+    """Return the sum of the counts of the symbols below this one."""
     below = symbol
     node = symbol
     while node > 0:
@@ -275,7 +275,7 @@ def _sum_below(tree: UInt16, slot: int, symbol: int) -> int:
 
 @compiled
 def _raise(tree: UInt16, slot: int, size: int, symbol: int, amount: int) -> None:
-    """Raise the count of a symbol."""
+    """Raise the count of a symbol in the tree."""
     node = symbol + 1
     while node <= size:
         tree[slot, node] += np.uint16(amount)
@@ -284,7 +284,7 @@ def _raise(tree: UInt16, slot: int, size: int, symbol: int, amount: int) -> None
 
 @compiled
 def _halve(added: UInt16, tree: UInt16, slot: int, size: int, usual: int) -> tuple[int, int]:
-    """Every count becomes (count + 1) / 2, which halves what was added to 1; new total and below_usual."""
+    """Halve every count, rounding up; return the new total and below_usual."""
     for node in range(1, size + 1):
         tree[slot, node] = 0
     total = size

@@ -1,4 +1,4 @@
-"""Reading and writing header bits, most significant bit first."""
+"""Read and write header bits, most significant bit first."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from fba.arrays import UInt8
 
 
 class OutOfDataError(Exception):
-    """The next element lies, wholly or in part, beyond the data. Never leaves the codec."""
+    """The next element goes beyond the end of the data. Never leaves the codec."""
 
 
 class BitReader:
-    """A position in `data`, of which `end` bits are there."""
+    """Reads `data` from position `bit` up to `end`, both in bits."""
 
     def __init__(self, data: UInt8, bit: int, end: int) -> None:
         self.data = data
@@ -20,7 +20,7 @@ class BitReader:
         self.end = end
 
     def read(self, count: int) -> int:
-        """The next `count` bits as an unsigned number. Raises `OutOfDataError`."""
+        """Return the next `count` bits as an unsigned number. Raises `OutOfDataError`."""
         start, stop = self.bit, self.bit + count
         if stop > self.end:
             raise OutOfDataError
@@ -29,8 +29,8 @@ class BitReader:
         number = int.from_bytes(self.data[first:last].tobytes(), "big")
         return (number >> (8 * last - stop)) & ((1 << count) - 1)
 
-    def ahead(self, count: int) -> UInt8 | None:
-        """The next `count` bits, one an element, without going on; None where there are not so many."""
+    def peek(self, count: int) -> UInt8 | None:
+        """Return the next `count` bits, one in each element, without moving on; None if there are fewer."""
         start, stop = self.bit, self.bit + count
         if stop > self.end:
             return None
@@ -39,7 +39,7 @@ class BitReader:
 
 
 class BitWriter:
-    """Grows a zeroed buffer; `bit` is the position after what was written."""
+    """Writes into `data`, a buffer that grows; `bit` is the position after the last bit written."""
 
     def __init__(self) -> None:
         self.data = np.zeros(4096, dtype=np.uint8)
@@ -64,18 +64,18 @@ class BitWriter:
         self.bit += count
 
     def align(self) -> None:
-        """Stuff up to a byte border: a 0, then 1s; a whole byte where already there."""
+        """Write stuffing up to the byte boundary: a 0, then 1s; a whole byte if already aligned."""
         count = 8 - (self.bit & 7)
         self.write((1 << (count - 1)) - 1, count)
 
     def take_bytes(self) -> bytes:
-        """Hand over the whole bytes written so far; up to 7 bits stay."""
-        whole = self.bit >> 3
-        done = self.data[:whole].tobytes()
-        rest = self.data[whole]
+        """Return the complete bytes written so far, and drop them; up to 7 bits stay."""
+        count = self.bit >> 3
+        taken = self.data[:count].tobytes()
+        rest = self.data[count]
         used = (self.bit + 7) >> 3
         self.data[:used] = 0
         self.bit &= 7
         if self.bit:
             self.data[0] = rest
-        return done
+        return taken

@@ -14,7 +14,7 @@ from fba.codec.settings import RANGE_UNIT, PartSettings
 from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, baps, faps
 
 UNDEFINED = -1
-"""Limit of a parameter that has neither a default range nor a sent one."""
+"""Limit of a parameter without a default range, for which none was sent."""
 
 _SELECTS = (0, 1, 3, 5)
 _SELECT_LIMITS = np.array(
@@ -24,12 +24,12 @@ _INT32 = np.iinfo(np.int32)
 
 
 class Models:
-    """What encoder and decoder must agree on, as arrays over the 372 slots (see `slots`).
+    """State that encoder and decoder must share, as arrays over the 372 slots (see `slots`).
 
     `i_minimum`, `i_size`, `minimum`, `size`: smallest level and number of symbols, for I and P planes.
     `step`, `last`: quantiser step and last value. `usual`, `total`, `below_usual`, `added`, `tree`:
-    the adaptive models of P planes (see `arithmetic`). `lowest`, `highest`: what a value may be.
-    `intra` and `predicted` bundle them for the compiled loops.
+    the adaptive models of P planes (see `arithmetic`). `lowest`, `highest`: limits of values.
+    `intra` and `predicted` bundle the arrays for the compiled loops.
     """
 
     def __init__(self, bap_table: str = "iso") -> None:
@@ -60,49 +60,49 @@ class Models:
         self.predicted = Coding(self.minimum, *value, Counts(self.size, *shared))
 
     def begin_intra(self, part: int, settings: PartSettings) -> None:
-        """Put the settings of an I plane in force for a part: new ranges, steps and fresh models."""
-        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        """Apply the settings of an I plane to a part: set ranges and steps, and reset the models."""
+        columns = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
         coded = settings.mask[2:] if part == slots.FACE_BIT else settings.mask
         for limits, codes in zip(self.limits, settings.ranges, strict=True):
             if codes is not None:
                 sent = codes[2:] if part == slots.FACE_BIT else codes
-                limits[place][coded] = RANGE_UNIT * sent[coded].astype(np.int64)
+                limits[columns][coded] = RANGE_UNIT * sent[coded].astype(np.int64)
         scale = quantiser.scale(part, settings.quant)
-        span = slice(0 if part == slots.FACE_BIT else place.start, place.stop)
-        self._forget(span)
+        span = slice(0 if part == slots.FACE_BIT else columns.start, columns.stop)
+        self._reset_counts(span)
         self.step[span] = quantiser.steps(part, settings.quant, self.bap_table)
-        i_max, i_min, p_max, p_min = np.maximum(self.limits[:, place], 0) // scale
-        self.i_minimum[place], self.i_size[place] = -i_min, i_max + i_min + 1
-        self.minimum[place], self.size[place] = -p_min, p_max + p_min + 1
+        i_max, i_min, p_max, p_min = np.maximum(self.limits[:, columns], 0) // scale
+        self.i_minimum[columns], self.i_size[columns] = -i_min, i_max + i_min + 1
+        self.minimum[columns], self.size[columns] = -p_min, p_max + p_min + 1
         if part == slots.FACE_BIT:
             amount = (INTENSITY_MAX + settings.quant // 2) // scale if settings.quant else INTENSITY_MAX
             limit = _SELECT_LIMITS.copy()
             limit[slots.AMOUNTS] = amount
-            self.i_size[: place.start] = limit + 1  # I: 0..limit
-            self.minimum[: place.start], self.size[: place.start] = -limit, 2 * limit + 1
+            self.i_size[: columns.start] = limit + 1  # I: 0..limit
+            self.minimum[: columns.start], self.size[: columns.start] = -limit, 2 * limit + 1
         self.total[span] = self.size[span]
         self.usual[span] = self.below_usual[span] = -self.minimum[span]
 
-    def _forget(self, span: slice) -> None:
-        """Take back to 0 what was added to the counts of these slots."""
+    def _reset_counts(self, span: slice) -> None:
+        """Reset the counts of these slots; only those that were used, which are few."""
         used = np.flatnonzero(self.total[span] != self.size[span]) + span.start
         self.added[used] = 0
         self.tree[used] = 0
 
     def undefined(self, settings: PartSettings, part: int) -> int | None:
-        """A slot that the settings code although nothing ever said its range, or None."""
-        place = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
+        """Return a slot that the settings code without a range having been sent for it, or None."""
+        columns = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
         coded = settings.mask[2:] if part == slots.FACE_BIT else settings.mask
-        missing = np.flatnonzero((self.limits[:, place] == UNDEFINED).any(axis=0) & coded)
-        return int(missing[0]) + place.start if len(missing) else None
+        missing = np.flatnonzero((self.limits[:, columns] == UNDEFINED).any(axis=0) & coded)
+        return int(missing[0]) + columns.start if len(missing) else None
 
 
 @cache
 def default_limits() -> Int64:
-    """Ranges where none were sent, int64 (4, 372): I max, I min, P max, P min, as sizes, unscaled.
+    """Return the default ranges, int64 (4, 372): magnitudes of I max, I min, P max, P min.
 
-    FAPs: symmetric, the largest limit of the standard's table rounded up to a multiple of 60; FAP 47 as
-    the reference decoder has it. BAPs: the table's. Extension BAPs have none: UNDEFINED.
+    Unscaled. FAPs: symmetric, the largest limit in the standard's table rounded up to a multiple of 60; FAP
+    47 as in the reference decoder. BAPs: those of the table. Extension BAPs have none: UNDEFINED.
     """
     limits = np.zeros((4, slots.SLOTS), dtype=np.int64)
     for fap in faps()[2:]:

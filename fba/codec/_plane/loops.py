@@ -1,8 +1,8 @@
-"""Runs of planes, compiled: from bits to rows of values and back (ISO/IEC 14496-2, FBA object plane).
+"""Compiled loops that decode and encode runs of planes (ISO/IEC 14496-2, FBA object plane).
 
-P planes have a header of a few bits and repeat the settings of the I plane before them, so that whole
-runs of them are coded without returning to Python. I planes bring new settings: their headers are
-`fba.codec._plane.syntax`, their values `decode_values` and `encode_values` here.
+P planes have a header of a few bits and use the settings of the I plane before them, so that runs of them are
+coded without returning to Python. I planes have new settings: `fba.codec._plane.syntax` codes their headers,
+`decode_values` and `encode_values` here their values.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fba.codec._plane import arithmetic, slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA, Counts, decode_segment, encode_segment, learn
 from fba.compiled import compiled
 
-# Why a run of planes ended; the first four are those of the arithmetic coder.
+# Why a run of planes ended; 0 to 3 are those of the arithmetic coder.
 INTRA = 4
 """An I plane comes next."""
 OTHER_MASK = 5
@@ -26,14 +26,14 @@ BAD_MASK = 7
 """fba_object_mask 0."""
 SKIP_TOO_LONG = 8
 OUT_OF_RANGE = 9
-"""A value beyond what its parameter can hold (decoding) or its range can carry (encoding)."""
+"""A value outside the limits of its parameter (decoding) or of its range (encoding)."""
 
 SKIP_MAX = 15 << 20
-"""Most frames that one plane may skip: a week at 25 Hz. More is damage."""
+"""Most frames that a plane may skip: a week at 25 frames/s. More is damage."""
 
 FIRST_FLAG = slots.FLAGS.start
 
-# Results of `find_start_code` where there is none.
+# Results of `find_start_code` without a start code.
 NO_START_CODE = -1
 UNDECIDED = -2
 
@@ -41,15 +41,18 @@ _INT32_MAX = 2147483647
 
 
 class Layout(NamedTuple):
-    """What a plane codes, and in which order: see `slots.coding_order`."""
+    """Slots that a plane codes, in order, and their segments: see `slots.coding_order`."""
 
     order: Int64
     segments: Int64
 
 
 class Coding(NamedTuple):
-    """How values become symbols, int64 (slots,) each: smallest level, quantiser step, what a parameter can
-    hold, its last value; and the models of the symbols."""
+    """How values become symbols.
+
+    int64 (slots,) each: smallest level, quantiser step, limits and last value of the parameter. models: of
+    the symbols.
+    """
 
     minimum: Int64
     step: Int64
@@ -61,12 +64,13 @@ class Coding(NamedTuple):
 
 @compiled
 def read_bit(data: UInt8, bit: int) -> int:
+    """Return the bit at a position."""
     return (int(data[bit >> 3]) >> (7 - (bit & 7))) & 1
 
 
 @compiled
 def read_skip(data: UInt8, bit: int, end: int) -> tuple[int, int, int]:
-    """number_of_frames_to_skip at `bit`: (status, skip, bit after it or of the word that is too much)."""
+    """Read number_of_frames_to_skip at `bit`; return status, skip, and the bit after it or of the error."""
     skip = 0
     word = 15
     while word == 15:
@@ -84,11 +88,11 @@ def read_skip(data: UInt8, bit: int, end: int) -> tuple[int, int, int]:
 
 @compiled
 def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[int, int]:
-    """Look for alignment and a start code between planes: (last byte of the code, bit after it).
+    """Look for alignment and a start code at `bit`; return the last byte of the code and the bit after it.
 
-    The alignment is a 0 and then 1s up to the byte border (a whole byte where already there), or zeros;
-    behind a start code (after_code) there is none. NO_START_CODE: a plane begins here. UNDECIDED: all
-    of the bits up to `end` fit a start code, but it is not complete.
+    The alignment is a 0 and then 1s up to the byte boundary (a whole byte if already aligned), or zeros;
+    after a start code (after_code) there is none. NO_START_CODE: a plane begins here. UNDECIDED: the bits up
+    to `end` fit a start code, but it is not complete.
     """
     here = bit & 7
     if here == 0:
@@ -97,7 +101,7 @@ def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[
         aligned = bit + 8 if data[bit >> 3] == 0x7F and not after_code else bit
     else:
         aligned = bit + 8 - here
-        if aligned > end:  # `end` is a byte border
+        if aligned > end:  # `end` is a byte boundary
             return UNDECIDED, bit
         rest = int(data[bit >> 3]) & (255 >> here)
         if rest != 0 and rest != (255 >> here) >> 1:
@@ -115,10 +119,10 @@ def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[
 
 @compiled
 def imitates_start_code(data: UInt8, bit: int, end: int) -> bool:
-    """Whether a P plane at bit..end would be taken for alignment and a start code.
+    """Whether a reader would take a P plane at bit..end for alignment and a start code.
 
-    Its first bits can look like alignment, and the inserted 1 after 22 zeros completes 00 00 01: the
-    guard watches over segments, not over the header before them.
+    Its first bits can look like alignment, and the 1 inserted after 22 zeros can complete 00 00 01: the guard
+    counts zeros in segments only, not in the header before them.
     """
     code, _ = find_start_code(data, bit, end, False)
     prefix = bit + (8 - (bit & 7) if bit & 7 or data[bit >> 3] == 0x7F else 0) + 24
@@ -137,7 +141,7 @@ def decode_values(
     values: Int64,
     flags: Int64,
 ) -> tuple[int, int]:
-    """Decode one plane's segments from `bit` on: (status, bit after them or of the damage).
+    """Decode the segments of one plane from `bit` on; return status, and the bit after them or of the damage.
 
     adaptive: a P plane, else an I plane. Writes symbols[k] and values[k] for slot layout.order[k], and
     flags[0:3] (viseme_def, init_face, expression_def); changes neither models nor last values.
@@ -187,14 +191,14 @@ def decode_run(
     skips: Int64,
     borders: Int64,
 ) -> tuple[int, int, int, int]:
-    """Decode P planes from `bit` on, until something else comes: (planes, status, bit, place).
+    """Decode P planes from `bit` on until something else comes; return (planes, status, bit, place).
 
-    after_code: a start code ends at `bit`.
+    after_code: a start code ends at `bit`. Fills rows[t] (columns: see `slots`; only coded ones are written),
+    skips[t], borders[t] (first bit) and borders[t + 1].
 
-    Fills rows[t] (columns: see `slots`; only those coded are written), skips[t], borders[t] (first
-    bit) and borders[t + 1]. `bit`: after the last whole plane. status: OK where rows are full, else why
-    it ended; place: the bit (or slot) that a failed plane failed at. A plane that fails leaves models
-    and `last` as they were.
+    planes: how many were decoded. status: OK if rows are full, else why the run ended. bit: after the last
+    complete plane. place: the bit, or slot, at which the next plane failed. A plane that fails does not
+    change models and `last`.
     """
     order = layout.order
     symbols = np.zeros(len(order), np.int64)
@@ -240,7 +244,7 @@ def decode_run(
 
 @compiled
 def quantise(value: int, step: int) -> int:
-    """Level of a value: the nearest multiple of the step, halves away from zero, but 0 up to step // 2."""
+    """Return the level of a value: nearest multiple of step, halves away from 0, but 0 up to step // 2."""
     if value < 0:
         return -quantise_size(-value, step)
     return quantise_size(value, step)
@@ -248,6 +252,7 @@ def quantise(value: int, step: int) -> int:
 
 @compiled
 def quantise_size(size: int, step: int) -> int:
+    """Return the level of a value that is 0 or more."""
     half = step // 2
     return 0 if size <= half else (size + half) // step
 
@@ -262,10 +267,10 @@ def encode_values(
     symbols: Int64,
     flags: Int64,
 ) -> int:
-    """Encode one plane's segments (symbols[k] for slot layout.order[k]; flags as decoded) at `bit`; the bit
-    after them.
+    """Encode the segments of one plane at `bit`; return the bit after them.
 
-    data: zeroed from `bit` on, with room for 16 bits a symbol and 20 a segment.
+    symbols: symbols[k] for slot layout.order[k]. flags: as decoded. data: zeroed from `bit` on, with room for
+    16 bits for each symbol and 20 for each segment.
     """
     for segment in range(len(layout.segments)):
         first = int(layout.segments[segment, 0])
@@ -285,6 +290,7 @@ def encode_values(
 
 @compiled
 def _write_nibble(data: UInt8, bit: int, value: int) -> int:
+    """Write 4 bits; return the bit after them."""
     for shift in range(3, -1, -1):
         if (value >> shift) & 1:
             data[bit >> 3] |= np.uint8(128 >> (bit & 7))
@@ -294,13 +300,13 @@ def _write_nibble(data: UInt8, bit: int, value: int) -> int:
 
 @compiled
 def room_for(skip: int, layout: Layout) -> int:
-    """More bits than a P plane can take, with a start code before it."""
+    """Return an upper bound of the bits of a P plane with a start code before it."""
     return 112 + 4 * (skip // 15) + 20 * len(layout.segments) + 17 * len(layout.order)
 
 
 @compiled
 def _write_start_code(data: UInt8, bit: int) -> int:
-    """Alignment and fba_object_plane_start_code; the bit after them."""
+    """Write alignment and fba_object_plane_start_code; return the bit after them."""
     bit += 1
     while bit & 7:
         data[bit >> 3] |= np.uint8(128 >> (bit & 7))
@@ -321,7 +327,7 @@ def _write_plane(
     symbols: Int64,
     flags: Int64,
 ) -> int:
-    """One P plane; the bit after it."""
+    """Write one P plane; return the bit after it."""
     header = 2 * object_mask + (1 if skip > 0 else 0)  # is_intra 0, fba_object_mask, skip_frames
     bit = _write_nibble(data, bit, header)
     while skip >= 0 and header & 1:
@@ -343,12 +349,12 @@ def encode_run(
     skips: Int64,
     borders: Int64,
 ) -> tuple[int, int, int, int]:
-    """Encode rows[t] as P planes at `bit`: (planes, status, bit, slot).
+    """Encode rows[t] as P planes at `bit`; return (planes, status, bit, slot).
 
-    after_code: a start code ends at `bit`. A plane that a reader would take for a start code gets one.
-    OUT_OF_RANGE: a difference in the next plane, that of `slot`, does not fit its range; nothing of that
-    plane was written. OUT_OF_DATA: `data` has no room for another. borders: first bit of each, and the
-    bit after the last.
+    after_code: a start code ends at `bit`. A start code is written before a plane that a reader would take
+    for one. OUT_OF_RANGE: the difference of `slot` in the next plane does not fit its range; nothing of that
+    plane was written. OUT_OF_DATA: `data` has no room for another plane. borders: first bit of each plane,
+    and the bit after the last.
     """
     order, minimum, step, last = layout.order, coding.minimum, coding.step, coding.last
     symbols = np.zeros(len(order), np.int64)

@@ -16,12 +16,12 @@ BAP_PREDICTIVE_SCALE = (
 
 
 def scale(part: int, quant: int) -> int:
-    """What range limits are divided by and table steps multiplied with; 1 where values go unquantised."""
+    """Return the divisor of range limits, which is the factor of table steps; 1 without quantisation."""
     return max(quant if part == slots.FACE_BIT else BAP_PREDICTIVE_SCALE[quant], 1)
 
 
 def steps(part: int, quant: int, bap_table: str) -> Int64:
-    """Step of every slot of a part, int64 (73,) or (296,) in slot order; 1 where values go unquantised."""
+    """Return the steps of a part, int64 (73,) or (296,) in slot order; 1 for unquantised values."""
     factor = scale(part, quant)
     if part == slots.BODY_BIT:
         table = bap_steps(bap_table)
@@ -34,7 +34,7 @@ def steps(part: int, quant: int, bap_table: str) -> Int64:
 
 
 def levels(values: Integer, step: Int64) -> Int64:
-    """Levels of values: the nearest multiple of the step, halves away from zero, but 0 up to step // 2."""
+    """Return the levels of values: nearest multiples of step, halves away from 0, but 0 up to step // 2."""
     size, half = np.abs(values.astype(np.int64)), step // 2
     quantised: Int64 = np.sign(values) * np.where(size <= half, 0, (size + half) // step)
     return quantised

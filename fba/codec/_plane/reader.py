@@ -1,4 +1,4 @@
-"""Reads planes, one I plane or a run of P planes at a time: the mirror of `plane_writer`."""
+"""Read planes, one I plane or a run of P planes at a time: the counterpart of `writer`."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ from fba.codec.settings import FrameRate, PartSettings, PlaneSettings
 from fba.errors import BitstreamError, UnsupportedError
 
 _RUN = 512
-"""Planes that one call of the compiled loop decodes at most."""
+"""Most planes that one call of the compiled loop decodes."""
 _PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
 
 
 @dataclass(frozen=True)
 class Planes:
-    """What was read: rows of values int32 (T, columns), see `slots`; bit positions int64 (T + 1,); skips
-    int64 (T,). Arrays belong to the reader and change with the next call."""
+    """Planes that share their settings.
+
+    rows: int32 (T, columns), values, see `slots`. borders: int64 (T + 1,), first bit of each plane, and the
+    bit after the last. skips: int64 (T,). The next call of the reader overwrites the arrays.
+    """
 
     rows: Int32
     borders: Int64
@@ -32,9 +35,9 @@ class Planes:
 
 
 class PlaneReader:
-    """The planes of an FBA object, and all that must be known from one plane to the next.
+    """Reads the planes of an FBA object, and holds the state from one plane to the next.
 
-    Bits in errors count from the start of the data that was handed in.
+    Bits in errors count from the start of the data that was passed in.
     """
 
     def __init__(self, bap_table: str = "iso") -> None:
@@ -49,30 +52,31 @@ class PlaneReader:
         self._borders = np.zeros(_RUN + 1, dtype=np.int64)
 
     def begin_object(self) -> None:
-        """Forget everything, ranges too."""
+        """Reset all state, including ranges."""
         if self._models_used:
             self._models = Models(self._bap_table)
             self._models_used = False
         self.forget_values()
 
     def forget_values(self) -> None:
-        """After damage: nothing can be predicted until the next I plane."""
+        """Reset settings after damage: P planes are errors until the next I plane."""
         self._settings.clear()
         self._layouts.clear()
 
     def read(self, data: UInt8, bit: int, end: int, *, after_code: bool) -> Planes | None:
-        """The plane at `bit`, and P planes that follow it; None where none is complete.
+        """Return the plane at `bit` and the P planes that follow it; None if none is complete.
 
-        after_code: a start code ends at `bit`. Raises OutOfDataError where even the first plane goes
-        beyond `end`, BitstreamError and UnsupportedError for it; nothing was changed then but what the
-        next I plane sets anew.
+        after_code: a start code ends at `bit`. Raises OutOfDataError if the first plane goes beyond `end`,
+        BitstreamError and UnsupportedError for that plane. After an error, only state that the next I plane
+        sets has changed.
         """
         reader = BitReader(data, bit, end)
         if reader.read(1):
-            return self._intra(reader, after_code)
-        return self._predicted(reader, after_code)
+            return self._read_intra(reader, after_code)
+        return self._read_predicted(reader, after_code)
 
-    def _intra(self, reader: BitReader, after_code: bool) -> Planes:
+    def _read_intra(self, reader: BitReader, after_code: bool) -> Planes:
+        """Read an I plane, whose first bit has been read."""
         start = reader.bit - 1
         mask = _read_object_mask(reader)
         frame_rate = _read_frame_rate(reader)
@@ -84,7 +88,7 @@ class PlaneReader:
         for part, name in _PARTS:
             if mask & part:
                 settings[part] = self._read_part(reader, part, name)
-                decoded.append(self._intra_values(reader, part, settings[part], row))
+                decoded.append(self._read_intra_values(reader, part, settings[part], row))
         for order, values in decoded:
             self._models.last[order] = values
         self._settings.update(settings)
@@ -105,7 +109,7 @@ class PlaneReader:
         )
 
     def _read_part(self, reader: BitReader, part: int, name: str) -> PartSettings:
-        """The header of a part, put in force."""
+        """Read the header of a part in an I plane, and apply it."""
         settings = syntax.read_part(reader, part)
         if settings.coding_type == syntax.DCT:
             raise UnsupportedError(
@@ -124,10 +128,10 @@ class PlaneReader:
             )
         return settings
 
-    def _intra_values(
+    def _read_intra_values(
         self, reader: BitReader, part: int, settings: PartSettings, row: Int32
     ) -> tuple[Int64, Int64]:
-        """Slots and values of a part; also written into row (1, columns)."""
+        """Return slots (K,) and values (K,) of a part in an I plane; also write row (1, columns)."""
         face = part == slots.FACE_BIT
         layout = Layout(*slots.coding_order(settings.mask if face else None, None if face else settings.mask))
         symbols, values = np.zeros_like(layout.order), np.zeros_like(layout.order)
@@ -143,8 +147,8 @@ class PlaneReader:
             row[0, slots.FLAGS] = flags
         return layout.order, values
 
-    def _predicted(self, reader: BitReader, after_code: bool) -> Planes | None:
-        """A run of P planes with one fba_object_mask."""
+    def _read_predicted(self, reader: BitReader, after_code: bool) -> Planes | None:
+        """Read a run of P planes with the same fba_object_mask; None if the first is incomplete."""
         start = reader.bit - 1
         mask = _read_object_mask(reader)
         for part, name in _PARTS:
@@ -165,7 +169,9 @@ class PlaneReader:
         if self._rows_layout is not layout:
             self._rows_layout = layout
             width = slots.row_width(body=body is not None)
-            self._rows = np.zeros((_RUN, width), dtype=np.int32)  # what this layout does not code stays 0
+            self._rows = np.zeros(
+                (_RUN, width), dtype=np.int32
+            )  # slots that this layout does not code stay 0
         count, status, _, place = loops.decode_run(
             reader.data, start, reader.end, after_code, mask, layout, self._models.predicted,
             self._rows, self._skips, self._borders,
@@ -177,7 +183,7 @@ class PlaneReader:
         return Planes(self._rows[:count], self._borders[: count + 1], self._skips[:count], settings)
 
     def _check(self, status: int, place: int, start: int) -> None:
-        """Raise what a compiled loop returned as its status; place: a bit, or a slot if out of range."""
+        """Raise the error for the status of a compiled loop. place: a bit, or a slot for OUT_OF_RANGE."""
         if status == OUT_OF_DATA:
             raise OutOfDataError
         if status == loops.OUT_OF_RANGE:
@@ -192,6 +198,7 @@ class PlaneReader:
 
 
 def _read_object_mask(reader: BitReader) -> int:
+    """Read fba_object_mask; BitstreamError if it is 0."""
     mask = reader.read(2)
     if mask == 0:
         raise BitstreamError(loops.STATUS_TEXT[loops.BAD_MASK], bit=reader.bit - 2)
@@ -199,6 +206,7 @@ def _read_object_mask(reader: BitReader) -> int:
 
 
 def _read_frame_rate(reader: BitReader) -> FrameRate | None:
+    """Read is_frame_rate and the rate after it; BitstreamError if that is 0."""
     if not reader.read(1):
         return None
     rate = syntax.read_frame_rate(reader)

@@ -1,8 +1,9 @@
-"""Numbering of everything that a plane carries: 372 slots.
+"""Slots: the numbers 0..371 of everything that a plane carries.
 
-The codec's loops know parameters by slot: 3 of the viseme, 4 of the expression, FAPs 3..68, BAPs
+The codec's loops address parameters by slot: 3 of the viseme, 4 of the expression, FAPs 3..68, BAPs
 1..296. Three slots between face and body hold the flags viseme_def, init_face and expression_def, which
-are plain bits. A row of values is int32, one column a slot; of a face alone it ends before the BAPs.
+are single bits. A row of values is int32 with one column for each slot; without a body it ends before the
+BAPs.
 """
 
 from __future__ import annotations
@@ -30,27 +31,28 @@ FACE_BIT, BODY_BIT = 1, 2
 
 
 def row_width(*, body: bool) -> int:
-    """Columns of a row of values with or without a body."""
+    """Return the number of columns in a row of values."""
     return SLOTS if body else FLAGS.stop
 
 
 def fap_slot(number: int) -> int:
-    """Slot of a low-level FAP, 3..68."""
+    """Return the slot of a low-level FAP, 3..68."""
     return FAPS.start + number - 3
 
 
 def bap_slot(number: int) -> int:
+    """Return the slot of a BAP, 1..296."""
     return BAPS.start + number - 1
 
 
 @cache
 def body_order() -> Int64:
-    """(296,) slots of the BAPs in coding order: group by group, in each group's listed order."""
+    """Return the slots (296,) of the BAPs in coding order: by group, as each group lists them."""
     return np.array([bap_slot(number) for group in bap_groups() for number in group], dtype=np.int64)
 
 
 def label(slot: int) -> str:
-    """The standard's name for what a slot carries."""
+    """Return the standard's name of what a slot carries."""
     if slot < VISEME.stop:
         return f"FAP 1 {VISEME_FIELDS[slot]}"
     if slot < EXPRESSION.stop:
@@ -61,28 +63,28 @@ def label(slot: int) -> str:
 
 
 def coding_order(face_mask: Bool | None, body_mask: Bool | None) -> tuple[Int64, Int64]:
-    """What a plane codes: (order int64 (K,), segments int64 (S, 3)).
+    """Return the slots that a plane codes, in order, and its arithmetic segments.
 
-    order: slots in coding order. segments: one row for each arithmetic segment: position in `order` of
-    its first slot, of the slot after its last, and how many flag bits follow it (1 after the viseme,
-    2 after the expression). A mask of None means that the plane lacks the part.
+    face_mask, body_mask: bool (68,), (296,), or None if the plane lacks the part. Returns order, int64 (K,),
+    and segments, int64 (S, 3): position in order of the segment's first slot, of the slot after its last, and
+    number of flag bits that follow it (1 after the viseme, 2 after the expression).
     """
     order: list[int] = []
     segments: list[tuple[int, int, int]] = []
 
-    def segment(slots: list[int], flags: int) -> None:
+    def add_segment(slots: list[int], flags: int) -> None:
         segments.append((len(order), len(order) + len(slots), flags))
         order.extend(slots)
 
     if face_mask is not None:
         if face_mask[0]:
-            segment(list(range(VISEME.start, VISEME.stop)), 1)
+            add_segment(list(range(VISEME.start, VISEME.stop)), 1)
         if face_mask[1]:
-            segment(list(range(EXPRESSION.start, EXPRESSION.stop)), 2)
-        segment((np.flatnonzero(face_mask[2:]) + FAPS.start).tolist(), 0)
+            add_segment(list(range(EXPRESSION.start, EXPRESSION.stop)), 2)
+        add_segment((np.flatnonzero(face_mask[2:]) + FAPS.start).tolist(), 0)
     if body_mask is not None:
         in_order = body_order()
-        segment(in_order[body_mask[in_order - BAPS.start]].tolist(), 0)
+        add_segment(in_order[body_mask[in_order - BAPS.start]].tolist(), 0)
     return np.array(order, dtype=np.int64), np.array(segments, dtype=np.int64).reshape(-1, 3)
 
 
@@ -101,8 +103,7 @@ def body_rows(track: BodyTrack, rows: Int32) -> None:
 
 
 def face_track(rows: Int32, mask: Bool, interpolated: Bool | None) -> FaceTrack:
-    """The face track that rows (T, columns) and one mask (68,) for all of them hold; the same for what
-    is to be interpolated."""
+    """Return the face track of rows (T, columns). mask, interpolated: (68,), the same for all frames."""
     count = len(rows)
     values = np.zeros((count, FAP_COUNT), dtype=np.int32)
     values[:, 2:] = rows[:, FAPS]
@@ -115,12 +116,12 @@ def face_track(rows: Int32, mask: Bool, interpolated: Bool | None) -> FaceTrack:
     for array in (values, viseme, expression):
         array.flags.writeable = False
     shape = (count, FAP_COUNT)
-    asked = np.broadcast_to(interpolated, shape) if interpolated is not None else None
-    return FaceTrack(values, np.broadcast_to(mask, shape), viseme, expression, asked)
+    interpolated_rows = np.broadcast_to(interpolated, shape) if interpolated is not None else None
+    return FaceTrack(values, np.broadcast_to(mask, shape), viseme, expression, interpolated_rows)
 
 
 def body_track(rows: Int32, mask: Bool) -> BodyTrack:
-    """The body track that rows (T, columns) and one mask (296,) for all of them hold."""
+    """Return the body track of rows (T, columns). mask: (296,), the same for all frames."""
     values = rows[:, BAPS].copy()
     values.flags.writeable = False
     return BodyTrack(values, np.broadcast_to(mask, (len(rows), BAP_COUNT)))

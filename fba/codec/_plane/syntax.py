@@ -1,6 +1,6 @@
-"""Headers of the FBA object and its planes, both ways (ISO/IEC 14496-2, FBA object plane).
+"""Read and write headers of the FBA object and its planes (ISO/IEC 14496-2, FBA object plane).
 
-Reading and writing stand side by side, element by element. A plane is::
+A plane is::
 
     [alignment, fba_object_plane_start_code]                     optional
     is_intra 1, fba_object_mask 2
@@ -34,9 +34,9 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, bap_groups, fap_groups
 
 START_CODE_PREFIX = b"\x00\x00\x01"
 OBJECT_CODES = (0xBA, 0x01)
-"""Last byte of fba_object_start_code: the standard's, and an old vendor code read as well."""
+"""Last bytes of fba_object_start_code: the standard's, and one of old tools, which is only read."""
 PLANE_CODES = (0xBB, 0x03)
-"""Last byte of fba_object_plane_start_code: likewise."""
+"""Last bytes of fba_object_plane_start_code: likewise."""
 END_CODE = 0xB1
 
 PREDICTIVE, DCT = 0, 1
@@ -49,44 +49,48 @@ _RANGE_WEIGHTS = 1 << np.arange(RANGE_BITS, dtype=np.uint8)[::-1]
 
 
 def interpolated(settings: PartSettings) -> Bool | None:
-    """bool (68,): the FAPs that are not sent and that mask type 2 asks to interpolate; None where none."""
+    """Return bool (68,): unsent FAPs that mask type 2 asks to interpolate; None without mask type 2."""
     if MASK_INTERPOLATE not in settings.mask_types:
         return None
-    asked = np.zeros_like(settings.mask)
+    result = np.zeros_like(settings.mask)
     for kind, group in zip(settings.mask_types, groups(slots.FACE_BIT), strict=True):
         if kind == MASK_INTERPOLATE:
             columns = np.array(group) - 1
-            asked[columns] = ~settings.mask[columns]
-    return asked
+            result[columns] = ~settings.mask[columns]
+    return result
 
 
 def groups(part: int) -> tuple[tuple[int, ...], ...]:
-    """Parameter numbers by group, in coding order, of the FAPs or the BAPs."""
+    """Return the numbers of FAPs or BAPs by group, in coding order."""
     return fap_groups() if part == slots.FACE_BIT else bap_groups()
 
 
 def read_frame_rate(reader: BitReader) -> FrameRate:
+    """Read frame_rate, seconds and frequency_offset."""
     return FrameRate(reader.read(8), reader.read(4), reader.read(1))
 
 
 def write_frame_rate(writer: BitWriter, rate: FrameRate) -> None:
+    """Write frame_rate, seconds and frequency_offset."""
     writer.write(rate.frame_rate, 8)
     writer.write(rate.seconds, 4)
     writer.write(rate.frequency_offset, 1)
 
 
 def read_time_code(reader: BitReader) -> TimeCode:
+    """Read a time code."""
     hours, minutes, marker, seconds = (reader.read(bits) for bits in (5, 6, 1, 6))
     return TimeCode(hours, minutes, seconds, marker)
 
 
 def write_time_code(writer: BitWriter, code: TimeCode) -> None:
+    """Write a time code."""
     for value, bits in ((code.hours, 5), (code.minutes, 6), (code.marker, 1), (code.seconds, 6)):
         writer.write(value, bits)
 
 
 def read_skip(reader: BitReader) -> int:
-    """skip_frames and number_of_frames_to_skip."""
+    """Read skip_frames and number_of_frames_to_skip; return the frames skipped."""
     if not reader.read(1):
         return 0
     status, skip, reader.bit = read_skip_words(reader.data, reader.bit, reader.end)
@@ -98,6 +102,7 @@ def read_skip(reader: BitReader) -> int:
 
 
 def write_skip(writer: BitWriter, skip: int) -> None:
+    """Write skip_frames and number_of_frames_to_skip."""
     writer.write(1 if skip else 0, 1)
     if skip:
         for _ in range(skip // 15):
@@ -106,7 +111,7 @@ def write_skip(writer: BitWriter, skip: int) -> None:
 
 
 def read_part(reader: BitReader, part: int) -> PartSettings:
-    """The header of the FAP or BAP half of an I plane, up to its first arithmetic segment.
+    """Read the header of the FAP or BAP half of an I plane, up to its first arithmetic segment.
 
     Raises BitstreamError on a wrong marker bit or a reserved mask type.
     """
@@ -139,6 +144,7 @@ def read_part(reader: BitReader, part: int) -> PartSettings:
 
 
 def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
+    """Write the header of the FAP or BAP half of an I plane, up to its first arithmetic segment."""
     writer.write(settings.quant, 5)
     for kind, group in zip(settings.mask_types, groups(part), strict=True):
         writer.write(0b100 | kind, 3)
@@ -160,6 +166,7 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
 
 
 def _read_ranges(reader: BitReader, part: int, mask: Bool) -> RangeLists:
+    """Read the four is_*_new_* flags and the range lists."""
     flags = [reader.read(1) for _ in LISTS]
     layout = _range_layout(part, mask.tobytes()) if any(flags) else None
     lists: list[np.ndarray | None] = []
@@ -168,28 +175,32 @@ def _read_ranges(reader: BitReader, part: int, mask: Bool) -> RangeLists:
             lists.append(None)
             continue
         codes = np.zeros(len(mask), dtype=np.uint8)
-        bits = reader.ahead(layout.size)
+        bits = reader.peek(layout.size)
         if bits is not None and bits[layout.markers].all():
             codes[layout.columns] = bits[layout.codes] @ _RANGE_WEIGHTS
             reader.bit += layout.size
         else:
-            _read_wrong_ranges(reader, name, layout.chunks)
+            _raise_range_error(reader, name, layout.chunks)
         codes.flags.writeable = False
         lists.append(codes)
     return RangeLists(*lists)
 
 
-def _read_wrong_ranges(reader: BitReader, name: str, chunks: list[list[int]]) -> NoReturn:
-    """Find where a range list goes wrong: a marker bit of 0, or the end of the data. Raises the error."""
+def _raise_range_error(reader: BitReader, name: str, chunks: list[list[int]]) -> NoReturn:
+    """Raise the error of a range list with a marker bit of 0, or that goes beyond the end of the data."""
     for chunk in chunks:
         bits = reader.read(1 + RANGE_BITS * len(chunk))
         if not bits >> RANGE_BITS * len(chunk):
             raise _marker_error(reader, f"in the {name} range list", 1 + RANGE_BITS * len(chunk))
-    raise AssertionError("this range list is right")
+    raise AssertionError("this range list has no error")
 
 
 class _RangeLayout(NamedTuple):
-    """A range list of one mask, in bits from its start. columns, codes: (C,), (C, 5) each limit's."""
+    """Where the bits of a range list are, for one mask.
+
+    chunks: parameter numbers after each marker bit. markers: (M,), positions of the marker bits, from the
+    start of the list. columns: (C,), column of each limit. codes: (C, 5), positions of its bits. size: bits.
+    """
 
     chunks: list[list[int]]
     markers: npt.NDArray[np.intp]
@@ -200,28 +211,32 @@ class _RangeLayout(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _range_layout(part: int, mask: bytes) -> _RangeLayout:
+    """Return the layout of a range list. mask: bytes of a bool array."""
     chunks = _range_chunks(part, np.frombuffer(mask, dtype=bool))
     markers: list[int] = []
     codes: list[int] = []
-    at = 0
+    bit = 0
     for chunk in chunks:
-        markers.append(at)
-        codes += range(at + 1, at + 1 + RANGE_BITS * len(chunk), RANGE_BITS)
-        at += 1 + RANGE_BITS * len(chunk)
+        markers.append(bit)
+        codes += range(bit + 1, bit + 1 + RANGE_BITS * len(chunk), RANGE_BITS)
+        bit += 1 + RANGE_BITS * len(chunk)
     columns = np.array([number - 1 for chunk in chunks for number in chunk], dtype=np.intp)
     starts = np.array(codes, dtype=np.intp)[:, None]
-    return _RangeLayout(chunks, np.array(markers, dtype=np.intp), columns, starts + np.arange(RANGE_BITS), at)
+    return _RangeLayout(
+        chunks, np.array(markers, dtype=np.intp), columns, starts + np.arange(RANGE_BITS), bit
+    )
 
 
 def _range_chunks(part: int, mask: Bool) -> list[list[int]]:
-    """How a range list is cut: parameters whose limits follow one marker bit, those masked out left out."""
-    listed = groups(part)[1:] if part == slots.FACE_BIT else groups(part)  # FAP 1 and 2 have no ranges
+    """Return the numbers of the sent parameters whose limits follow each marker bit of a range list."""
+    ranged = groups(part)[1:] if part == slots.FACE_BIT else groups(part)  # FAP 1 and 2 have no ranges
     return [
         [number for number in group[start : start + _MARKER_EVERY] if mask[number - 1]]
-        for group in listed
+        for group in ranged
         for start in range(0, len(group), _MARKER_EVERY)
     ]
 
 
 def _marker_error(reader: BitReader, where: str, back: int) -> BitstreamError:
+    """Return the error for a marker bit of 0, `back` bits before the reader."""
     return BitstreamError(f"marker bit {where} is 0, expected 1", bit=reader.bit - back)

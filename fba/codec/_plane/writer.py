@@ -1,4 +1,4 @@
-"""Writes planes bit by bit as it is told: the half of the encoder that decides nothing."""
+"""Write planes with given settings: the part of the encoder that makes no decisions."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from fba.codec._plane.loops import Layout
 from fba.codec.settings import PartSettings, PlaneSettings
 
 _SEGMENT_BITS = 20
+"""Most bits that a segment takes besides its symbols."""
 
 
 class DoesNotFitError(Exception):
-    """A level that its range cannot carry. Never leaves the codec.
+    """A level does not fit its range. Never leaves the codec.
 
-    slot: the parameter. level: the level wanted. position: which of the rows.
+    slot: the parameter. level: its level. position: number of the row.
     """
 
     def __init__(self, slot: int, level: int, position: int = 0) -> None:
@@ -29,7 +30,7 @@ class DoesNotFitError(Exception):
 
 
 class PlaneWriter:
-    """An FBA object in the making. `bits` counts what was written; whole bytes leave by `take_bytes`."""
+    """Writes an FBA object. planes: number of planes written."""
 
     def __init__(self, bap_table: str = "iso") -> None:
         self.models = Models(bap_table)
@@ -41,67 +42,72 @@ class PlaneWriter:
 
     @property
     def bits(self) -> int:
+        """Number of bits written."""
         return 8 * self._taken + self._writer.bit
 
     def take_bytes(self) -> bytes:
-        done = self._writer.take_bytes()
-        self._taken += len(done)
-        return done
+        """Return the complete bytes written since the last call."""
+        taken = self._writer.take_bytes()
+        self._taken += len(taken)
+        return taken
 
     def begin_object(self) -> None:
-        self._start_code(syntax.OBJECT_CODES[0])
+        """Write the start code of an object."""
+        self._write_start_code(syntax.OBJECT_CODES[0])
 
     def end_object(self) -> None:
+        """Write alignment and end code."""
         self._writer.align()
-        self._start_code(syntax.END_CODE)
+        self._write_start_code(syntax.END_CODE)
 
     def mask_in_force(self, part: int) -> Bool | None:
-        """What the last I plane with this part sends of it."""
+        """Return the mask of the last I plane with this part, or None."""
         settings = self._settings.get(part)
         return settings.mask if settings is not None else None
 
     def types_in_force(self, part: int) -> tuple[int, ...] | None:
-        """The mask types of the last I plane with this part."""
+        """Return the mask types of the last I plane with this part, or None."""
         settings = self._settings.get(part)
         return settings.mask_types if settings is not None else None
 
     def nearest(self, slot: int, level: int) -> int:
-        """The value that a P plane can come to which wants a difference of this level in a slot."""
+        """Return the value closest to a difference of this level that a P plane can carry in a slot."""
         models = self.models
         low = int(models.minimum[slot])
-        reached = min(max(level, low), low + int(models.size[slot]) - 1)
-        return int(models.last[slot]) + reached * int(models.step[slot])
+        nearest = min(max(level, low), low + int(models.size[slot]) - 1)
+        return int(models.last[slot]) + nearest * int(models.step[slot])
 
     def intra(self, settings: PlaneSettings, row: Int32, *, clamp: bool = False) -> int:
-        """Write an I plane with the values of row (columns,); how many values were clamped to their range.
+        """Write an I plane with the values of row (columns,); return how many were clamped to their range.
 
-        Raises DoesNotFitError before anything was written, unless `clamp`.
+        Raises DoesNotFitError before anything is written, unless `clamp`.
         """
         models = self.models
         parts = [
-            (part, one)
-            for part, one in ((slots.FACE_BIT, settings.face), (slots.BODY_BIT, settings.body))
-            if one is not None
+            (part, part_settings)
+            for part, part_settings in ((slots.FACE_BIT, settings.face), (slots.BODY_BIT, settings.body))
+            if part_settings is not None
         ]
         plan = []
         clamped = 0
-        for part, one in parts:
-            models.begin_intra(part, one)
+        for part, part_settings in parts:
+            models.begin_intra(part, part_settings)
             order, segments = slots.coding_order(
-                one.mask if part == slots.FACE_BIT else None, one.mask if part == slots.BODY_BIT else None
+                part_settings.mask if part == slots.FACE_BIT else None,
+                part_settings.mask if part == slots.BODY_BIT else None,
             )
             levels = quantiser.levels(row[order], models.step[order])
             low = models.i_minimum[order]
             fitting = np.clip(levels, low, low + models.i_size[order] - 1)
-            wrong = np.flatnonzero(fitting != levels)
-            if len(wrong) and not clamp:
-                raise DoesNotFitError(int(order[wrong[0]]), int(levels[wrong[0]]))
-            clamped += len(wrong)
-            plan.append((part, one, order, segments, fitting))
+            misfits = np.flatnonzero(fitting != levels)
+            if len(misfits) and not clamp:
+                raise DoesNotFitError(int(order[misfits[0]]), int(levels[misfits[0]]))
+            clamped += len(misfits)
+            plan.append((part, part_settings, order, segments, fitting))
         writer = self._writer
         if settings.start_code:
             writer.align()
-            self._start_code(syntax.PLANE_CODES[0])
+            self._write_start_code(syntax.PLANE_CODES[0])
         writer.write(1, 1)
         writer.write(sum(part for part, _ in parts), 2)
         writer.write(int(settings.frame_rate is not None), 1)
@@ -112,15 +118,15 @@ class PlaneWriter:
             syntax.write_time_code(writer, settings.time_code)
         syntax.write_skip(writer, settings.skip)
         flags = row[slots.FLAGS].astype(np.int64)
-        for part, one, order, segments, levels in plan:
-            syntax.write_part(writer, part, one)
+        for part, part_settings, order, segments, levels in plan:
+            syntax.write_part(writer, part, part_settings)
             writer.reserve(17 * len(order) + _SEGMENT_BITS * len(segments))
             symbols = levels - models.i_minimum[order]
             writer.bit = loops.encode_values(
                 writer.data, writer.bit, Layout(order, segments), models.intra, False, symbols, flags
             )
             models.last[order] = levels * models.step[order]
-            self._settings[part] = one
+            self._settings[part] = part_settings
         self._layouts.clear()
         self.planes += 1
         return clamped
@@ -128,8 +134,8 @@ class PlaneWriter:
     def predicted(self, mask: int, rows: Int32, skips: Int64, *, start_code: bool = False) -> None:
         """Write P planes with fba_object_mask `mask` and the values of rows (T, columns).
 
-        start_code: with a plane start code before the first. Raises DoesNotFitError at the first that
-        does not fit its ranges, with those before it written and nothing of it.
+        start_code: write a plane start code before the first. Raises DoesNotFitError for the first plane that
+        does not fit its ranges; those before it have been written, and nothing of that plane.
         """
         if mask not in self._layouts:
             face = self._settings[slots.FACE_BIT].mask if mask & slots.FACE_BIT else None
@@ -140,7 +146,7 @@ class PlaneWriter:
         borders = np.zeros(len(rows) + 1, dtype=np.int64)
         if start_code:
             writer.align()
-            self._start_code(syntax.PLANE_CODES[0])
+            self._write_start_code(syntax.PLANE_CODES[0])
         done = 0
         while done < len(rows):
             count, status, bit, slot = loops.encode_run(
@@ -164,5 +170,6 @@ class PlaneWriter:
                 need = loops.room_for(int(skips[done]), layout)
                 writer.reserve(max(need, 8 * len(writer.data)))
 
-    def _start_code(self, code: int) -> None:
+    def _write_start_code(self, code: int) -> None:
+        """Write a start code with this last byte."""
         self._writer.write(int.from_bytes(syntax.START_CODE_PREFIX, "big") << 8 | code, 32)

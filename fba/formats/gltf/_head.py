@@ -123,8 +123,9 @@ class HeadParts:
     ) -> list[int]:
         """Add a mesh for each part; return the nodes that have no parent.
 
-        slots: part name -> position in the skin's list of the part's own joint. skin: whether skin 0 moves the
-        parts; otherwise they are children of nodes. parents: part name -> that node, and "" for other parts.
+        slots: part name -> position in the skin's list of the part's own joint. skin: whether skin 0 moves
+        the parts; otherwise they are children of nodes. parents: part name -> that node, and "" for other
+        parts.
         """
         roots = []
         taken = {node["name"] for node in self._builder.root["nodes"]}
@@ -155,7 +156,7 @@ class HeadParts:
         return roots
 
     def _transform(self, part: Part, rows: slice, skin: bool) -> Part | None:
-        """Return the part in the body's frame, or in that of its own joint; None if clothes hide all of it."""
+        """Return the part in the body's frame, or in that of its own joint; None if clothes hide it all."""
         positions = part.vertices.astype(np.float64)
         triangles = part.triangles
         if skin and self.on is not None:

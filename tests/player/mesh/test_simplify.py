@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from fba.cache import kept
+from fba.cache import load_or_make
 from fba.compiled import is_compiled
 from fba_player.gl.lod import Details, distance, share_memory
 from fba_player.mesh.primitives import sphere_mesh
@@ -127,14 +127,14 @@ def test_a_file_that_was_tampered_with_is_made_anew(tmp_path: Path) -> None:
     count = len(points)
     zeros = np.zeros(count, dtype=np.int32)
     path.unlink()
-    kept(path.stem, ((count,),) * 2, lambda: [np.full(count, 10**6, dtype=np.int32), zeros], np.int32)
+    load_or_make(path.stem, ((count,),) * 2, lambda: [np.full(count, 10**6, dtype=np.int32), zeros], np.int32)
     again = DetailLevels(points, 1, triangles.astype(np.int32)).triangles_within(0.0016)
     assert good is not None
     assert again is not None
     np.testing.assert_array_equal(good, again)
     circle = np.roll(np.arange(count), 1).astype(np.int32)
     path.unlink()
-    kept(path.stem, ((count,),) * 2, lambda: [circle, zeros], np.int32)
+    load_or_make(path.stem, ((count,),) * 2, lambda: [circle, zeros], np.int32)
     assert (
         DetailLevels(points, 1, triangles.astype(np.int32)).triangles_within(0.0016) is not None
     )  # and no endless walk
