@@ -1,4 +1,4 @@
-"""The folder of the package `fba_conformance`; `conformance` was its name, which could be anyone's."""
+"""Former name of the package `fba_conformance`, which is in this folder; importing it raises ImportError."""
 
 raise ImportError(
     "the package 'conformance' is now called 'fba_conformance': from fba_conformance import ...",

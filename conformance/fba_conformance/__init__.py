@@ -1,7 +1,7 @@
-"""Proof that a codec does what the standard says, for this one and for others.
+"""Conformance tests for FBA codecs, this one and others.
 
-Nothing in here is needed to encode, decode or play. It is the second opinion: `trace` reads an FBA
-stream element by element with other tools than `fba.codec` uses (bitstring, and the arithmetic
-decoder of `textbook`, a linear search in plain Python), so that an error would have to be made twice
-to go unseen. `fba info --trace` prints what it finds.
+Encoding, decoding and playing do not need this package. `trace` reads an FBA stream element by element,
+independently of `fba.codec`: with bitstring, and an arithmetic decoder in plain Python with a linear search
+(`_textbook`), so that an error goes unseen only if it is made twice. `fba info --trace` prints a trace.
+May use: the data model, parameters and the codec's public names.
 """

@@ -1,7 +1,7 @@
-"""The test vectors that come with fba: what each is made of, and the one thing that it tests.
+"""Definitions of the test vectors that come with fba, each for one feature.
 
-`python -m fba_conformance.generate` writes them. They are streams of this project's own encoder, checked
-by its independent reader (`fba_conformance.trace`) when they are made.
+`python -m fba_conformance.generate` writes them. They are streams of this project's encoder, checked by the
+independent reader (`fba_conformance.trace`) when they are written.
 """
 
 from __future__ import annotations
@@ -19,8 +19,12 @@ from fba_conformance import _motion as motion
 
 @dataclass(frozen=True)
 class Case:
-    """name: of the file. tests: one line. make: its bytes. encodes: whether encoding what it decodes to,
-    as its planes say, gives the same bytes; streams with foreign start codes or layers do not."""
+    """Definition of a test vector.
+
+    name: of the file. tests: what it tests, in one line. make: returns its bytes. encodes: whether decoding
+    it and encoding the result with the same plane settings gives the same bytes; not so for streams with
+    other start codes or layers.
+    """
 
     name: str
     tests: str
@@ -30,7 +34,7 @@ class Case:
 
 
 def cases() -> Iterator[Case]:
-    """All vectors, in the order of the index."""
+    """Yield all vectors, in the order of the index."""
     yield from _quantisers()
     yield from _masks()
     yield from _planes()
@@ -39,7 +43,8 @@ def cases() -> Iterator[Case]:
     yield from _frames_around()
 
 
-def _encoded(animation: Animation, **options: object) -> Callable[[], bytes]:
+def _encoding(animation: Animation, **options: object) -> Callable[[], bytes]:
+    """Return a function that encodes an animation."""
     return lambda: encode(animation, EncoderOptions(**options))  # type: ignore[arg-type]
 
 
@@ -50,49 +55,49 @@ def _quantisers() -> Iterator[Case]:
             track = FaceTrack(np.clip(track.values, -1860, 1860), track.mask, track.viseme, track.expression)
         yield Case(
             f"face_q{quant:02}", f"all FAPs, viseme and expression at fap_quant {quant}",
-            _encoded(motion.animation(track), fap_quant=quant),
+            _encoding(motion.animation(track), fap_quant=quant),
         )  # fmt: skip
     for quant in (1, 5, 12, 31):
         yield Case(
             f"body_q{quant:02}", f"BAPs 1..186 at bap_quant {quant}, the standard's steps",
-            _encoded(motion.animation(None, motion.body(8)), bap_quant=quant),
+            _encoding(motion.animation(None, motion.body(8)), bap_quant=quant),
         )  # fmt: skip
     small = motion.body(8)
     clipped = type(small)(np.clip(small.values, -1860, 1860), small.mask)
-    yield Case("body_q00", "BAPs unquantised", _encoded(motion.animation(None, clipped), bap_quant=0))
+    yield Case("body_q00", "BAPs unquantised", _encoding(motion.animation(None, clipped), bap_quant=0))
     for quant in (1, 9):
         yield Case(
             f"body_visage_q{quant:02}", f"BAPs 1..186 at bap_quant {quant}, the vendor's steps",
-            _encoded(
+            _encoding(
                 motion.animation(None, motion.body(8, table="visage")), bap_quant=quant, bap_steps="visage"
             ),
             "visage",
         )  # fmt: skip
     yield Case(
         "both_q6_9", "FAPs and BAPs in one plane, fap_quant 6, bap_quant 9",
-        _encoded(motion.animation(motion.face(10), motion.body(10)), fap_quant=6, bap_quant=9),
+        _encoding(motion.animation(motion.face(10), motion.body(10)), fap_quant=6, bap_quant=9),
     )  # fmt: skip
 
 
 def _masks() -> Iterator[Case]:
-    listed = (1, 4, 5, 19, 33, 50, 90, 125, 180, 181, 186)
-    some = (3, 4, 8, 19, 20, 33, 48, 51, 60, 61, 68)
+    few_baps = (1, 4, 5, 19, 33, 50, 90, 125, 180, 181, 186)
+    few_faps = (3, 4, 8, 19, 20, 33, 48, 51, 60, 61, 68)
     for unsent in ("keep", "interpolate"):
         yield Case(
             f"mask_{unsent}", f"some FAPs of most groups, unsent ones: {unsent}",
-            _encoded(motion.animation(motion.face(12, faps_sent=some)), unsent=unsent),
+            _encoding(motion.animation(motion.face(12, faps_sent=few_faps)), unsent=unsent),
         )  # fmt: skip
     yield Case(
         "mask_body", "some BAPs of many groups, in listed order",
-        _encoded(motion.animation(None, motion.body(10, baps_sent=listed))),
+        _encoding(motion.animation(None, motion.body(10, baps_sent=few_baps))),
     )  # fmt: skip
     yield Case(
         "mask_high_level_only", "viseme and expression, no low-level FAP: an empty last segment",
-        _encoded(motion.animation(motion.face(20, faps_sent=(), high_level=True))),
+        _encoding(motion.animation(motion.face(20, faps_sent=(), high_level=True))),
     )  # fmt: skip
     yield Case(
         "mask_nothing", "masks of type 0 in every group: planes of a header and two flush bits",
-        _encoded(motion.animation(motion.face(3, faps_sent=()))),
+        _encoding(motion.animation(motion.face(3, faps_sent=()))),
     )  # fmt: skip
     track = motion.face(12)
     mask = track.mask.copy()
@@ -100,45 +105,45 @@ def _masks() -> Iterator[Case]:
     mask[8:, 3:9] = False
     yield Case(
         "mask_changes", "masks that change twice: an I plane each, with new range lists",
-        _encoded(motion.animation(FaceTrack(track.values, mask))),
+        _encoding(motion.animation(FaceTrack(track.values, mask))),
     )  # fmt: skip
     mask = track.mask.copy()
     mask[3:9] = False
     yield Case(
         "part_comes_and_goes", "planes without FAPs between planes with both: fba_object_mask 3, 2, 3",
-        _encoded(motion.animation(FaceTrack(track.values, mask), motion.body(12))),
+        _encoding(motion.animation(FaceTrack(track.values, mask), motion.body(12))),
     )  # fmt: skip
     yield Case(
         "extension_baps", "user-defined BAPs 187..296",
-        _encoded(motion.animation(None, motion.body(6, baps_sent=tuple(range(187, 297))))),
+        _encoding(motion.animation(None, motion.body(6, baps_sent=tuple(range(187, 297))))),
     )  # fmt: skip
 
 
 def _planes() -> Iterator[Case]:
     long = motion.animation(motion.face(40))
-    yield Case("all_intra", "I planes only", _encoded(long[:8], intra_period=Fraction(1, 25)))
-    yield Case("intra_period", "an I plane every 10 frames", _encoded(long, intra_period=Fraction(10, 25)))
+    yield Case("all_intra", "I planes only", _encoding(long[:8], intra_period=Fraction(1, 25)))
+    yield Case("intra_period", "an I plane every 10 frames", _encoding(long, intra_period=Fraction(10, 25)))
     yield Case(
         "start_codes", "a plane start code and range lists with every I plane",
-        _encoded(long, intra_period=Fraction(10, 25), start_codes=True), encodes=True,
+        _encoding(long, intra_period=Fraction(10, 25), start_codes=True), encodes=True,
     )  # fmt: skip
     resting = np.zeros((600, 68), dtype=np.int32)
     mask = np.zeros((600, 68), dtype=bool)
     mask[:, 2:] = True
     yield Case(
         "emulation_guard", "a face at rest: runs of zero bits, a 1 inserted after every 22",
-        _encoded(motion.animation(FaceTrack(resting, mask))),
+        _encoding(motion.animation(FaceTrack(resting, mask))),
     )  # fmt: skip
     many = 17_000
-    one = np.zeros((many, 68), dtype=np.int32)
-    one[:, 47] = [170 * (frame // 40 % 9) for frame in range(many)]
+    values = np.zeros((many, 68), dtype=np.int32)
+    values[:, 47] = [170 * (frame // 40 % 9) for frame in range(many)]
     mask = np.zeros((many, 68), dtype=bool)
     mask[:, 47] = True
     yield Case(
         "counts_halved", "one FAP long enough for its counts to reach 16383 and be halved",
-        _encoded(motion.animation(FaceTrack(one, mask), rate=100)),
+        _encoding(motion.animation(FaceTrack(values, mask), rate=100)),
     )  # fmt: skip
-    yield Case("one_frame", "a single I plane", _encoded(long[:1]))
+    yield Case("one_frame", "a single I plane", _encoding(long[:1]))
 
 
 def _times() -> Iterator[Case]:
@@ -150,15 +155,15 @@ def _times() -> Iterator[Case]:
         ("rate_slowest", Fraction(1, 16)),
         ("rate_fastest", Fraction(4095, 16)),
     ):
-        yield Case(name, f"{rate} frames/s", _encoded(motion.animation(track, rate=rate)))
+        yield Case(name, f"{rate} frames/s", _encoding(motion.animation(track, rate=rate)))
     gaps = [0, 1, 3, 18, 34, 51, 83, 284, 285]  # skips of 0, 1, 14, 15, 16, 31, 200
     yield Case(
-        "skips", "skipped frames: 1, 14, 15, 16, 31, 200", _encoded(motion.animation(track, index=gaps))
+        "skips", "skipped frames: 1, 14, 15, 16, 31, 200", _encoding(motion.animation(track, index=gaps))
     )
     start = 25 * (5 * 3600 + 59 * 60 + 59)
     yield Case(
         "time_code", "a first time code of 5:59:59",
-        _encoded(motion.animation(track, index=list(range(start, start + 9)))),
+        _encoding(motion.animation(track, index=list(range(start, start + 9)))),
     )  # fmt: skip
 
 
@@ -169,17 +174,17 @@ def _ranges() -> Iterator[Case]:
     jumps[::2, 4], jumps[1::2, 4] = 3720, -3720
     yield Case(
         "ranges_too_narrow", "differences that no range holds: an I plane for each",
-        _encoded(motion.animation(FaceTrack(jumps, mask))),
+        _encoding(motion.animation(FaceTrack(jumps, mask))),
     )  # fmt: skip
     constant = np.zeros((10, 68), dtype=np.int32)
     yield Case(
         "ranges_of_one_symbol", "ranges 0..0: alphabets of a single symbol, no bits",
-        _encoded(motion.animation(FaceTrack(constant, mask))),
+        _encoding(motion.animation(FaceTrack(constant, mask))),
     )  # fmt: skip
 
 
 def _frames_around() -> Iterator[Case]:
-    """Streams as others write them: other start codes, layers around the object."""
+    """Yield streams as other programs write them: other start codes, layers around the object."""
     plain = encode(motion.animation(motion.face(6)))
     end = b"\x00\x00\x01\xb1"
     yield Case(

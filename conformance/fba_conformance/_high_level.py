@@ -1,4 +1,4 @@
-"""FAP 1 and FAP 2 of a plane: visemes and expressions, each an arithmetic segment and its flags."""
+"""Read FAP 1 (viseme) and FAP 2 (expression) of a plane, each an arithmetic segment and flags."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fba_conformance._part import INTENSITY_MAX, Slot, read_segment
 from fba_conformance._reader import Reader
 
 CODED_FIELDS = {"viseme": 3, "expression": 4}
-"""How many of the fields go through the arithmetic coder; the rest are single bits behind it."""
+"""Number of fields in the arithmetic segment; the others are single bits after it."""
 
 
 @dataclass
@@ -24,7 +24,7 @@ class HighLevel:
         self.select_max = VISEME_SELECT_MAX if self.name == "viseme" else EXPRESSION_SELECT_MAX
 
     def begin(self, fap_quant: int) -> None:
-        """Fresh slots for an I plane. Selects are never quantised; blends and intensities are."""
+        """Make new slots for an I plane. Selects are never quantised; blends and intensities are."""
         self.slots = []
         for name in self.fields[: CODED_FIELDS[self.name]]:
             if "select" in name:
@@ -36,7 +36,7 @@ class HighLevel:
             self.slots.append(Slot(name, step, {True: (0, limit), False: (-limit, limit)}))
 
     def read(self, reader: Reader, *, intra: bool) -> list[int]:
-        """The fields in the standard's order: selects, blend or intensities, then the flags."""
+        """Read the fields; return them in the standard's order."""
         start = reader.bit
         read_segment(reader, self.name, "fap", self.slots, intra=intra)
         for slot in self.slots:

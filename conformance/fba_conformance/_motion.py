@@ -1,6 +1,6 @@
-"""Made-up motion for the test vectors: the same integers on every machine and in every version.
+"""Synthetic motion for the test vectors: the same integers on every machine and in every version.
 
-No random module's sequence is promised for ever, so the noise comes from a generator written out here.
+Random modules may change their sequences, so the noise comes from a generator defined here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _MULTIPLIER, _INCREMENT, _MODULUS = 1664525, 1013904223, 1 << 32
 
 
 def noise(seed: int) -> Iterator[float]:
-    """Numbers in -1..1 from a linear congruential generator."""
+    """Yield numbers in -1..1 from a linear congruential generator."""
     state = seed
     while True:
         state = (state * _MULTIPLIER + _INCREMENT) % _MODULUS
@@ -25,7 +25,7 @@ def noise(seed: int) -> Iterator[float]:
 
 
 def wander(count: int, limits: tuple[int, int], step: int, source: Iterator[float]) -> list[int]:
-    """A walk of `count` values inside limits x step, which rests half of the time."""
+    """Return a random walk of `count` values within limits x step, which rests half of the time."""
     low, high = limits[0] * step, limits[1] * step
     value = 0.0
     values = []
@@ -40,14 +40,14 @@ def wander(count: int, limits: tuple[int, int], step: int, source: Iterator[floa
 def face(
     frames: int, *, faps_sent: tuple[int, ...] = tuple(range(3, 69)), seed: int = 1, high_level: bool = False
 ) -> FaceTrack:
-    """A face that wanders within the standard's ranges; high_level: with viseme and expression too."""
+    """Return a face whose FAPs walk within the standard's ranges. high_level: also viseme and expression."""
     source = noise(seed)
     values = np.zeros((frames, FAP_COUNT), dtype=np.int32)
     mask = np.zeros((frames, FAP_COUNT), dtype=bool)
     for number in faps_sent:
-        one = faps()[number - 1]
-        assert one.i_limits is not None
-        values[:, number - 1] = wander(frames, one.i_limits, one.step, source)
+        fap = faps()[number - 1]
+        assert fap.i_limits is not None
+        values[:, number - 1] = wander(frames, fap.i_limits, fap.step, source)
         mask[:, number - 1] = True
     viseme = np.zeros((frames, 4), dtype=np.int16)
     expression = np.zeros((frames, 6), dtype=np.int16)
@@ -65,14 +65,14 @@ def face(
 def body(
     frames: int, *, baps_sent: tuple[int, ...] | None = None, table: str = "iso", seed: int = 2
 ) -> BodyTrack:
-    """A body that wanders within the standard's ranges at a table's steps; extension BAPs within 1860."""
+    """Return a body whose BAPs walk within the standard's ranges; extension BAPs within -1860..1860 steps."""
     source = noise(seed)
     values = np.zeros((frames, BAP_COUNT), dtype=np.int32)
     mask = np.zeros((frames, BAP_COUNT), dtype=bool)
     steps = bap_steps(table)
     for number in baps_sent if baps_sent is not None else range(1, BAP_STANDARD_COUNT + 1):
-        one = baps()[number - 1]
-        values[:, number - 1] = wander(frames, one.i_limits or (-1860, 1860), int(steps[number - 1]), source)
+        bap = baps()[number - 1]
+        values[:, number - 1] = wander(frames, bap.i_limits or (-1860, 1860), int(steps[number - 1]), source)
         mask[:, number - 1] = True
     return BodyTrack(values, mask)
 
@@ -84,6 +84,7 @@ def animation(
     rate: Fraction | int = 25,
     index: list[int] | None = None,
 ) -> Animation:
+    """Return an animation of these tracks; index: 0, 1, ... if None."""
     track = face_track if face_track is not None else body_track
     assert track is not None
     numbers = np.arange(len(track)) if index is None else np.array(index)

@@ -1,4 +1,4 @@
-"""The FAP half or the BAP half of a plane, read element by element and turned into values.
+"""Read the FAP or BAP half of a plane, element by element, and compute its values.
 
 ISO/IEC 14496-2, FBA object plane, predictive mode: masks, range lists, quantiser, arithmetic segments.
 """
@@ -15,18 +15,18 @@ from fba_conformance._textbook import FrequencyTable
 RANGE_UNIT = 60
 LISTS = ("i_new_max", "i_new_min", "p_new_max", "p_new_min")
 MARKER_EVERY = 4
-"""A marker bit stands before the 1st, 5th, 9th ... parameter of a group in a range list."""
+"""A marker bit precedes every `MARKER_EVERY`-th parameter of a group in a range list, from the first on."""
 INTENSITY_MAX = 63
 PREDICTION_SCALE = (
     0, 1, 2, 3, 5, 7, 9, 11, 14, 17, 20, 23, 27, 31, 35, 39,
     43, 47, 52, 57, 62, 67, 72, 77, 82, 88, 94, 100, 106, 113, 120, 127,
 )  # fmt: skip
-"""What bap_quant stands for."""
+"""Factor of BAP steps, by bap_quant."""
 
 
 @dataclass(slots=True)
 class Slot:
-    """One coded number: its label, step and limits (for I and P planes), model and last value."""
+    """A coded number: label, step, limits (of I planes: True, of P planes: False), model and last value."""
 
     label: str
     step: int
@@ -59,6 +59,7 @@ class Part:
         self._set_default_limits()
 
     def _set_default_limits(self) -> None:
+        """Set the limits in force before any were sent."""
         if self.kind == "bap":
             for bap in baps():
                 if bap.i_limits is None or bap.p_limits is None:
@@ -71,12 +72,12 @@ class Part:
                 continue
             intra, predicted = (1080, 420) if fap.number == 47 else (fap.i_limits[1], fap.p_limits[1])
             for name, limit in zip(LISTS, (intra, -intra, predicted, -predicted), strict=True):
-                whole = -(-abs(limit) // RANGE_UNIT) * RANGE_UNIT
-                self.limits[name][fap.number] = whole if limit > 0 else -whole
+                rounded = -(-abs(limit) // RANGE_UNIT) * RANGE_UNIT
+                self.limits[name][fap.number] = rounded if limit > 0 else -rounded
 
     @property
     def divisor(self) -> int:
-        """What range limits are divided by, and steps multiplied with."""
+        """Divisor of range limits, and factor of steps."""
         quant = self.quant or 0
         return max(1, quant if self.kind == "fap" else PREDICTION_SCALE[quant])
 
@@ -86,7 +87,7 @@ class Part:
         return [number for group in self.ranged_groups for number in group if number in self.mask]
 
     def read_header(self, reader: Reader) -> None:
-        """What an I plane says about this half, and fresh models."""
+        """Read the header of this half in an I plane, and reset the models."""
         kind = self.kind
         self.quant = reader.number(f"{kind}_quant", 5, kind)
         self._read_masks(reader)
@@ -107,6 +108,7 @@ class Part:
         self._make_slots(reader)
 
     def _read_masks(self, reader: Reader) -> None:
+        """Read mask types and group masks."""
         self.mask_types, mask = [], set[int]()
         for group, numbers in enumerate(self.groups, 1):
             section = f"{self.kind} group {group}"
@@ -126,6 +128,7 @@ class Part:
         self.mask = frozenset(mask)
 
     def _read_list(self, reader: Reader, name: str) -> None:
+        """Read a range list."""
         section = f"{self.kind} ranges"
         sign = 1 if name.endswith("max") else -1
         for numbers in self.ranged_groups:
@@ -137,6 +140,7 @@ class Part:
                     self.limits[name][number] = sign * RANGE_UNIT * code
 
     def _make_slots(self, reader: Reader) -> None:
+        """Make the slots of the main segment from mask and limits."""
         self.slots = {}
         for number in self.low_level:
             if any(number not in self.limits[name] for name in LISTS):
@@ -144,7 +148,7 @@ class Part:
                     f"{self.labels[number]} is masked in, but its range was never sent, and extension BAPs "
                     "have none by default; a writer must send all four range lists"
                 )
-            # Integer division toward zero, of the limits as they were sent or stand in the table.
+            # integer division towards zero, of the limits as sent or as in the table
             i_max, i_min, p_max, p_min = (
                 abs(self.limits[name][number]) // self.divisor * (1 if self.limits[name][number] > 0 else -1)
                 for name in LISTS
@@ -155,27 +159,27 @@ class Part:
             )
 
     def read_values(self, reader: Reader, *, intra: bool) -> dict[int, int]:
-        """The main segment; returns value by parameter number, in coding order."""
+        """Read the main segment; return values by parameter number, in coding order."""
         numbers = self.low_level
         read_segment(reader, f"{self.kind}s", self.kind, [self.slots[n] for n in numbers], intra=intra)
         return {number: self.slots[number].value for number in numbers}
 
 
 def read_segment(reader: Reader, name: str, section: str, slots: list[Slot], *, intra: bool) -> None:
-    """One arithmetic segment into its slots; noted as an element even where it codes nothing."""
+    """Read an arithmetic segment into its slots; record it as an element even if it codes nothing."""
     tables = []
     for slot in slots:
         low, high = slot.limits[intra]
         if intra:
             low_p, high_p = slot.limits[False]
-            slot.model = FrequencyTable(high_p - low_p + 1)  # every I plane makes the P planes forget
+            slot.model = FrequencyTable(high_p - low_p + 1)  # every I plane resets the models of P planes
             tables.append(FrequencyTable(high - low + 1))
         else:
-            assert slot.model is not None  # an I plane of this half came first: `Walker` saw to it
+            assert slot.model is not None  # `Walker` makes sure that an I plane of this half came first
             tables.append(slot.model)
     symbols, start, inserted = reader.segment(f"{name} segment", tables, section, learn=not intra)
     levels = tuple(symbol + slot.limits[intra][0] for symbol, slot in zip(symbols, slots, strict=True))
     for slot, level in zip(slots, levels, strict=True):
         slot.value = level * slot.step + (0 if intra else slot.value)
     content = Levels(tuple(s.label for s in slots), levels, tuple(s.value for s in slots), inserted)
-    reader.note(start, f"{name} segment", content, section)
+    reader.record(start, f"{name} segment", content, section)

@@ -1,4 +1,4 @@
-"""Reading an FBA stream by name: every read leaves an `Element` that says what stood where."""
+"""Read an FBA stream by named elements; every read is recorded as an `Element`."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ TRAILING_BYTES_SHOWN = 16
 class Element:
     """One syntax element.
 
-    bit: its first bit, counted from the start of the data. bits: its length. plane: number of the plane
-    (0-based, in stream order) that it belongs to, None outside planes. name: as in the standard, with the
-    parameter where it belongs to one. value: an int, a string of bits for masks, or `Levels`. section:
-    the part of the syntax it stands in: object, plane, fap, bap, "fap ranges", ...
+    bit: its first bit, from the start of the data. bits: its length. plane: number of its plane (0-based, in
+    stream order), None outside planes. name: as in the standard, with the parameter if it belongs to one.
+    value: an int, a string of bits for masks, or `Levels`. section: its part of the syntax: object, plane,
+    fap, bap, "fap ranges", ...
     """
 
     bit: int
@@ -35,10 +35,11 @@ class Element:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Content of an arithmetic segment, parameter by parameter in coding order.
+    """Content of an arithmetic segment, by parameter in coding order.
 
-    parameters: their labels. levels: what was coded (in P planes the difference, in quantiser steps).
-    values: the parameters after it, in the standard's units. inserted: 1 bits inserted against start codes.
+    parameters: their labels. levels: as coded, in quantiser steps (in P planes, differences). values: of the
+    parameters after this plane, in the standard's units. inserted: number of 1 bits inserted against start
+    codes.
     """
 
     parameters: tuple[str, ...]
@@ -48,7 +49,7 @@ class Levels:
 
 
 class Reader:
-    """Takes elements from data and keeps them until `drain`."""
+    """Reads elements from data and records them until `drain`."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
@@ -59,21 +60,24 @@ class Reader:
 
     @property
     def bit(self) -> int:
+        """Position of the next bit."""
         return int(self.stream.pos)
 
     def drain(self) -> list[Element]:
-        """The elements taken since the last call."""
+        """Return the elements recorded since the last call."""
         elements, self._elements = self._elements, []
         return elements
 
     def error(self, message: str, *, bit: int | None = None) -> BitstreamError:
+        """Return an error in this plane, at the next bit or the given one."""
         return BitstreamError(message, plane=self.plane, bit=self.bit if bit is None else bit)
 
-    def note(self, bit: int, name: str, value: object, section: str) -> None:
-        """Keep an element that reaches from `bit` to here."""
+    def record(self, bit: int, name: str, value: object, section: str) -> None:
+        """Record an element from `bit` to the next bit."""
         self._elements.append(Element(bit, self.bit - bit, self.plane, name, value, section))
 
     def _need(self, name: str, bits: int) -> None:
+        """Raise BitstreamError if the data has fewer bits left."""
         if self.bit + bits > self.size:
             raise self.error(
                 f"{name}: needs {bits} bits, but the data ends after {self.size - self.bit}; "
@@ -81,23 +85,23 @@ class Reader:
             )
 
     def number(self, name: str, bits: int, section: str) -> int:
-        """An unsigned integer, most significant bit first."""
+        """Read an unsigned integer, most significant bit first."""
         self._need(name, bits)
         bit = self.bit
         value = int(self.stream.read(f"uint:{bits}"))
-        self.note(bit, name, value, section)
+        self.record(bit, name, value, section)
         return value
 
     def flags(self, name: str, bits: int, section: str) -> str:
-        """A row of flags as a string of 0 and 1."""
+        """Read a row of flags; return a string of 0 and 1."""
         self._need(name, bits)
         bit = self.bit
         value = str(self.stream.read(f"bin:{bits}"))
-        self.note(bit, name, value, section)
+        self.record(bit, name, value, section)
         return value
 
     def marker(self, section: str) -> None:
-        """A marker bit, which must be 1."""
+        """Read a marker bit, which must be 1."""
         if not self.number("marker_bit", 1, section):
             raise self.error(
                 f"marker_bit in {section} is 0, expected 1; the stream is damaged here or before",
@@ -107,9 +111,9 @@ class Reader:
     def segment(
         self, name: str, tables: Sequence[FrequencyTable], section: str, *, learn: bool
     ) -> tuple[tuple[int, ...], int, int]:
-        """An arithmetic segment: its symbols, its first bit and the number of inserted bits.
+        """Read an arithmetic segment; return its symbols, first bit and number of inserted bits.
 
-        The caller knows what the symbols mean, and notes the element.
+        The caller, which knows what the symbols mean, records the element.
         """
         start = self.bit
         segment = decode_segment(
@@ -119,12 +123,12 @@ class Reader:
         return segment.symbols, start, segment.inserted
 
     def stuffing_before_start_code(self, *, behind_start_code: bool = False) -> int | None:
-        """Bits of alignment stuffing between here and a start code; None where none follows.
+        """Return the number of stuffing bits before a start code; None if no start code follows.
 
-        Stuffing is a 0 and then 1s to the byte boundary: 1 to 8 bits. Where we are aligned already it may
-        be missing; behind another start code it must be, for there the byte 0x7F can begin a plane. (A P
-        plane with BAPs may look like stuffing and a start code in other places too: the guard against
-        emulation counts zeros in its segment only. A writer must set a plane start code before such a one.)
+        Stuffing is a 0 and then 1s up to the byte boundary: 1 to 8 bits. At a byte boundary it may be
+        missing; after another start code it must be missing, because there the byte 0x7F can begin a plane.
+        (Elsewhere, too, a P plane with BAPs may look like stuffing and a start code: the guard against
+        emulation counts zeros in its segment only. A writer must put a plane start code before such a plane.)
         """
         unaligned = -self.bit % 8
         for bits in (unaligned,) if unaligned else (0,) if behind_start_code else (0, 8):
@@ -136,28 +140,29 @@ class Reader:
         return None
 
     def only_stuffing_left(self) -> bool:
-        """Whether nothing but alignment stuffing stands between here and the end of the data."""
+        """Whether only alignment stuffing is left before the end of the data."""
         left = self.size - self.bit
         return left == 0 or (left <= 8 and str(self.stream.peek(f"bin:{left}")) == _stuffing(left))
 
     def start_code(self, stuffing: int) -> int:
-        """The start code behind so many bits of stuffing."""
+        """Read that many bits of stuffing, and a start code; return the code."""
         if stuffing:
             self.flags("alignment stuffing", stuffing, "object")
         bit = self.bit
         self._need("start code", START_CODE_BITS)
         code = int(self.stream.read(f"uint:{START_CODE_BITS}"))
-        self.note(bit, START_CODES.get(code, "start_code"), code, "object")
+        self.record(bit, START_CODES.get(code, "start_code"), code, "object")
         return code
 
 
 def _stuffing(bits: int) -> str:
+    """Return stuffing as a string of 0 and 1."""
     return "0" + "1" * (bits - 1) if bits else ""
 
 
 OBJECT_START_CODES = (0x1BA, 0x101)
 PLANE_START_CODES = (0x1BB, 0x103)
-"""The second of each pair is what one vendor's older tools wrote."""
+"""The standard's code, and that of one vendor's older tools."""
 START_CODES = {
     0x1BA: "fba_object_start_code",
     0x101: "fba_object_start_code (old)",

@@ -1,11 +1,11 @@
-"""The adaptive arithmetic coder of FBA planes as a textbook has it: a linear search, plain integers.
+"""The adaptive arithmetic coder of FBA planes as in a textbook: a linear search, plain integers.
 
-ISO/IEC 14496-2, FBA object plane, predictive mode. Written to be read and to check a faster coder
-against, so it shares nothing with `fba.codec`.
+ISO/IEC 14496-2, FBA object plane, predictive mode. Written for clarity, to check a faster coder, so it
+shares no code with `fba.codec`.
 
-A segment is a run of symbols between a start (low 0, high 65535) and a flush. The decoder holds 16
-bits, of which the flush has written only 2: it has always read 14 bits of what follows. So the length
-of a segment is counted in bits shifted out, plus 2, and what it saw beyond is not judged.
+A segment is a run of symbols between a start (low 0, high 65535) and a flush. The decoder holds 16 bits, of
+which the flush wrote only 2: it has always read 14 bits of what follows. So the length of a segment is the
+number of bits shifted out, plus 2, and the bits beyond are not checked.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from fba.errors import BitstreamError
 
 HALF, QUARTER, TOP = 32768, 16384, 65535
 COUNT_LIMIT = 16383
-"""Sum of a table's counts at which they are halved."""
+"""Sum of a table's counts at which all are halved."""
 ZERO_RUN = 22
-"""After so many zero bits a 1 is inserted, so that no start code (23 zeros) can appear."""
+"""Number of zero bits after which a 1 is inserted, so that no start code (23 zeros) can appear."""
 REGISTER_BITS = 16
 FLUSH_BITS = 2
 
 
 class FrequencyTable:
-    """How often each symbol of an alphabet was seen; every count starts at 1.
+    """Counts of the symbols of an alphabet, which all start at 1.
 
-    Only counts above 1 are stored, as what they have more than 1, in the order of the symbols: of the
-    thousands of symbols of a wide range a stream uses a few dozen.
+    Only symbols with counts above 1 are stored, in order: of the thousands of symbols of a wide range a
+    stream uses a few dozen. extra: their counts minus 1.
     """
 
     def __init__(self, size: int) -> None:
@@ -39,9 +39,9 @@ class FrequencyTable:
         self.extra: list[int] = []
 
     def find(self, target: int) -> tuple[int, int, int]:
-        """The symbol whose share holds target (0 <= target < total), and the cumulated counts around it.
+        """Return the symbol at a target (0 <= target < total), and the cumulated counts around it.
 
-        Returns symbol, sum of the counts from it on, sum of the counts after it: symbol 0 has the top.
+        Returns symbol, sum of the counts from it on, and sum of the counts after it: symbol 0 is at the top.
         """
         symbol, above = 0, self.total
         for seen, extra in zip(self.symbols, self.extra, strict=True):
@@ -55,10 +55,10 @@ class FrequencyTable:
         return symbol + before, above - before, above - before - 1
 
     def share(self, symbol: int) -> tuple[int, int]:
-        """Sum of the counts from symbol on, and of those after it."""
-        at = bisect_left(self.symbols, symbol)
-        own = self.extra[at] if at < len(self.symbols) and self.symbols[at] == symbol else 0
-        above = self.size - symbol + sum(self.extra[at:])
+        """Return the sum of the counts from symbol on, and of those after it."""
+        position = bisect_left(self.symbols, symbol)
+        own = self.extra[position] if position < len(self.symbols) and self.symbols[position] == symbol else 0
+        above = self.size - symbol + sum(self.extra[position:])
         return above, above - 1 - own
 
     def learn(self, symbol: int) -> None:
@@ -68,19 +68,22 @@ class FrequencyTable:
             self.symbols = [s for s, _ in halved]
             self.extra = [e for _, e in halved]
             self.total = self.size + sum(self.extra)
-        at = bisect_left(self.symbols, symbol)
-        if at < len(self.symbols) and self.symbols[at] == symbol:
-            self.extra[at] += 1
+        position = bisect_left(self.symbols, symbol)
+        if position < len(self.symbols) and self.symbols[position] == symbol:
+            self.extra[position] += 1
         else:
-            self.symbols.insert(at, symbol)
-            self.extra.insert(at, 1)
+            self.symbols.insert(position, symbol)
+            self.extra.insert(position, 1)
         self.total += 1
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """symbols: one per table. bits: length in the stream, flush and inserted bits included.
-    inserted: how many of them are inserted 1 bits."""
+    """A decoded segment.
+
+    symbols: one for each table. bits: length in the stream, with flush and inserted bits. inserted: number of
+    inserted 1 bits.
+    """
 
     symbols: tuple[int, ...]
     bits: int
@@ -88,30 +91,34 @@ class Segment:
 
 
 class _GuardedBits:
-    """Bits of a segment with the inserted ones dropped; zeros for ever behind the end of the data."""
+    """Bits of a segment without the inserted ones; zeros after the end of the data."""
 
     def __init__(self, data: bytes, start: int) -> None:
         self.data = data
-        self.at = start
+        self.position = start
         self.zeros = 0
-        self.ends: list[int] = []  # where each bit handed out ends in the stream
-        self.insertions: list[int] = []  # how many bits had been handed out before each inserted one
-        self.violation: tuple[int, int] | None = None  # the same for an inserted 0, and its position
+        self.ends: list[int] = []  # position after each bit returned
+        self.insertions: list[int] = []  # number of bits returned before each inserted one
+        self.violation: tuple[int, int] | None = (
+            None  # the same for the first 0 in place of an inserted 1, and its position
+        )
 
     def _raw(self) -> int:
-        byte, shift = self.at >> 3, 7 - (self.at & 7)
-        self.at += 1
+        """Return the next bit of the stream."""
+        byte, shift = self.position >> 3, 7 - (self.position & 7)
+        self.position += 1
         return self.data[byte] >> shift & 1 if byte < len(self.data) else 0
 
     def next(self) -> int:
+        """Return the next bit that was not inserted."""
         if self.zeros == ZERO_RUN:
             self.insertions.append(len(self.ends))
             if not self._raw() and self.violation is None:
-                self.violation = len(self.ends), self.at - 1
+                self.violation = len(self.ends), self.position - 1
             self.zeros = 0
         bit = self._raw()
         self.zeros = 0 if bit else self.zeros + 1
-        self.ends.append(self.at)
+        self.ends.append(self.position)
         return bit
 
 
@@ -124,11 +131,11 @@ def decode_segment(
     name: str = "arithmetic segment",
     plane: int | None = None,
 ) -> Segment:
-    """Read one symbol per table from bit `start` of data; with `learn`, the tables count them.
+    """Read one symbol for each table from bit `start` of data; with `learn`, the tables count them.
 
-    Raises BitstreamError, with `name` and `plane` in it, where the data ends inside the segment, a run
-    of 22 zeros is not followed by a 1, or the segment does not close as a coder closes it: that finds
-    much of the damage that would otherwise turn into wrong values.
+    Raises BitstreamError with `name` and `plane` if the data ends inside the segment, 22 zeros are not
+    followed by a 1, or the segment does not close as a coder closes it: that finds much of the damage that
+    would otherwise become wrong values.
     """
     source = _GuardedBits(data, start)
     low, high, code = 0, TOP, 0
@@ -183,7 +190,7 @@ def decode_segment(
 
 
 def encode_segment(symbols: Sequence[int], tables: Sequence[FrequencyTable], *, learn: bool) -> str:
-    """The bits of a segment, as a string of 0 and 1: the inverse of `decode_segment`."""
+    """Return the bits of a segment as a string of 0 and 1: the inverse of `decode_segment`."""
     bits: list[str] = []
     zeros = pending = 0
 

@@ -1,14 +1,14 @@
-"""Seeded damage: mutated streams against what a decoder owes to bad input.
+"""Fuzz the decoder with mutated streams.
 
 `python -m fba_conformance.fuzz --count 100000 --seed 7 [STREAM.fba ...]` mutates small streams made here (or
-the files named) and holds the decoder to its contract, in both modes:
+the files named) and checks the contract of the decoder, in both modes:
 
-- an `FbaError`, or an animation that its own constructor accepts; never another exception;
-- the same frames and the same error whatever the chunks that the stream comes in;
-- in salvage mode all frames before the damage, and damage listed in order, within the stream;
-- now and then, the values that the independent reader (`fba_conformance.trace`) finds.
+- it raises an `FbaError` or returns an animation that is valid; it never raises another exception;
+- frames and errors do not depend on the chunks in which the stream comes;
+- in salvage mode it returns all frames before the damage, and lists damage in order, within the stream;
+- sometimes: its values are those of the independent reader (`fba_conformance.trace`).
 
-Every stream is made from the seed and its number alone: a finding names the command that repeats it.
+A stream depends on the seed and its number only: a finding prints the command that repeats it.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ START_CODES = (
     b"\0\0\1",
 )
 COMPARED_BYTES = 600
-"""Larger streams are not read by the independent reader, which takes a second for some kilobytes."""
+"""Largest stream that is compared: the independent reader takes a second for a few kilobytes."""
 
 
 class ContractError(AssertionError):
-    """The decoder did something that it must not do; the text says what."""
+    """The decoder broke its contract; the text says how."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A stream that broke the contract. number: of the mutation, with its seed enough to make it again."""
+    """A stream for which the decoder broke its contract. seed and number reproduce it."""
 
     seed: int
     number: int
@@ -63,7 +63,7 @@ class Finding:
 
 @dataclass
 class Report:
-    """What became of the streams. slowest: number of that which took longest, `worst` seconds."""
+    """Counts of a run. slowest: number of the stream that took longest, `worst` seconds."""
 
     count: int = 0
     decoded: int = 0
@@ -75,7 +75,7 @@ class Report:
     findings: list[Finding] = field(default_factory=list)
 
     def line(self) -> str:
-        """The counts in one line."""
+        """Return the counts in one line."""
         return (
             f"{self.count} streams: {self.decoded} decoded whole, {self.refused} refused, of these "
             f"{self.salvaged} salvaged in part; {self.compared} compared with the independent reader; "
@@ -84,9 +84,9 @@ class Report:
 
 
 def base_streams() -> list[bytes]:
-    """Small streams, tens to hundreds of bytes, which together have every element of the syntax."""
-    some = (3, 5, 19, 20, 48)
-    face = motion.face(5, faps_sent=some)
+    """Return small streams, tens to hundreds of bytes, that together have every element of the syntax."""
+    few_faps = (3, 5, 19, 20, 48)
+    face = motion.face(5, faps_sent=few_faps)
     talking = motion.face(4, faps_sent=(3, 4), high_level=True)
     body = motion.body(5, baps_sent=(1, 19, 124, 181, 186))
     mask = face.mask.copy()
@@ -98,7 +98,7 @@ def base_streams() -> list[bytes]:
         (make(face), {}),
         (make(talking), {"fap_quant": 9}),
         (make(None, body), {"bap_quant": 3}),
-        (make(motion.face(5, faps_sent=some, high_level=True), body), every_other),
+        (make(motion.face(5, faps_sent=few_faps, high_level=True), body), every_other),
         (make(gaps, body), every_other),
         (make(gaps, body), {}),
         (make(motion.face(6, faps_sent=(3,))), every_other),
@@ -115,9 +115,12 @@ def base_streams() -> list[bytes]:
     return streams
 
 
-def mutated(streams: Sequence[bytes], random: Random) -> bytes:
-    """One of the streams after one to four of: bits flipped, bytes changed, put in, taken out or doubled,
-    start codes put in, the end cut off, another stream's end put on."""
+def mutate(streams: Sequence[bytes], random: Random) -> bytes:
+    """Return one of the streams with one to four mutations.
+
+    Mutations flip a bit, change, insert, delete or repeat bytes, insert a start code, cut the end off, or
+    append the end of another stream.
+    """
     data = bytearray(random.choice(streams))
     for _ in range(random.choice((1, 1, 1, 2, 2, 3, 4))):
         random.choice(_MUTATIONS)(data, random, streams)
@@ -136,21 +139,21 @@ def _change(data: bytearray, random: Random, _: Sequence[bytes]) -> None:
 
 
 def _insert(data: bytearray, random: Random, _: Sequence[bytes]) -> None:
-    at = random.randrange(len(data) + 1)
+    position = random.randrange(len(data) + 1)
     byte = random.choice((0, 0xFF, random.randrange(256)))
-    data[at:at] = bytes([byte]) * random.choice((1, 1, 2, 3, 40))
+    data[position:position] = bytes([byte]) * random.choice((1, 1, 2, 3, 40))
 
 
 def _delete(data: bytearray, random: Random, _: Sequence[bytes]) -> None:
-    at = random.randrange(len(data) + 1)
-    del data[at : at + random.choice((1, 1, 2, 5, 30))]
+    position = random.randrange(len(data) + 1)
+    del data[position : position + random.choice((1, 1, 2, 5, 30))]
 
 
 def _double(data: bytearray, random: Random, _: Sequence[bytes]) -> None:
-    at = random.randrange(len(data) + 1)
-    piece = data[at : at + random.choice((1, 2, 4, 8, 50))]
-    to = random.randrange(len(data) + 1)
-    data[to:to] = piece * random.choice((1, 1, 3))
+    position = random.randrange(len(data) + 1)
+    piece = data[position : position + random.choice((1, 2, 4, 8, 50))]
+    target = random.randrange(len(data) + 1)
+    data[target:target] = piece * random.choice((1, 1, 3))
 
 
 def _truncate(data: bytearray, random: Random, _: Sequence[bytes]) -> None:
@@ -163,8 +166,8 @@ def _splice(data: bytearray, random: Random, streams: Sequence[bytes]) -> None:
 
 
 def _start_code(data: bytearray, random: Random, _: Sequence[bytes]) -> None:
-    at = random.randrange(len(data) + 1)
-    data[at : at + random.choice((0, 0, 4))] = random.choice(START_CODES)
+    position = random.randrange(len(data) + 1)
+    data[position : position + random.choice((0, 0, 4))] = random.choice(START_CODES)
 
 
 _MUTATIONS: tuple[Callable[[bytearray, Random, Sequence[bytes]], None], ...] = (
@@ -180,23 +183,25 @@ def fuzz(
     first: int = 0,
     compare_every: int = 50,
 ) -> Report:
-    """Check mutations number first..first + count of a seed. compare_every: how often with the
-    independent reader; 0 for never."""
+    """Check the mutations first..first + count of a seed.
+
+    compare_every: compare every `compare_every`-th one with the independent reader; 0 for none.
+    """
     streams = base_streams() if streams is None else streams
     report = Report()
     for number in range(first, first + count):
         random = Random(f"{seed} {number}")
-        data = mutated(streams, random)
+        data = mutate(streams, random)
         begin = time.perf_counter()
         try:
-            whole, salvaged = check(data, random)
-            report.decoded += whole
-            report.refused += not whole
+            complete, salvaged = check(data, random)
+            report.decoded += complete
+            report.refused += not complete
             report.salvaged += salvaged
             if compare_every and number % compare_every == 0 and len(data) <= COMPARED_BYTES:
                 report.compared += 1
                 compare(data)
-        except Exception:  # whatever it is: finding it is what this is for
+        except Exception:  # any other exception is a finding
             report.findings.append(Finding(seed, number, data, traceback.format_exc(limit=-4)))
         seconds = time.perf_counter() - begin
         if seconds > report.worst:
@@ -206,42 +211,46 @@ def fuzz(
 
 
 def check(data: bytes, random: Random) -> tuple[bool, bool]:
-    """Hold the decoder to its contract on one stream: (decoded whole, else: salvaged in part)."""
+    """Check the decoder's contract on one stream; return whether it was decoded, else whether salvaged.
+
+    Raises ContractError.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        blocks, error, _ = _decoded(data, [len(data)], "raise")
-        ours = _flat(blocks)
+        blocks, error, _ = _decode(data, [len(data)], "raise")
+        ours = _frames(blocks)
         cuts = sorted(random.randrange(len(data) + 1) for _ in range(random.choice((1, 2, 8))))
-        if random.random() < 0.5:  # the salvaging decoder gets the chunks anyway
-            chunked, chunked_error, _ = _decoded(data, [*cuts, len(data)], "raise")
-            if _place(error) != _place(chunked_error):
+        if random.random() < 0.5:  # the salvaging decoder always gets chunks
+            chunked, chunked_error, _ = _decode(data, [*cuts, len(data)], "raise")
+            if _error_position(error) != _error_position(chunked_error):
                 raise ContractError(f"in chunks {cuts}: {chunked_error}; at once: {error}")
-            if ours != _flat(chunked):
+            if ours != _frames(chunked):
                 raise ContractError(f"other frames in chunks {cuts} than at once")
-        salvaged, fatal, decoder = _decoded(data, [*cuts, len(data)], "salvage")
+        salvaged, fatal, decoder = _decode(data, [*cuts, len(data)], "salvage")
         if fatal is not None and (salvaged or not decoder.damage):
             raise ContractError(f"a salvaging decoder raised {fatal!r}")
-        rest = _flat(salvaged)
-        earlier = rest and ours and rest[0].bit < ours[0].bit  # joined where no object start code stands
+        rest = _frames(salvaged)
+        earlier = rest and ours and rest[0].bit < ours[0].bit  # began without an object start code
         if rest[: len(ours)] != ours and not earlier:
             raise ContractError(
                 f"{len(rest)} frames salvaged that do not begin with the {len(ours)} good ones"
             )
-        at = 0
+        lost_to = 0
         for damage in decoder.damage:
-            if not at <= damage.start <= damage.stop <= len(data):
+            if not lost_to <= damage.start <= damage.stop <= len(data):
                 raise ContractError(f"damage {damage} out of order or out of the stream ({len(data)} bytes)")
-            at = damage.stop
+            lost_to = damage.stop
         if error is not None and not decoder.damage:
             raise ContractError(f"{error} went unmentioned by the salvaging decoder")
         if salvaged:
-            _animation(salvaged)
+            _check_tracks(salvaged)
         if random.random() < 0.2:
             _check_probe(data, len(rest))
         return error is None, bool(rest) and error is not None
 
 
 def _check_probe(data: bytes, expected: int) -> None:
+    """Raise ContractError if `probe_stream` counts another number of frames."""
     try:
         frames = probe_stream(data).frames
     except FbaError:
@@ -251,10 +260,13 @@ def _check_probe(data: bytes, expected: int) -> None:
 
 
 def compare(data: bytes) -> None:
-    """Hold the decoder's planes against those of the independent reader, as far as both go."""
+    """Compare the decoder's planes with those of the independent reader, as far as both read.
+
+    Raises ContractError.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        blocks, _, _ = _decoded(data, [len(data)], "raise")
+        blocks, _, _ = _decode(data, [len(data)], "raise")
         ours = plane_records([frame for block in blocks for frame in block.frames()])
         reader = independent_planes(data)
         for number, record in enumerate(ours):
@@ -265,7 +277,7 @@ def compare(data: bytes) -> None:
                     return
                 raise ContractError(f"the independent reader stops at plane {number}: {error}") from error
             if other is None:
-                return  # it reads one object, and stricter alignment
+                return  # it reads only one object, and checks alignment more strictly
             expected = {
                 "intra": other["intra"],
                 "skip": other["skip"],
@@ -281,11 +293,13 @@ def compare(data: bytes) -> None:
                 raise ContractError(f"plane {number}: {wrong} differ from the independent reader's")
 
 
-def _place(error: FbaError | None) -> tuple[object, ...]:
+def _error_position(error: FbaError | None) -> tuple[object, ...]:
+    """Return type, plane and bit of an error."""
     return type(error), getattr(error, "plane", None), getattr(error, "bit", None)
 
 
-def _decoded(data: bytes, stops: Sequence[int], mode: str) -> tuple[list[Block], FbaError | None, Decoder]:
+def _decode(data: bytes, stops: Sequence[int], mode: str) -> tuple[list[Block], FbaError | None, Decoder]:
+    """Decode data in chunks that end at `stops`; return blocks, error and decoder."""
     decoder = Decoder(on_error=mode)  # type: ignore[arg-type]
     blocks: list[Block] = []
     start = 0
@@ -300,16 +314,16 @@ def _decoded(data: bytes, stops: Sequence[int], mode: str) -> tuple[list[Block],
     return blocks, None, decoder
 
 
-class _Seen(NamedTuple):
-    """Everything about a frame that was decoded; its first bit in the stream."""
+class _DecodedFrame(NamedTuple):
+    """A decoded frame: its first bit in the stream, and everything else about it."""
 
     bit: int
     content: tuple[object, ...]
 
 
-def _flat(blocks: list[Block]) -> list[_Seen]:
-    """The frames, however the blocks are cut."""
-    frames: list[_Seen] = []
+def _frames(blocks: list[Block]) -> list[_DecodedFrame]:
+    """Return the frames, independent of their division into blocks."""
+    frames: list[_DecodedFrame] = []
     for block in blocks:
         tracks = []
         if block.face is not None:
@@ -319,12 +333,12 @@ def _flat(blocks: list[Block]) -> list[_Seen]:
         for position, index in enumerate(block.index.tolist()):
             after = int(block.borders[position + 1])
             values = tuple(track[position].tobytes() for track in tracks)
-            frames.append(_Seen(int(block.borders[position]), (index, block.rate, after, *values)))
+            frames.append(_DecodedFrame(int(block.borders[position]), (index, block.rate, after, *values)))
     return frames
 
 
-def _animation(blocks: list[Block]) -> None:
-    """Whether the blocks' frames are what the constructors of the data model accept."""
+def _check_tracks(blocks: list[Block]) -> None:
+    """Construct the data model from copies of the blocks' frames, which checks them."""
     for block in blocks:
         face, body = block.face, block.body
         if face is not None:
@@ -335,7 +349,7 @@ def _animation(blocks: list[Block]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; 1 where there were findings."""
+    """Run the command line; return 1 if there were findings."""
     parser = argparse.ArgumentParser(
         prog="python -m fba_conformance.fuzz", description=(__doc__ or "").split("\n")[0]
     )
@@ -343,9 +357,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0, metavar="NUMBER", help="number of the first mutation")
     parser.add_argument(
-        "--compare-every", type=int, default=50, metavar="N", help="with the independent reader"
+        "--compare-every",
+        type=int,
+        default=50,
+        metavar="N",
+        help="compare every N-th with the independent reader; 0: none (default 50)",
     )
-    parser.add_argument("--save", type=Path, metavar="FOLDER", help="where to keep streams that were found")
+    parser.add_argument("--save", type=Path, metavar="FOLDER", help="save streams with findings here")
     parser.add_argument("streams", nargs="*", type=Path, help="streams to mutate instead of those made here")
     chosen = parser.parse_args(arguments)
     streams = [path.read_bytes() for path in chosen.streams] or None

@@ -1,7 +1,7 @@
-"""Writes the test vectors: `python -m fba_conformance.generate [FOLDER]`.
+"""Write the test vectors: `python -m fba_conformance.generate [FOLDER]`.
 
-Every stream is read with the independent decoder, and its values go into the index as a digest: the
-codec that is tested has no say in what is right. Streams that both read differently are refused.
+The independent decoder reads every stream, and the digest of its values goes into the index, so that the
+tested codec does not define what is right. A stream that the two decode differently is an error.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fba_conformance.trace import decode_values
 
 
 def generate(folder: Path) -> list[dict[str, Any]]:
-    """Write all vectors and their index into a folder; the index."""
+    """Write all vectors and their index into a folder; return the index."""
     folder.mkdir(parents=True, exist_ok=True)
     index = []
     for case in cases():
@@ -34,7 +34,7 @@ def generate(folder: Path) -> list[dict[str, Any]]:
 
 
 def index_entry(case: Case, data: bytes) -> dict[str, Any]:
-    """What the index says of a stream, by the independent decoder."""
+    """Return the entry of a stream in the index, from the independent decoder."""
     records = [_record(plane) for plane in decode_values(data, bap_steps=case.bap_steps)]
     return {
         "stream": f"{case.name}.fba",
@@ -47,6 +47,7 @@ def index_entry(case: Case, data: bytes) -> dict[str, Any]:
 
 
 def _record(plane: dict[str, Any]) -> dict[str, Any]:
+    """Return the part of a plane's content that the digest covers."""
     return {
         "intra": bool(plane["intra"]),
         "skip": plane["skip"],

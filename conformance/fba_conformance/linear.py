@@ -1,9 +1,8 @@
-"""The arithmetic coder as the textbooks write it, compiled: what `bench/` measures the codec against.
+"""A textbook arithmetic coder, compiled, with which `bench/` compares the codec.
 
-Witten, Neal and Cleary's adaptive coder with its cumulative counts in plain arrays: a symbol is found
-by walking along them, and a count is raised by raising every cumulative count above it. Same integers,
-same bits as `fba.codec._plane.arithmetic`, which keeps its counts in trees, and the same guard against start
-codes, so that both do the same work for every bit.
+Witten, Neal and Cleary's adaptive coder with cumulative counts in plain arrays: finding a symbol is a linear
+search, and raising a count raises every cumulative count above it. It makes the same bits as
+`fba.codec._plane.arithmetic`, which has its counts in trees, with the same guard against start codes.
 """
 
 from __future__ import annotations
@@ -24,21 +23,22 @@ def reset(cumulative: Int64, size: int) -> None:
 
 @compiled
 def _learn(cumulative: Int64, model: int, symbol: int, size: int) -> None:
+    """Raise the count of a symbol, halving the counts of a full model."""
     if cumulative[model, 0] == 16383:
         total = 0
         following = int(cumulative[model, size])
-        for one in range(size - 1, -1, -1):
-            here = int(cumulative[model, one])
+        for index in range(size - 1, -1, -1):
+            here = int(cumulative[model, index])
             total += (here - following + 1) // 2
-            cumulative[model, one] = total
+            cumulative[model, index] = total
             following = here
-    for one in range(symbol + 1):
-        cumulative[model, one] += 1
+    for index in range(symbol + 1):
+        cumulative[model, index] += 1
 
 
 @compiled
 def encode(data: UInt8, symbols: Int64, size: int, cumulative: Int64) -> int:
-    """Encode symbols (T, models), one segment a row, into zeroed `data`; bits written."""
+    """Encode symbols (T, models), one segment for each row, into zeroed `data`; return the bits written."""
     bit = 0
     for row in range(symbols.shape[0]):
         low, high, pending, zeros = 0, 65535, 0, 0
@@ -88,7 +88,7 @@ def encode(data: UInt8, symbols: Int64, size: int, cumulative: Int64) -> int:
 
 @compiled
 def decode(data: UInt8, symbols: Int64, size: int, cumulative: Int64) -> int:
-    """Decode rows of symbols (T, models) from `data`, which has 16 bytes to spare; bits read."""
+    """Decode rows of symbols (T, models) from `data`, which has 16 more bytes; return the bits read."""
     bit = 0
     for row in range(symbols.shape[0]):
         low, high, code, zeros, taken, guard_at = 0, 0, 0, 0, 0, -1

@@ -1,4 +1,4 @@
-"""A trace as text for people and as plain dictionaries for programs."""
+"""Format a trace as text for people, or as dictionaries for programs."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from fba_conformance._reader import START_CODE_BITS, TRAILING_BYTES_SHOWN, Eleme
 
 HEADER = f"{'bit':>9} {'bits':>6} {'plane':>6}  element"
 NAMES_SHOWN = 8
-"""Levels other than 0 that a line names; the rest are counted."""
+"""Most levels other than 0 that a line names; further ones are counted."""
 
 
 def format_trace(elements: Iterable[Element], *, values: bool = False) -> Iterator[str]:
-    """A heading, then one line per element: bit, bits, plane, name = value.
+    """Yield a heading, then a line for each element: bit, bits, plane, name = value.
 
-    Of arithmetic segments the line tells how many parameters they code and names the first levels that
-    are not 0; with `values`, a line per parameter follows, with its level and its value.
+    The line of an arithmetic segment has the number of its parameters and the first levels that are not 0.
+    values: add a line with level and value for each parameter.
     """
     yield HEADER
     for element in elements:
@@ -29,7 +29,7 @@ def format_trace(elements: Iterable[Element], *, values: bool = False) -> Iterat
 
 
 def element_dict(element: Element) -> dict[str, Any]:
-    """The same as JSON has it; levels and values of a segment by parameter."""
+    """Return an element as a dictionary for JSON; levels and values of a segment by parameter."""
     record: dict[str, Any] = {
         "bit": element.bit,
         "bits": element.bits,
@@ -50,6 +50,7 @@ def element_dict(element: Element) -> dict[str, Any]:
 
 
 def _text(element: Element) -> str:
+    """Return the value of an element as text."""
     content = element.value
     if isinstance(content, Levels):
         return _summary(content)
@@ -63,6 +64,7 @@ def _text(element: Element) -> str:
 
 
 def _summary(content: Levels) -> str:
+    """Return the number of levels of a segment, and the first that are not 0."""
     changed = [
         f"{label} {level:+d}"
         for label, level in zip(content.parameters, content.levels, strict=True)

@@ -1,7 +1,7 @@
-"""Runs this codec over test vectors: decoded values and encoded bytes must be exact.
+"""Run this codec over test vectors: decoded values and encoded bytes must be exact.
 
-Two kinds of folders: the vectors that come with fba (`conformance/vectors`: an index of digests), and
-folders whose index names the files that another decoder made: `stream`, `bap_steps`, `decoded_fap`,
+There are two kinds of folders: the vectors that come with fba (`vectors`, with digests in the index), and
+folders whose index names the files that another decoder wrote: `stream`, `bap_steps`, `decoded_fap`,
 `decoded_bap`, `epf`, `source_fap`, `source_bap`, `same_bytes`.
 """
 
@@ -24,7 +24,7 @@ OWN = Path(__file__).with_name("vectors")
 
 @dataclass(frozen=True)
 class Vector:
-    """One entry of an index, and the folder that its files lie in."""
+    """An entry of an index, and the folder of its files."""
 
     folder: Path
     entry: dict[str, Any]
@@ -40,14 +40,17 @@ class Vector:
         return str(self.entry.get("bap_steps", "iso"))
 
     def path(self, key: str) -> Path | None:
-        """The path of a file of the vector, None where it has none."""
+        """Return the path of a file of the vector, or None if there is none."""
         return self.folder / self.entry[key] if key in self.entry else None
 
 
 @dataclass(frozen=True)
 class Result:
-    """decoded, encoded: whether they are exact; encoded is None where bytes are not to be compared.
-    message: what was wrong."""
+    """Result of a vector.
+
+    decoded, encoded: whether values and bytes are exact; encoded is None if bytes are not compared. message:
+    what was wrong.
+    """
 
     name: str
     decoded: bool
@@ -56,22 +59,22 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """Whether it was decoded exactly, and encoded exactly where that was tried."""
+        """Whether it was decoded exactly, and encoded exactly if that was tried."""
         return self.decoded and self.encoded is not False
 
     def to_dict(self) -> dict[str, Any]:
-        """The verdict for JSON."""
+        """Return the result for JSON."""
         return {**asdict(self), "passed": self.passed}
 
     def line(self) -> str:
-        """The verdict in one line of text."""
+        """Return the result in one line of text."""
         words = {True: "exact", False: "WRONG", None: "-"}
         text = f"{self.name}: decoded {words[self.decoded]}, encoded {words[self.encoded]}"
         return f"{text}: {self.message}" if self.message else text
 
 
 def vectors(folder: Path | None = None) -> list[Vector]:
-    """The vectors of a folder, or those that come with fba. Raises FormatError without a usable index."""
+    """Return the vectors of a folder, or those that come with fba. FormatError without a valid index."""
     folder = folder or OWN
     index = folder / "index.json"
     try:
@@ -84,7 +87,7 @@ def vectors(folder: Path | None = None) -> list[Vector]:
 
 
 def check(vector: Vector) -> Result:
-    """Decode a vector and, where it can be, encode it again."""
+    """Decode a vector and, if its bytes can be reproduced, encode it again."""
     stream = vector.folder / vector.name
     try:
         with warnings.catch_warnings():
@@ -93,26 +96,29 @@ def check(vector: Vector) -> Result:
             decoder = Decoder(bap_steps=vector.bap_steps)
             frames = decoder.push(data) + decoder.finish()
             wrong = (
-                _wrong_digest(vector, frames) if "values" in vector.entry else _wrong_files(vector, frames)
+                _check_digest(vector, frames) if "values" in vector.entry else _check_files(vector, frames)
             )
             if wrong:
                 return Result(vector.name, False, None, wrong)
             if not vector.entry.get("same_bytes", False):
                 return Result(vector.name, True, None)
-            again = _encoded(vector, frames)
+            again = _encode(vector, frames)
     except (FbaError, OSError) as error:
         return Result(vector.name, False, None, str(error))
     if again == data:
         return Result(vector.name, True, True)
     pairs = enumerate(zip(again, data, strict=False))
-    at = next((i for i, (one, other) in pairs if one != other), min(len(again), len(data)))
+    position = next((i for i, (ours, theirs) in pairs if ours != theirs), min(len(again), len(data)))
     return Result(
-        vector.name, True, False, f"{len(again)} bytes, expected {len(data)}; they differ from {at} on"
+        vector.name,
+        True,
+        False,
+        f"{len(again)} bytes, expected {len(data)}; they differ from byte {position} on",
     )
 
 
 def plane_records(frames: Iterable[Frame]) -> list[dict[str, Any]]:
-    """What the planes of decoded frames carry, in the form that the independent reader gives it."""
+    """Return the content of the planes of decoded frames, in the form of the independent reader."""
     records = []
     for frame in frames:
         record: dict[str, Any] = {
@@ -138,20 +144,21 @@ def plane_records(frames: Iterable[Frame]) -> list[dict[str, Any]]:
 
 
 def digest(records: Sequence[dict[str, Any]]) -> str:
-    """A fingerprint of `plane_records`."""
+    """Return a digest of `plane_records`, as hexadecimal text."""
     lines = (json.dumps(record, sort_keys=True, separators=(",", ":")) for record in records)
     return sha256("\n".join(lines).encode()).hexdigest()
 
 
-def _wrong_digest(vector: Vector, frames: list[Frame]) -> str:
+def _check_digest(vector: Vector, frames: list[Frame]) -> str:
+    """Return how decoded frames differ from the digest in the index, or ""."""
     records = plane_records(frames)
     if len(records) != vector.entry["planes"]:
         return f"{len(records)} planes, expected {vector.entry['planes']}"
     return "" if digest(records) == vector.entry["values"] else "the decoded values differ"
 
 
-def _wrong_files(vector: Vector, frames: list[Frame]) -> str:
-    """How decoded frames differ from the FAP and BAP files of another decoder, which numbers planes."""
+def _check_files(vector: Vector, frames: list[Frame]) -> str:
+    """Return how decoded frames differ from the files of another decoder, or ""; it numbers planes."""
     from fba.formats.text.bap import read_bap
     from fba.formats.text.fap import read_fap
 
@@ -171,7 +178,8 @@ def _wrong_files(vector: Vector, frames: list[Frame]) -> str:
     return ""
 
 
-def _encoded(vector: Vector, frames: list[Frame]) -> bytes:
+def _encode(vector: Vector, frames: list[Frame]) -> bytes:
+    """Return the stream encoded again, from its EPF file and source or from the decoded planes."""
     from fba.formats import merge
     from fba.formats.epf.epf import read_epf
     from fba.formats.text.bap import read_bap

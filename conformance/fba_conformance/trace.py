@@ -1,8 +1,7 @@
-"""Every syntax element of an FBA stream in order, with its bit position, and the values it makes.
+"""Read an FBA stream independently of `fba.codec`: its syntax elements with bit positions, and its values.
 
-An independent reading of ISO/IEC 14496-2, FBA object: it shares no code with `fba.codec` and is
-hundreds of times slower. `trace` for people who look for what is wrong with a stream, `decode_values`
-to compare a decoder with.
+Implements ISO/IEC 14496-2, FBA object, without code of `fba.codec`, and is hundreds of times slower. Use
+`trace` to find what is wrong with a stream, `decode_values` to check a decoder.
 """
 
 from __future__ import annotations
@@ -31,16 +30,16 @@ __all__ = ["Element", "Levels", "Walker", "decode_values", "element_dict", "form
 
 FAP_BIT, BAP_BIT = 1, 2
 SKIP_MORE = 15
-"""A word of number_of_frames_to_skip that says that another one follows."""
+"""Value of a word of number_of_frames_to_skip after which another word follows."""
 
 
 def trace(data: bytes, *, bap_steps: str = "iso") -> Iterator[Element]:
-    """Every syntax element of a stream, in order.
+    """Yield every syntax element of a stream, in order.
 
-    bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it changes values only.
+    bap_steps: "iso" or "visage", the table of BAP steps that the writer used; it only changes values.
 
-    After damage it yields the elements before it, and then raises BitstreamError(plane, bit), which
-    names the element; UnsupportedError for DCT segments; ValueError for another bap_steps.
+    Yields the elements before damage, then raises BitstreamError(plane, bit), which names the damaged
+    element; UnsupportedError for DCT segments; ValueError for another bap_steps.
     """
     walker = Walker(data, bap_steps=bap_steps)
     more = True
@@ -54,7 +53,7 @@ def trace(data: bytes, *, bap_steps: str = "iso") -> Iterator[Element]:
 
 
 def planes(data: bytes, *, bap_steps: str = "iso") -> Iterator[dict[str, Any]]:
-    """What each plane says, in order; raises like `trace`, behind the last good plane.
+    """Yield the content of each plane, in order; raises like `trace`, after the last undamaged plane.
 
     Keys: number; bit and bits (where it starts and its length, start code and stuffing before it
     included); intra; parts (bit 0 FAPs, bit 1 BAPs); start_code (or None); rate (exact fraction or None
@@ -67,20 +66,20 @@ def planes(data: bytes, *, bap_steps: str = "iso") -> Iterator[dict[str, Any]]:
     walker = Walker(data, bap_steps=bap_steps)
     more = True
     while more:
-        done = walker.count
+        before = walker.count
         more = walker.step()
         walker.reader.drain()
-        if walker.count > done:
+        if walker.count > before:
             yield walker.record
 
 
 def decode_values(data: bytes, *, bap_steps: str = "iso") -> list[dict[str, Any]]:
-    """All of `planes` as a list. Of a stream from a stranger take `planes`: six bits can code a plane."""
+    """Return `planes` as a list. For untrusted streams use `planes`: a plane may have only six bits."""
     return list(planes(data, bap_steps=bap_steps))
 
 
 class Walker:
-    """Walks through one object, a plane a step. `record` describes the last plane (see `planes`)."""
+    """Reads one object, one plane at each step. `record` describes the last plane (see `planes`)."""
 
     def __init__(self, data: bytes, *, bap_steps: str = "iso") -> None:
         if bap_steps not in BAP_STEP_TABLES:
@@ -97,7 +96,7 @@ class Walker:
         self._started = False
 
     def step(self) -> bool:
-        """Read the next plane, with what stands before it; False when the object is over."""
+        """Read the next plane, with stuffing and start codes before it; False at the end of the object."""
         if not self._started:
             self._read_object_start()
             self._started = True
@@ -124,34 +123,36 @@ class Walker:
         return True
 
     def _read_object_start(self) -> None:
-        """The object's start code; visual object sequence and visual object headers may stand before it."""
+        """Read the object's start code; headers of visual object sequence and visual object may precede it."""
         reader = self.reader
-        found = min(
-            (at for code in OBJECT_START_CODES if (at := reader.data.find(code.to_bytes(4, "big"))) >= 0),
-            default=-1,
-        )
-        if found < 0 or not reader.data.startswith(b"\0\0\1"):
+        positions = [reader.data.find(code.to_bytes(4, "big")) for code in OBJECT_START_CODES]
+        start = min((position for position in positions if position >= 0), default=-1)
+        if start < 0 or not reader.data.startswith(b"\0\0\1"):
             raise reader.error(
                 f"an FBA object starts with {' or '.join(f'{c:08x}' for c in OBJECT_START_CODES)}, "
                 f"found {reader.data[:4].hex() or 'nothing'}"
                 f"{but_recognised(reader.data[:HEAD_BYTES]) or '; is this an FBA stream?'}",
                 bit=0,
             )
-        if found:
-            reader.stream.pos = 8 * found
-            shown = reader.data[: min(found, TRAILING_BYTES_SHOWN)].hex()
-            reader.note(0, "headers before the object", shown, "object")
+        if start:
+            reader.stream.pos = 8 * start
+            shown = reader.data[: min(start, TRAILING_BYTES_SHOWN)].hex()
+            reader.record(0, "headers before the object", shown, "object")
         reader.start_code(0)
 
     def _read_rest(self) -> None:
+        """Record all data after the object as one element."""
         reader = self.reader
         left = reader.size - reader.bit
         if left:
             bit = reader.bit
             reader.stream.pos = reader.size
-            reader.note(bit, "trailing data", reader.data[bit // 8 :][:TRAILING_BYTES_SHOWN].hex(), "object")
+            reader.record(
+                bit, "trailing data", reader.data[bit // 8 :][:TRAILING_BYTES_SHOWN].hex(), "object"
+            )
 
     def _read_plane(self) -> None:
+        """Read a plane into `record`."""
         reader = self.reader
         intra = bool(reader.number("is_intra", 1, "plane"))
         parts = reader.number("fba_object_mask", 2, "plane")
@@ -179,14 +180,15 @@ class Walker:
             self.record[f"{part.kind}_lists"] = part.lists_sent
 
     def _read_time(self, intra: bool) -> None:
+        """Read frame rate, time code and skip of a plane into `record`."""
         reader, record = self.reader, self.record
         record.update(frame_rate=None, time_code=None)
         if intra and reader.number("is_frame_rate", 1, "plane"):
-            whole = reader.number("frame_rate", 8, "plane")
+            integral = reader.number("frame_rate", 8, "plane")
             sixteenths = reader.number("seconds", 4, "plane")
             offset = reader.number("frequency_offset", 1, "plane")
-            record["frame_rate"] = (whole, sixteenths, offset)
-            self.rate = (whole + Fraction(sixteenths, 16)) * (Fraction(1000, 1001) if offset else 1)
+            record["frame_rate"] = (integral, sixteenths, offset)
+            self.rate = (integral + Fraction(sixteenths, 16)) * (Fraction(1000, 1001) if offset else 1)
         if intra and reader.number("is_time_code", 1, "plane"):
             hours = reader.number("time_code_hours", 5, "plane")
             minutes = reader.number("time_code_minutes", 6, "plane")
@@ -212,6 +214,7 @@ class Walker:
             self.clock = self.clock + (1 + skip) / self.rate if self.rate else None
 
     def _read_faps(self, intra: bool) -> None:
+        """Read the FAP half of a plane into `record`."""
         reader, fap = self.reader, self.fap
         if intra:
             fap.read_header(reader)

@@ -67,8 +67,8 @@ def test_mutated_streams(checked_process: subprocess.Popen[str]) -> None:
 
 def test_mutations_are_made_from_their_numbers() -> None:
     streams = fuzz.base_streams()
-    one = [fuzz.mutated(streams, fuzz.Random(f"5 {number}")) for number in range(200)]
-    again = [fuzz.mutated(streams, fuzz.Random(f"5 {number}")) for number in range(200)]
+    one = [fuzz.mutate(streams, fuzz.Random(f"5 {number}")) for number in range(200)]
+    again = [fuzz.mutate(streams, fuzz.Random(f"5 {number}")) for number in range(200)]
     assert one == again
     assert len(set(one)) > 150
     assert sum(stream in streams for stream in one) < 40
