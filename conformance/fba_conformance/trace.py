@@ -123,7 +123,7 @@ class Walker:
         return True
 
     def _read_object_start(self) -> None:
-        """Read the object's start code; headers of visual object sequence and visual object may precede it."""
+        """Read the object's start code; visual object sequence and visual object headers may precede."""
         reader = self.reader
         positions = [reader.data.find(code.to_bytes(4, "big")) for code in OBJECT_START_CODES]
         start = min((position for position in positions if position >= 0), default=-1)

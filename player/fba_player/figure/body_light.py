@@ -14,7 +14,7 @@ import numpy as np
 
 from fba.arrays import Array, Float32, Float64, Int32, Integer
 from fba.body.model import BodyModel
-from fba.cache import kept, key_of
+from fba.cache import load_or_make, make_key
 from fba.compiled import compiled, is_compiled
 from fba_player.figure.face_light import KEY_DIRECTION, cached_visibility
 from fba_player.mesh.simplify import DetailLevels
@@ -133,8 +133,8 @@ def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
     if total < LARGE:
         near, shares = make()
         return near, shares
-    key = key_of("near", MAKING, *parts, *rows)
-    near, shares = kept(key, ((total, NEAREST),) * 2, make, [np.int32, np.float32])
+    key = make_key("near", MAKING, *parts, *rows)
+    near, shares = load_or_make(key, ((total, NEAREST),) * 2, make, [np.int32, np.float32])
     if near.min() < 0 or near.max() >= sum(map(len, rows)):
         near, shares = make()
     return near, shares

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
-from fba.cache import kept
+from fba.cache import load_or_make
 from fba.compiled import is_compiled
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
@@ -161,7 +161,7 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
         digest.update(np.ascontiguousarray(array).data)
     count = len(within)
     shapes = ((count, HARMONICS), (count, HARMONICS), (count,))
-    arrays = kept(f"light-{digest.hexdigest()[:32]}", shapes, make) if is_compiled() else make()
+    arrays = load_or_make(f"light-{digest.hexdigest()[:32]}", shapes, make) if is_compiled() else make()
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 

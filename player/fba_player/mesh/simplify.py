@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Int32
-from fba.cache import kept
+from fba.cache import load_or_make
 from fba.compiled import is_compiled
 
 TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
@@ -64,7 +64,7 @@ class DetailLevels:
             return list(simplify(self.points.astype(np.float64), self.poses, self.triangles))
 
         count = len(self.points)
-        onto, first = kept(f"coarse-{digest.hexdigest()[:32]}", ((count,), (count,)), make, np.int32)
+        onto, first = load_or_make(f"coarse-{digest.hexdigest()[:32]}", ((count,), (count,)), make, np.int32)
         if (onto < 0).any() or (onto >= count).any():
             onto, first = make()
         return onto, first

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Float32, Int32, UInt8
-from fba.cache import kept, key_of
+from fba.cache import load_or_make, make_key
 
 LARGEST = 4096
 """Wider or higher pictures are scaled down to this many pixels."""
@@ -43,7 +43,9 @@ class FacePicture:
         if len(data) < LARGE:
             (found,) = self._measured()
         else:
-            (found,) = kept(key_of("picture", MAKING, self._bytes), ((3,),), self._measured, np.int32)
+            (found,) = load_or_make(
+                make_key("picture", MAKING, self._bytes), ((3,),), self._measured, np.int32
+            )
             if found.min() < 0 or found.max() > LARGEST:
                 (found,) = self._measured()
         self.size = (int(found[0]), int(found[1]))
@@ -70,8 +72,8 @@ class FacePicture:
         if factor < 2 or len(self._data) < LARGE:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
-        key = key_of("texture", MAKING, factor, self._bytes)
-        (found,) = kept(key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8)
+        key = make_key("texture", MAKING, factor, self._bytes)
+        (found,) = load_or_make(key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8)
         return found
 
     def _measured(self) -> list[Int32]:
@@ -114,8 +116,8 @@ def skin_relief() -> UInt8:
 
     From pores to the coarser grain seen from further away; always the same, stored in the disk cache.
     """
-    key = key_of("relief", RELIEF_MAKING, RELIEF_SIZE, SPREAD, SHARES)
-    (found,) = kept(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
+    key = make_key("relief", RELIEF_MAKING, RELIEF_SIZE, SPREAD, SHARES)
+    (found,) = load_or_make(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
     return found
 
 
