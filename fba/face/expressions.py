@@ -1,4 +1,4 @@
-"""What the 14 visemes and the 6 expressions look like: their FAPs at full intensity.
+"""Definitions of the 14 visemes and the 6 expressions: their FAPs at full intensity.
 
 `definitions.csv` lists them for the left half and the midline; the right half and the outer lips
 follow from their mates. Profiles of the expressions after the measured vocabularies of the six
@@ -36,9 +36,9 @@ VISEME_NAMES = (
     "Q",
     "U",
 )
-"""What viseme_select stands for: example phonemes."""
+"""Example phonemes by viseme_select."""
 EXPRESSION_NAMES = ("none", "joy", "sadness", "anger", "fear", "disgust", "surprise")
-"""What expression_select stands for."""
+"""Names of expressions by expression_select."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Eyeballs of a face model, measured: the sphere through each, its gaze, its iris and its pupil."""
+"""Measures the eyeballs of a face model: the sphere through each, its gaze and its pupil."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PUPIL_POINT = {"left": "3.5", "right": "3.6"}
 LID_POINTS = {"left": ("3.1", "3.3"), "right": ("3.2", "3.4")}
 """Middles of the upper and the lower lid margin."""
 FEWEST_VERTICES = 8
-"""Fewer vertices do not say where a sphere is."""
+"""Fewest vertices that determine a sphere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ def symmetry_plane(points: Float64) -> float:
 def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
     """(centre, radius, error, share) of the sphere through most of a part's vertices, None for too few.
 
-    Least squares, again and again without what lies far off: a cornea or an iris does not pull at it.
+    Least squares, repeated without outliers, so that a cornea or an iris has no influence.
     """
     vertices = np.unique(part.vertices.astype(np.float64), axis=0)
     if len(vertices) < FEWEST_VERTICES:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 MOST_VERTICES = 250_000
-"""A denser mesh is refused: it shows nothing more, and would take minutes and gigabytes."""
+"""Denser meshes are refused: they show no more, and would take minutes and gigabytes."""
 EYE_FAPS = {"left": (23, 25, 27), "right": (24, 26, 28)}
 PUPIL_FAPS = {"left": 29, "right": 30}
 HEAD_AXES = {48: (1.0, 0.0, 0.0), 49: (0.0, 1.0, 0.0), 50: (0.0, 0.0, 1.0)}
@@ -165,7 +165,7 @@ class _Authoring:
                 )
 
     def _surface(self, fap: int, motion: Motion) -> None:
-        """A motion of the surface, and of what it carries."""
+        """Add a motion of the surface, and of the parts attached to it, to a FAP."""
         moves = split_by_part(self.marks.surface, motion)
         for name, anchors in self.anchors.items():
             moves[name] = anchors.carry(motion)
@@ -202,7 +202,7 @@ class _Authoring:
         motion = unfold(self.marks.surface, self.limiter, unlimited, self._pinned(), True)
         motion = stop_at_folds(self.limiter, motion, turning=True)
         self._surface(OPEN_JAW, motion)
-        # what the skin stops at, teeth and tongue stop at too
+        # teeth and tongue stop where the skin stops
         reached = jaw_angles_at_values(motion, values, angles)
         for part in self.parts:
             if part.name in shares:
@@ -213,7 +213,7 @@ class _Authoring:
             self._slide(fap, found, shares)
 
     def _pinned(self) -> Bool:
-        """Vertices that follow the jaw exactly."""
+        """(N,) mask of vertices that follow the jaw exactly."""
         pinned = self.marks.on_contours(*LIP_CONTOURS)
         pinned[[self.marks.vertex[name] for name in CHIN if self.marks.has(name)]] = True
         return pinned
@@ -279,7 +279,7 @@ class _Authoring:
 
 
 def jaw_angles_at_values(motion: Motion, values: Float64, angles: Float64) -> Float64:
-    """The jaw's angle at the values of a motion that may have been stopped on its way."""
+    """(K,) angles of the jaw at the values of a motion that may have been stopped, radians."""
     result = np.interp(motion.values, values, angles)
     for k in range(1, len(result)):
         if np.array_equal(motion.shifts[k], motion.shifts[k - 1]):

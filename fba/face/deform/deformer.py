@@ -1,4 +1,4 @@
-"""FAPs -> vertices: a face model moved as its FaceDefTables say.
+"""Turns FAPs into vertices: moves a face model by its FaceDefTables.
 
 ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
 """
@@ -26,7 +26,7 @@ from fba.mesh.meshes import result_array
 from fba.parameters import FAP_COUNT, faps
 
 BLOCK = 64
-"""Frames that one call of the compiled loop makes: in between, an interrupt gets through."""
+"""Frames per call of the compiled loop: an interrupt can only get through between calls."""
 
 
 class Deformer:
@@ -97,7 +97,7 @@ class Deformer:
         return self._run(faps, out, normals, with_head=False)
 
     def head_matrices(self, faps: npt.ArrayLike) -> Float64:
-        """How the head is turned: float64 (4, 4) for FAPs (68,), (T, 4, 4) for (T, 68).
+        """Transforms of the head: float64 (4, 4) for FAPs (68,), (T, 4, 4) for (T, 68).
 
         For column vectors: `calling = matrix . local`. Errors as when called.
         """
@@ -106,12 +106,12 @@ class Deformer:
         return matrices[0] if single else matrices
 
     def part_matrices(self, faps: npt.ArrayLike) -> Float64:
-        """How each part is turned, sized and shifted within the head: float64 (P, 4, 4) for FAPs (68,),
-        (T, P, 4, 4) for (T, 68), in the order of `model.parts`.
+        """Transforms of each part within the head: float64 (P, 4, 4) for FAPs (68,), (T, P, 4, 4) for (T,
+        68), in the order of `model.parts`.
 
         The matrix of an eyeball takes it from its neutral place, looking ahead, to where it looks now,
-        in the frame of the head: `head_matrices . part_matrices` is its way into the room. Parts
-        without transforms have the identity; what FaceDefMesh does is not in it. Errors as when called.
+        in the frame of the head; `head_matrices . part_matrices` takes it to the world. Parts
+        without transforms have the identity; FaceDefMesh has no part in it. Errors as when called.
         """
         values, single = _frames(faps)
         matrices = self._poses(values)[:, :-1]

@@ -1,8 +1,8 @@
-"""What a plain glTF viewer shows of the FAPs: a morph target each, at a typical value.
+"""Morph targets for plain glTF viewers: one per FAP, at a typical value.
 
 `morph_values.csv` lists the value of each FAP at which its target has weight 1, in the FAP's own unit:
 lids close, the jaw opens by some 16 mm on an adult, brows rise by some 9 mm, eyes and head turn by 0.3
-radians. What turns or bends on the way there is drawn as a straight line.
+radians. Motions that turn or bend on the way become straight lines.
 """
 
 from __future__ import annotations

@@ -43,12 +43,14 @@ def import_model(
     if chosen == "makehuman":
         from fba.face.importers.makehuman.makehuman import import_makehuman
 
-        _no_more("MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=None if up == "y" else up)
+        _refuse_options(
+            "MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=None if up == "y" else up
+        )
         return import_makehuman(path, name=name or "MakeHuman")
     if chosen == "fdp":
         from fba.face.importers._fdp import import_fdp
 
-        _no_more("an FDP file", points=points)
+        _refuse_options("an FDP file", points=points)
         return import_fdp(path, unit=unit, up=up, kinds=kinds, name=named)
     if chosen == "gltf":
         from fba.face.importers._gltf import import_gltf
@@ -59,7 +61,7 @@ def import_model(
     return import_mesh(path, chosen, points=points, unit=unit, up=up, kinds=kinds, name=named)
 
 
-def _no_more(what: str, **options: object) -> None:
+def _refuse_options(what: str, **options: object) -> None:
     for option, value in options.items():
         if value is not None:
             raise OptionError(f"{option} does not apply to {what}, which brings its own")

@@ -38,7 +38,7 @@ def import_gltf(
     pieces, has_extension = gltf_pieces(path)
     if has_extension and points is None:
         return FaceModel.load(path)
-    given = given_points(points) if points is not None else _beside(Path(path))
+    given = given_points(points) if points is not None else _points_beside(Path(path))
     if given is None:
         from fba.face.importers.assembly.landmarks import find_points
 
@@ -85,7 +85,7 @@ def gltf_pieces(path: str | os.PathLike[str]) -> tuple[list[Piece], bool]:
             material = Material(
                 surface.material.name, (r, g, b), surface.material.roughness, surface.material.texture
             )
-        name = _free(surface.name, taken)
+        name = _unused_name(surface.name, taken)
         part = Part(
             name,
             "other",
@@ -93,7 +93,7 @@ def gltf_pieces(path: str | os.PathLike[str]) -> tuple[list[Piece], bool]:
             surface.triangles,
             surface.normals,
             surface.texcoords,
-            None if surface.colours is None else _glossy(surface.colours, material),
+            None if surface.colours is None else _with_gloss(surface.colours, material),
             material
             if surface.texcoords is not None
             else Material(material.name, material.colour, material.roughness),
@@ -106,7 +106,7 @@ def gltf_pieces(path: str | os.PathLike[str]) -> tuple[list[Piece], bool]:
     return pieces, own
 
 
-def _free(name: str, taken: set[str]) -> str:
+def _unused_name(name: str, taken: set[str]) -> str:
     chosen, count = name or "mesh", 1
     while chosen in taken or chosen == "head":
         count += 1
@@ -115,7 +115,7 @@ def _free(name: str, taken: set[str]) -> str:
     return chosen
 
 
-def _glossy(colours: Float32, material: Material) -> Float32:
+def _with_gloss(colours: Float32, material: Material) -> Float32:
     """Vertex colours times the material's; the fourth, opacity in glTF, is gloss here."""
     result = colours.copy()
     result[:, :3] *= np.array(material.colour, dtype=np.float32)
@@ -123,7 +123,7 @@ def _glossy(colours: Float32, material: Material) -> Float32:
     return result
 
 
-def _beside(path: Path) -> GivenPoints | None:
+def _points_beside(path: Path) -> GivenPoints | None:
     for end in POINT_FILES:
         candidate = path.with_name(path.stem + end)
         if candidate.is_file():

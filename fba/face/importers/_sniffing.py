@@ -1,4 +1,4 @@
-"""Which importer reads a file: told from its content, then from its name."""
+"""Finds the importer for a file, from its content, then from its name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KINDS: Mapping[str, str] = {
     "wfm": "Candide wire frames (.wfm) with feature points",
     "fdp": "FDP files (.fdp) of text or Xface, with their mesh beside them",
 }
-"""Kinds of sources that are read, and what they are."""
+"""Kinds of sources that can be read, with a description."""
 OBJ_WORDS = (b"v ", b"f ", b"vt ", b"vn ", b"g ", b"o ", b"mtllib", b"usemtl", b"s ")
 
 
@@ -34,7 +34,7 @@ def sniff(path: str | os.PathLike[str]) -> str:
         head = read_head(place)
     except FormatError as error:
         raise ModelError(str(error)) from error
-    kind = _of_content(head, place)
+    kind = _kind_of_content(head, place)
     if kind is None:
         reads = "; ".join(KINDS.values())
         found = but_recognised(head)
@@ -42,7 +42,7 @@ def sniff(path: str | os.PathLike[str]) -> str:
     return kind
 
 
-def _of_content(head: bytes, path: Path) -> str | None:
+def _kind_of_content(head: bytes, path: Path) -> str | None:
     suffix = path.suffix.lower()
     start = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith(b"glTF") or (start.startswith(b"{") and (b'"asset"' in head or suffix == ".gltf")):

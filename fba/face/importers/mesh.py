@@ -48,7 +48,7 @@ def import_mesh(
 ) -> FaceModel:
     """A face from a mesh file without motion; form: "obj", "ply" or "wfm"; the rest as `import_model`."""
     polygons = READERS[form](path)
-    given = given_points(points) if points is not None else _beside(path)
+    given = given_points(points) if points is not None else _points_beside(path)
     pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {})
     places, vertices = _places(polygons, given, os.fspath(path))
     return finish_import(pieces, places, vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
@@ -74,7 +74,7 @@ def polygon_pieces(polygons: Polygons, materials: Mapping[str, Material]) -> lis
     return pieces
 
 
-def _beside(path: str | os.PathLike[str]) -> GivenPoints:
+def _points_beside(path: str | os.PathLike[str]) -> GivenPoints:
     """Feature points from a file of the same name beside the mesh."""
     place = Path(path)
     for end in POINT_FILES:

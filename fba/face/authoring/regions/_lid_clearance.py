@@ -1,4 +1,4 @@
-"""Lids kept off the eyeball."""
+"""Keeps moving lids outside the eyeball."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from fba.face.authoring.surface.surface import Surface
 from fba.face.model import Part
 
 CLEARANCE = 0.012
-"""Between a lid that has moved and the eyeball, as a share of the eyeball's radius."""
+"""Clearance between a moved lid and the eyeball, as a share of the eyeball's radius."""
 FULL_CLEARANCE = 0.3
 """Share of the way after which a lid has its full clearance."""
 BULGE = np.radians(12.0)
-"""The cornea bulges by this much beyond where it is now: the eye may look elsewhere."""
+"""Angle by which the cornea may be elsewhere, because the eye turns."""
 STRICT = np.radians(4.0)
 OUTSIDE = 0.97
-"""What is this far out, in radii of the eyeball, lies before it."""
+"""Vertices this far out, in radii of the eyeball, count as outside."""
 DEEPEST = 0.02
-"""How deep an edge is taken to dip, as a share of the eyeball's radius: a longer one is left as it is."""
+"""Largest correction for an edge that dips into the eyeball, as a share of its radius."""
 BRIDGINGS = 3
-"""Moving a vertex off the eyeball may pull another edge into it; so many times this is looked after."""
+"""Moving a vertex off the eyeball may pull another edge into it: number of passes."""
 
 
 class Profile:
-    """How far the front of an eyeball reaches out in every direction, the cornea included."""
+    """Distance of an eyeball's surface from its centre in every direction, the cornea included."""
 
     def __init__(self, eye: Eye, parts: Sequence[Part], edge: float) -> None:
         """edge: typical length of the lids' edges, whose middles dip below their ends."""
@@ -54,7 +54,7 @@ class Profile:
         self._here[self._here == 0.0] = eye.radius
 
     def radius(self, points: Float64, *, around: bool) -> Float64:
-        """(N,) how far the eyeball reaches in the directions of points (N, 3), or in those around them."""
+        """(N,) metres: radius of the eyeball in the directions of points (N, 3), or its largest nearby."""
         arms = points - self._eye.centre
         reach = np.linalg.norm(arms, axis=1)
         angle = np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1))
@@ -67,14 +67,14 @@ class Profile:
         return self._eye.radius
 
     def before(self, points: Float64) -> Bool:
-        """(N,) which points lie outside the eyeball."""
+        """(N,) mask of points (N, 3) outside the eyeball."""
         reach = np.linalg.norm(points - self._eye.centre, axis=1)
         return np.asarray(reach >= self.radius(points, around=False))
 
     def lift(self, points: Float64, shifts: Float64, *, edges: bool = True) -> Float64:
-        """(N, 3): what must be added, forwards, so that what was outside the eyeball stays outside.
+        """(N, 3) forward shifts to add so that points that were outside the eyeball stay outside.
 
-        edges: with room for edges between, whose middles dip.
+        edges: leave room for the edges between vertices, whose middles dip.
         """
         at = points + shifts
         needed = self.radius(at, around=True) + self._clearance + (self._dip if edges else 0.0)
@@ -111,7 +111,7 @@ def push_vertices_outside(profile: Profile, points: Float64, shifts: Float64, va
 def push_edges_outside(
     profile: Profile, surface: Surface, vertices: Intp, shifts: Float64, margins: Bool, values: Float64
 ) -> Float64:
-    """Shifts (K, N, 3) with vertices brought forwards where the edges from them would cut the eyeball."""
+    """Shifts (K, N, 3) with vertices moved forwards where their edges would cut the eyeball."""
     place = np.full(len(surface), -1)
     place[vertices] = np.arange(len(vertices))
     # a lid's inner side may run into the eyeball where nobody sees it
@@ -125,7 +125,7 @@ def push_edges_outside(
         for _ in range(BRIDGINGS):
             middles = points[local].mean(axis=1)
             push = profile.lift(middles, result[k][local].mean(axis=1), edges=False)[:, 2]
-            # an edge may dip between ends that are outside; an end that is not pulls nothing along
+            # only edges with both ends outside are corrected
             push[~profile.before(points + result[k])[local].all(axis=1)] = 0.0
             push = np.minimum(push, DEEPEST * profile.reach)
             worst = np.zeros(len(vertices))

@@ -1,7 +1,7 @@
 """Brows, cheeks, chin and nose: FAPs whose feature points pull at the skin around them.
 
-Which points share a region, what bounds it and what a FAP takes along is in `regions.csv` and
-`handles.csv`; the right side mirrors the left.
+`regions.csv` lists the points and bounds of each region, `handles.csv` the points that each FAP moves;
+the right side mirrors the left.
 """
 
 from __future__ import annotations
@@ -31,15 +31,16 @@ from fba.parameters import faps
 
 SMOOTHINGS = 5
 HEM = 0.006
+"""Shares of a motion below this are set to 0."""
 
 
 @dataclass(frozen=True)
 class Region:
     """Points that pull at the same skin.
 
-    reach, in ES0. share: of the way to what stays that moves. slack: over longer distances, in ES0, the
-    skin does not spring back. through: in ES0, over what depth skin takes along what is behind it, or 0.
-    behind: what that is, the inside of the "mouth" or "all".
+    reach: of the motion, in ES0. share: of the way to fixed vertices that moves. slack: distance in ES0
+    beyond which the skin does not overshoot. through: depth in ES0 to which surfaces behind the skin move
+    with it, or 0. behind: these surfaces, the inside of the "mouth" or "all".
     """
 
     name: str
@@ -55,7 +56,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Handle:
-    """What one FAP does to the points of its region. bulge: how far the skin beside swells outwards."""
+    """Displacements of a region's points by one FAP. bulge: size of the outward swelling of skin beside."""
 
     fap: int
     region: str
@@ -84,7 +85,7 @@ def regions() -> dict[str, Region]:
 
 @cache
 def handles() -> tuple[Handle, ...]:
-    """What each FAP pulls at, right mates included."""
+    """The handles of all FAPs, right mates included."""
     found = []
     mirror = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
     for row in _rows("handles.csv"):
@@ -99,7 +100,7 @@ def handles() -> tuple[Handle, ...]:
 
 
 def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
+    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     found: dict[int, Motion] = {}
     lost: dict[int, str] = {}
     for area in regions().values():

@@ -23,9 +23,9 @@ EARS = {
 """Feature points of the ears; "below" and "above" are where they meet the face."""
 RAISE, PULL = {65: "left", 66: "right"}, {67: "left", 68: "right"}
 WHOLE, ROOT = 0.55, 1.15
-"""Up to the first share of the ear's width from its rim the ear moves as one, from the second on nothing."""
+"""Shares of the ear's width from its rim: up to the first it moves as one, beyond the second not at all."""
 AROUND = (1.1, 1.7)
-"""Seen from the side, the head around the ear moves less and less between these multiples of its size."""
+"""Multiples of the ear's size between which the motion of the head around it fades out."""
 WIDER = 1.2
 LEAST_PULL = 0.1
 SMOOTHINGS = 6
@@ -33,7 +33,7 @@ HEM = 0.006
 
 
 def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
+    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     found: dict[int, Motion] = {}
     lost: dict[int, str] = {}
     for fap, side in (RAISE | PULL).items():
@@ -53,7 +53,7 @@ def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
 
 
 def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
-    """(N,) how much each vertex goes with the ear."""
+    """(N,) share of the ear's motion at each vertex."""
     names = EARS[side]
     surface = marks.surface
     top, back, lobe, below, above = (marks.point_or_average(name) for name in names.values())

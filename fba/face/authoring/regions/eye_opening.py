@@ -17,8 +17,10 @@ COLUMNS = 65
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """The opening of one eye by columns. x: (C,) rising. upper, lower: (C, 2) height and depth of the
-    margins there, from the eyeball's centre, metres.
+    """The opening of one eye by columns.
+
+    x: (C,) rising. upper, lower: (C, 2) height and depth of the margins there from the eyeball's centre,
+    metres.
     """
 
     x: Float64
@@ -59,9 +61,9 @@ def slide_lid(
     *,
     columns: Float64 | None = None,
 ) -> Float64:
-    """(K, N, 3): shifts of points (N, 3) when a lid has gone some shares (K,) of the way to the other.
+    """(K, N, 3) shifts of points (N, 3), metres, when a lid has made shares (K,) of the way to the other.
 
-    share: (N,), how much each goes with the margin of its column. columns: (N,), x of the columns, where
+    share: (N,), share of the margin's motion in each point's column. columns: (N,), x of the columns, where
     they are not the points' own, as of a lash that goes with its root.
     """
     own, other = (opening.upper, opening.lower) if lid == "upper" else (opening.lower, opening.upper)
@@ -74,7 +76,7 @@ def slide_lid(
     height = points[:, 1] - eye.centre[1]
     depth = points[:, 2] - eye.centre[2]
     distance = np.hypot(height, depth)
-    # what is further out than the margin turns less: it moves no further than the margin does
+    # points further out than the margin turn less, so that they move no further than it does
     part = share if columns is not None else share * np.minimum(1.0, radius / np.maximum(distance, 1e-12))
     start = np.arcsin(np.clip(here[:, 0] / np.maximum(radius, 1e-12), -1, 1))
     shifts = np.zeros((len(way), len(points), 3))

@@ -18,7 +18,7 @@ from fba.face.points import EYEBALL_PER_IRIS
 from fba.face.tables import FaceDefTransform
 
 PUPIL_OF_IRIS = 1 / 3
-"""Of a neutral face."""
+"""Diameter of the pupil relative to the iris on a neutral face."""
 PUPIL_REACH = 1.5
 """An eyeball without vertices this close to its axis, in radii of the pupil, has no pupil to move."""
 SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
@@ -27,8 +27,10 @@ SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
 
 @dataclass(frozen=True, eq=False)
 class Eye:
-    """side: "left" or "right". parts: names of all parts that turn with it. centre: (3,). radius: metres.
-    pupil: (3,) where it looks out. measured: whether there is an eyeball to measure, or points only.
+    """One eye of a face.
+
+    side: "left" or "right". parts: names of all parts that turn with it. centre: (3,). radius: metres.
+    pupil: (3,) position. measured: whether there is an eyeball, else the sphere is a guess from the points.
     """
 
     side: str
@@ -74,7 +76,7 @@ def _middle(part: Part) -> Float64:
 
 
 def eye_transforms(fap: int, eye: Eye) -> list[FaceDefTransform]:
-    """Turns (FAPs 23-26) and shifts (27, 28) of the parts of an eye."""
+    """The rotations (FAPs 23-26) or translations (27, 28) of an eye's parts for one FAP."""
     centre = tuple(eye.centre.tolist())
     kind, amount = {
         23: ("rotation", (0.0, 1.0, 0.0)),
@@ -88,7 +90,7 @@ def eye_transforms(fap: int, eye: Eye) -> list[FaceDefTransform]:
 
 
 def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -> dict[str, Motion]:
-    """By part: the pupil's rim moved along the eyeball, the iris between it and its own rim squeezed."""
+    """Motions by part that move the pupil's rim along the eyeball and compress the iris around it."""
     unit = marks.fapu.IRISD
     iris = unit * 1024 / 2
     pupil = iris * PUPIL_OF_IRIS

@@ -35,19 +35,20 @@ STILL = (
     "8.1",
 )
 REACH = 1.5
-"""How far the jaw pulls at cheeks and neck, in ES0."""
+"""Reach of the jaw's motion into cheeks and neck, in ES0."""
 NECK = 0.1
 """Open edges of the skin this far below the chin, in ES0, are where the neck was cut."""
 CORNER = 0.6
-"""How much of the jaw's turn the skin over its corners makes."""
+"""Share of the jaw's turn that the skin over its corners makes."""
 WIDEST = np.radians(30.0)
-"""Nobody opens further."""
+"""Largest opening of the jaw, radians."""
 SLIDE = (0.35, 0.1)
-"""How far the hinge goes forwards and down for a turn of one radian, in ES0: some 11 mm when wide open."""
+"""Motion of the hinge forwards and down per radian, in ES0: some 11 mm when wide open."""
 INTERVAL = np.radians(3.0)
 """The arc is cut into intervals no longer than this."""
 LIP_RIDE = 0.5
-"""The lower lip rides on a jaw that slides, but not on one that opens: it has FAPs of its own for that."""
+"""Share of a sliding jaw's motion that the lower lip makes. It does not follow an opening jaw: it has its
+own FAPs for that."""
 SLACK = 0.2
 HEM = 0.004
 TEETH_MARGIN = 0.12
@@ -62,9 +63,11 @@ LIP_DEPTH = 0.16
 
 @dataclass(frozen=True, eq=False)
 class Jaw:
-    """share: (N,) of the surface, 1 on the chin. sliding: the same for FAPs 14 and 15, with the lower lip.
-    hinge: (y, z) of the axis. chin: (3,), the point that sinks by exactly value x MNS.
-    size: ES0 in metres.
+    """The jaw of a face.
+
+    share: (N,) share of the opening at each vertex of the surface, 1 on the chin. sliding: the same for FAPs
+    14 and 15, with the lower lip. hinge: (y, z) of the axis, metres. chin: (3,), the point that sinks by
+    exactly value x MNS. size: ES0 in metres.
     """
 
     share: Float64
@@ -75,7 +78,7 @@ class Jaw:
 
 
 def find_jaw(marks: Landmarks) -> Jaw | str:
-    """The jaw of a face, or why it has none."""
+    """The jaw of a face, or the reason why it has none."""
     if not marks.has("2.1"):
         return "feature point 2.1 is not on the skin"
     ears = np.array([marks.point_or_average(name) for name in EARS])
@@ -105,9 +108,9 @@ def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
 
 
 def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
-    """(K, N, 3) shifts of points (N, 3) when the jaw opens by each angle (K,).
+    """(K, N, 3) shifts of points (N, 3), metres, when the jaw opens by angles (K,), radians.
 
-    It turns about the hinge, +z down, while the hinge itself slides forwards and a little down, as the
+    The jaw turns about the hinge, +z down, while the hinge itself slides forwards and a little down, as the
     joint of a human jaw does.
     """
     y, z = points[:, 1] - jaw.hinge[0], points[:, 2] - jaw.hinge[1]
@@ -118,7 +121,7 @@ def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
 
 
 def bite_height(marks: Landmarks) -> float:
-    """Height at which upper and lower teeth meet."""
+    """Height (y, metres) at which upper and lower teeth meet."""
     heights = [marks.point(name)[1] for name in ("9.10", "9.11")]
     known = [h for h in heights if np.isfinite(h)]
     lips = [marks.point(name)[1] for name in ("2.2", "2.3")]
@@ -136,9 +139,9 @@ def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
 
 
 def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
-    """(V,) how much each vertex of a part inside the mouth turns with the jaw.
+    """(V,) share of the jaw's turn at each vertex of a part inside the mouth.
 
-    Each connected piece that lies on one side of the teeth's edge goes as one: a tooth does not bend.
+    A connected piece on one side of the teeth's edge moves as one: a tooth does not bend.
     """
     from fba.face.authoring.surface.surface import Surface
 
@@ -151,7 +154,7 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
         row = _by_teeth_points(marks, part)
         if row is not None:
             return np.full(len(part.vertices), row)
-        # an overbite does not take the upper teeth along: the whole set decides, then each piece of it
+        # decided for the whole set first, then for each piece: an overbite must not move upper teeth
         if abs(float(each.mean()) - 0.5) > MIXED:
             return np.full(len(part.vertices), float(each.mean() > 0.5))
         count = np.bincount(shape.component)
@@ -190,7 +193,7 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
         marks.on_contours("lower outer lip", "upper outer lip", "lower inner lip", "upper inner lip")
         | marks.lips
     )
-    # below, the neck ends at a body that stays
+    # the neck's lower end joins a body that does not move
     end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK * es)
     still = np.unique(
         [*np.flatnonzero(lips | end), *(marks.vertex[name] for name in STILL if marks.has(name))]
@@ -214,7 +217,7 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
 
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
-    """Shares along the jaw line: 1 between the corners of the chin, less towards the corners of the jaw."""
+    """(M,) shares along the jaw line: 1 between the corners of the chin, less towards those of the jaw."""
     chin = [k for k, v in enumerate(line) if v in {marks.vertex.get(name) for name in CHIN}]
     steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -225,13 +228,13 @@ def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
 
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:
-    """The share of a sliding jaw: the lower lip goes half way, the upper one stays."""
+    """(N,) shares of a sliding jaw's motion: half on the lower lip, none on the upper one."""
     lower = marks.on_contours("lower outer lip", "lower inner lip")
     upper = marks.on_contours("upper outer lip", "upper inner lip")
     lower &= ~upper
     if not lower.any():
         return share
-    # lips and skin around take what lies between the given: chin, lower lip, upper lip
+    # interpolated over lips and skin between chin, lower lip and upper lip
     es = marks.fapu.ES * 1024
     surface = marks.surface
     close = surface.distances(np.flatnonzero(lower), 0.6 * es) < 0.5 * es

@@ -1,4 +1,4 @@
-"""Lashes: they move with the lid that they grow on."""
+"""Motions of lashes, which follow the lid that they grow on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fba.face.model import Part
 
 
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -> Motion:
-    """Lashes turn with the margin that they grow on, each vertex as its root does."""
+    """The motion of a part's lashes for a lid's FAP: each vertex turns as its root on the margin does."""
     side, name = LIDS[fap]
     opening = measure_opening(marks, eye)
     assert opening is not None  # the lid moves, so there is one
@@ -43,7 +43,7 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, lid: Motion) -
 
 
 def _sound_range(lid: Motion) -> tuple[float, float]:
-    """Where a lid comes to rest on both sides."""
+    """(lowest, highest) value at which a lid still moves."""
     moved = np.abs(np.diff(lid.shifts, axis=0)).max(axis=(1, 2)) > 0
     used = np.flatnonzero(moved)
     return (float(lid.values[used[0]]), float(lid.values[used[-1] + 1])) if len(used) else (0.0, 0.0)

@@ -1,7 +1,7 @@
 """Eyelids: FAPs 19-22. Every vertex of a lid stays in its own upright plane and turns about the eyeball.
 
-A lid closes column by column, each in proportion to its own opening, so that upper and lower margin meet
-along their whole length however the way is split between them.
+A lid closes column by column, each in proportion to its own opening, so that the margins meet along their
+whole length however the way is split between upper and lower lid.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from fba.face.model import Part
 STEP = 128
 """Values between two borders of the tables: an eighth of the way."""
 REACH = 0.6
-"""How far a lid pulls at the skin around it at most, in ES0."""
+"""Largest reach of a lid's motion into the skin around it, in ES0."""
 CREASE = 0.11
 """Distance from the margin to the crease in ES0, where its feature point is unknown."""
 FOLD = {
@@ -42,17 +42,17 @@ FOLD = {
 }
 """The feature points on the creases."""
 AT_CREASE = 0.25
-"""The crease goes this share of the margin's way."""
+"""Share of the margin's way that the crease makes."""
 ENDS = 3.5
-"""What is this many times as far away as the crease rests."""
+"""Multiple of the crease's distance beyond which the skin does not move."""
 EDGE = 0.4
-"""The lid's edge, up to this share of the distance to the crease, goes as one."""
+"""Share of the distance to the crease up to which the lid's edge moves as one."""
 FURTHER = 0.2
-"""The front edge of a lid may go this much further than the margin."""
+"""Share by which the front edge of a lid may move further than the margin."""
 OWN_SIDE = 0.6
-"""What is closer to the other lid than this share of the way goes less and less with this one."""
+"""Share of the way from the other lid below which vertices follow this one less and less."""
 NARROW = 0.4
-"""At the corners of the eye distances shrink to this."""
+"""Factor of distances at the corners of the eye."""
 SMOOTHINGS = 4
 STILL = {
     "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
@@ -60,11 +60,11 @@ STILL = {
 }
 HEM = 0.006
 CORNER = 0.12
-"""So near the corners, as a share of the eye's width, a fold does not stop a lid."""
+"""Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
 
 
 def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Sequence[Part]) -> Motion | str:
-    """The motion of the surface, or why there is none."""
+    """The motion of the surface for a lid's FAP, or the reason why there is none."""
     side, lid = LIDS[fap]
     own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
     if not len(own) or not len(other):
@@ -95,7 +95,7 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
 
 
 def lid_values(fap: int) -> Float64:
-    """Borders: the range of the FAP, and in any case all of the way to the other lid."""
+    """(K,) rising borders over the FAP's range, extended to all of the way to the other lid."""
     low, high = fap_limits(fap)
     high = max(high, float(CLOSED))
     between = np.arange(np.ceil(low / STEP) * STEP, high + 1, STEP)
@@ -107,10 +107,10 @@ def _other(lid: str) -> str:
 
 
 def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, other: Intp) -> Float64:
-    """(N,) how much each vertex goes with the margin of its column.
+    """(N,) share of the margin's motion at each vertex of a column.
 
-    All of it on the lid's edge, a quarter at the crease, nothing well before the brow; towards the corners,
-    where the crease comes closer, within a shorter distance.
+    1 on the lid's edge, a quarter at the crease, 0 well before the brow; towards the corners, where the
+    crease is closer, within a shorter distance.
     """
     surface, es, side = marks.surface, marks.fapu.ES * 1024, eye.side
     stays = np.setdiff1d(other, own)
@@ -131,7 +131,7 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     opposite = surface.distances(stays, 4 * REACH * es)
     with np.errstate(invalid="ignore"):
         share *= smoothstep(np.nan_to_num(opposite / (away + opposite), nan=1.0) / OWN_SIDE)
-    # walking along edges makes the distances uneven
+    # distances along edges are uneven
     pinned = np.zeros(len(surface), dtype=bool)
     pinned[own] = pinned[stays] = True
     share[own] = 1.0
@@ -141,7 +141,7 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
 
 
 def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:
-    """(N,) how much further than the margin the front edge of a lid must go to meet that of the other.
+    """(N,) share by which the front edge of a lid must move further than the margin to meet the other's.
 
     The margin lies on the eyeball; the front edge before it is further away from the other lid.
     """

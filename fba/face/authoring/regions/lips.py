@@ -50,18 +50,18 @@ ALONG = {
     16: {"lower middle": 1.0, "lower left": 0.8, "lower right": 0.8},
     17: {"upper middle": 1.0, "upper left": 0.8, "upper right": 0.8},
 }
-"""FAPs that take more handles along than their own: a stretched lip keeps its points evenly spaced."""
+"""FAPs that move more handles than their own: a stretched lip keeps its points evenly spaced."""
 PUSH = (16, 17)
 OUTER_PUSH = 0.9
-"""How much of a push of the inner contour reaches the outer one, which has no such FAP."""
+"""Share of a push of the inner contour that the outer one makes, which has no such FAP."""
 LINES = ("upper inner lip", "lower inner lip", "upper outer lip", "lower outer lip")
 REACH = 0.75
-"""How far the lips pull at the face, in ES0."""
+"""Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.3
 STILL = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
-"""What the lips do not move."""
+"""Feature points that the lips do not move."""
 SLACK = 0.25
-"""Distance in ES0 beyond which the skin does not spring back."""
+"""Distance in ES0 beyond which the skin does not overshoot."""
 HEM = 0.006
 TANGENT = 1.0
 """1 makes straight lines through the points stay straight, 0 keeps the shares of far points from dipping
@@ -71,13 +71,13 @@ below 0; between them lies what looks best."""
 @dataclass(frozen=True, eq=False)
 class _Lips:
     field: dict[str, Float64]
-    """(N,) by handle: how much each vertex goes with it."""
+    """(N,) by handle: share of its motion at each vertex."""
     inward: Float64
     """(N,) 1 on the inner contour and behind it, 0 on the outer contour and beyond."""
 
 
 def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
-    """Motions of the surface by FAP, and the FAPs that this face cannot have, with the reason."""
+    """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
     numbers = [fap.number for fap in faps() if fap.group in (2, 8) and fap.number not in (3, 14, 15, 18)]
     lost = {number: reason for number in numbers if (reason := _missing_reason(marks, number))}
     if len(lost) == len(numbers):
@@ -195,10 +195,10 @@ def _motion_along(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) 
 
 
 def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:
-    """Motions of an inner and an outer FAP whose sum stays straight although each alone has its limit.
+    """(inner, outer) motions of a pair of FAPs whose sum stays linear although each alone is limited.
 
-    Where one contour has come as close to the other as the skin between them can take, it stops, and
-    from there on the other one, moving away, takes it along.
+    Where one contour gets as close to the other as the skin between them allows, it stops; from there on it
+    moves with the other one.
     """
     low, high = fap_limits(fap)
     vertices = np.flatnonzero((np.abs(inner) + np.abs(outer)).max(axis=1) > 0)

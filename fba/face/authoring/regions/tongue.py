@@ -1,4 +1,4 @@
-"""The tongue: FAPs 43-47."""
+"""Motions of the tongue: FAPs 43-47."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fba.parameters import faps
 FAPS = (43, 44, 45, 46, 47)
 POINTS = {43: ("6.1",), 44: ("6.1",), 45: ("6.1",), 46: ("6.2",), 47: ("6.2", "6.3", "6.4")}
 TIP_BEND = 2.0
-"""The tip's way falls off towards the root with this power of the length: a bent, not a sheared tongue."""
+"""Power of the length with which the tip's motion falls off to the root: the tongue bends, not shears."""
 ROLL_STEPS = 8
 
 
 def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
-    """The motion of the tongue's part, or why there is none."""
+    """The motion of the tongue's part for a FAP, or the reason why there is none."""
     missing = [name for name in POINTS[fap] if np.isnan(marks.point(name)).any()]
     if missing:
         return f"feature point {missing[0]} is unknown"
@@ -54,7 +54,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
 
 
 def _roll(marks: Landmarks, points: Float64) -> Motion:
-    """Sides turned up about the middle line, the more the further out: the section becomes a U."""
+    """The motion that turns the sides up about the middle line, more further out: a U in section."""
     middle, left, right = (marks.point(name) for name in ("6.2", "6.3", "6.4"))
     unit = marks.fapu.AU
     low, high = fap_limits(TONGUE_ROLL)

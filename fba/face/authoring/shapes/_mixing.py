@@ -21,14 +21,13 @@ from fba.parameters import faps
 OWN, ELSEWHERE, ACROSS = 3.0, 1.0, 0.5
 """Weights of the points that are to move, of the other points, and of directions across the way."""
 RIDGE = 0.05
-"""Holds weights small: a shape at weight 1 costs as much as a twentieth of the way at another point."""
+"""Regularisation of the weights: a shape at weight 1 costs as much as 5 % of the way at another point."""
 MOST_WEIGHT = 1.25
 """A shape is used up to this weight for a typical value of the FAP."""
 LEAST_SHARE, LEAST_OF_ONE = 0.5, 0.25
-"""Shapes that bring the points of a group less than this share of the way, or one of them less than the
-second, do not serve it."""
+"""Shapes must move a group's points by the first share of the way on average, each by the second at least."""
 FULL_WEIGHT = 0.15
-"""From this weight of the mesh's own tables on, shapes show in full; they fade out below."""
+"""Weight of the mesh's own tables from which shapes are used in full; they fade out below."""
 GROUPS = (
     (31, 33, 35), (32, 34, 36), (37,), (38,), (39,), (40,), (41,), (42,),
     (51, 55, 56), (52, 57, 58), (53,), (54,), (59,), (60,), (61,), (62,), (63,), (64,),
@@ -57,11 +56,11 @@ class Mixer:
         self.at = shapes.displacements_at(vertices)
         columns = [self.weight(fap) for fap in self.points.values()]
         self.weights = np.stack(columns, axis=1) if columns else np.zeros((len(base.vertices), 0))
-        # how far each point follows when another one is moved by its own table
+        # motion of each point when another one is moved by its own table
         self.coupling = self.weights[vertices]
 
     def _points(self) -> dict[str, int]:
-        """Feature points of the skin that a FAP moves straight, and the FAP whose table shows their hold."""
+        """Feature points of the skin that a FAP moves linearly, with the FAP that gives their weights."""
         found: dict[str, int] = {}
         for region in REGIONS:
             for fap in region:
@@ -71,12 +70,12 @@ class Mixer:
         return found
 
     def weight(self, fap: int) -> Float64:
-        """(V,): how much of the way of its point each vertex goes when a FAP is small."""
+        """(V,) share of its point's way that each vertex makes for small values of a FAP."""
         field = first_steps(self.base, fap, 1.0)
         return np.asarray(field @ np.array(DIRECTIONS[faps()[fap - 1].positive]) / self.unit[fap])
 
     def tables(self, group: tuple[int, ...]) -> tuple[dict[int, FaceDefTables], set[str]]:
-        """Tables of a group of FAPs from shapes, and the shapes; none where these do not reach."""
+        """(tables of a group of FAPs made from shapes, names of the shapes); empty without fitting shapes."""
         group = tuple(fap for fap in group if fap in self.base.table_of)
         group = tuple(fap for fap in group if faps()[fap - 1].feature_points[0] in self.points)
         details: dict[float, Float64] = {}
@@ -94,7 +93,7 @@ class Mixer:
         made: dict[int, FaceDefTables] = {}
         if not details:
             return made, used
-        # what the sculptor adds is shared out, so that it shows once when all of the group move
+        # details are divided among the FAPs, so that they show once when all of the group move
         holds = {fap: np.abs(self.weight(fap)) for fap in group}
         total = np.sum(list(holds.values()), axis=0)
         shown = smoothstep(total / FULL_WEIGHT)
@@ -110,7 +109,7 @@ class Mixer:
         return made, used
 
     def _points_moved_together(self, group: tuple[int, ...]) -> dict[str, int]:
-        """Points that shapes move at once, and their FAPs: those of a group and of the inner lip's."""
+        """Points that shapes move together, with their FAPs: those of a group and of its inner lip mates."""
         found = {faps()[fap - 1].feature_points[0]: fap for fap in group}
         for fap in group:
             mate = faps()[fap - 1].lip_mate
@@ -126,7 +125,7 @@ class Mixer:
         return float(morph_values()[fap])
 
     def _steps(self, group: tuple[int, ...]) -> Float64:
-        """(P, 3): where one step of all FAPs of a group, and of their inner mates, brings each point."""
+        """(P, 3) displacement of each point by one step of all FAPs of a group and of their inner mates."""
         wanted = np.zeros((len(self.points), 3))
         names = list(self.points)
         for name, fap in self._points_moved_together(group).items():
@@ -160,7 +159,7 @@ class Mixer:
         return np.asarray(solution / (shares.mean() * value) * sign)
 
     def _correct_at_points(self, group: tuple[int, ...], step: Float64) -> Float64:
-        """(V, 3) for one step of a group: faded out of its region, and exact at all feature points."""
+        """(V, 3) a group's step, faded out outside its region and corrected to be exact at all points."""
         region = next(region for region in REGIONS if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
         step = step * smoothstep(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
@@ -168,7 +167,7 @@ class Mixer:
         return np.asarray(step + self.weights @ rest)
 
     def replacement_tables(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
-        """A FAP that the mesh alone cannot serve, straight along shapes, in one direction."""
+        """Tables of a FAP that the mesh alone cannot serve, linear along shapes, or None."""
         entry = faps()[fap - 1]
         name = entry.feature_points[0]
         vertex = int(self.base.bound[row_of()[name]])
@@ -184,7 +183,7 @@ class Mixer:
 
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
-    """(V, 3) metres a step: what a FAP does to all vertices of a model next to 0, above or below it."""
+    """(V, 3) metres a step: displacements by a FAP next to 0, above (sign 1) or below (-1) it."""
     unit = model.fapu[faps()[fap - 1].unit]
     field = np.zeros((len(model.vertices), 3))
     for mesh in model.table_of[fap].meshes:
@@ -195,8 +194,10 @@ def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
 
 
 def fold_limited_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
-    """Tables of a FAP that moves vertices by `down` (V, 3) a step below 0 and by `up` above, metres, up
-    to where the skin would fold; None where nothing moves."""
+    """Tables of a FAP, limited where the skin would fold, or None where nothing moves.
+
+    down, up: (V, 3), metres a step below and above 0.
+    """
     skins = [part for part in model.parts if part.kind in SKIN_KINDS]
     surface = Surface(skins)
     pool = np.concatenate(
@@ -213,7 +214,7 @@ def fold_limited_tables(model: FaceModel, fap: int, down: Float64, up: Float64) 
     values = np.array([*below.values[below.values < 0], 0.0, *above.values[above.values > 0]])
     moving = np.union1d(below.vertices, above.vertices)
     shifts = np.zeros((len(values), len(surface), 3))
-    # what the skin is held back by, teeth, brows and lashes are held back by too
+    # teeth, brows and lashes are limited as the skin is
     share = np.zeros(len(values))
     for k, value in enumerate(values):
         side = below if value < 0 else above
@@ -240,7 +241,7 @@ def surface_field(surface: Surface, moves: Float64) -> Float64:
 
 
 def _side(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
-    """A straight motion from 0 to one end, limited where triangles would fold."""
+    """The linear motion from 0 to one end, limited where triangles would fold."""
     limiter = Limiter(surface.vertices, surface.triangles)
     if not field.any() or not end:
         return Motion(np.array(sorted((0.0, end or 1.0))), np.zeros(0, dtype=np.intp), np.zeros((2, 0, 3)))
@@ -251,7 +252,7 @@ def _side(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
 
 
 def _progress(side: Motion, value: float) -> float:
-    """How many unhindered steps a straight motion has gone at a value."""
+    """Number of unlimited steps to which a linear motion at a value corresponds."""
     first = side.values[side.values != 0]
     if not value or not side.shifts.size or not len(first):
         return float(value)

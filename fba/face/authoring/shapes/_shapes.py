@@ -16,14 +16,14 @@ from fba.face.model import FaceModel, Part
 BLEND = 0.12
 """Half the width over which a shape fades from one side to the other, as a share of ES0."""
 STILL = 1e-3
-"""A half that moves less than this share of its shape is none."""
+"""A half that moves less than this share of its shape is left out."""
 
 Morphs = Mapping[str, Mapping[str, Floating]]
 
 
 @dataclass(frozen=True, slots=True)
 class Half:
-    """A shape, or what it does on one side of the face: side +1 left, -1 right."""
+    """One side of a shape: side +1 left, -1 right."""
 
     shape: str
     side: int
@@ -47,13 +47,13 @@ class Shapes:
         self.halves = [half for shape in self.morphs for half in self._halves(shape)]
 
     def field(self, half: Half) -> Float64:
-        """(V, 3): what half a shape does to all vertices of the model."""
+        """(V, 3) displacements of all vertices of the model by half a shape, metres."""
         field = self.displacements(half.shape)
         field *= (self._left if half.side > 0 else 1.0 - self._left)[:, None]
         return field
 
     def displacements(self, shape: str) -> Float64:
-        """(V, 3): what a shape does to all vertices of the model."""
+        """(V, 3) displacements of all vertices of the model by a shape, metres."""
         field = np.zeros((len(self.model.vertices), 3))
         for part, moved in self.morphs[shape].items():
             start = self.model.starts[part]
@@ -61,7 +61,7 @@ class Shapes:
         return field
 
     def mix(self, weights: npt.ArrayLike) -> Float64:
-        """(V, 3): all halves together, each with its weight."""
+        """(V, 3) sum of all halves, each times its weight, metres."""
         field = np.zeros((len(self.model.vertices), 3))
         for half, weight in zip(self.halves, np.asarray(weights, dtype=np.float64), strict=True):
             if weight:

@@ -2,9 +2,9 @@
 
 How far each shape moves each feature point is measured; for each group of FAPs that shapes move together
 (a brow, a lip) and each direction the shapes are mixed so that its points move as the standard wants and
-the others least. What is left over at the points is taken away with the tables that `author` makes of the
-mesh alone, so every point moves exactly as far as its FAP says, and between the points the sculptor's
-shapes show.
+the others least. The remaining errors at the points are corrected with the tables that `author` makes from
+the mesh alone, so every point moves exactly as far as its FAP says, and the sculptor's shapes show between
+the points.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from fba.face.interpolation.table import InterpolationTable
 
 FEWEST_FAPS = 5
-"""With so many shapes named after FAPs, the names are taken at their word."""
+"""Number of shapes named after FAPs from which these names are used."""
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
 """FAPs whose points move on arcs, or as bodies: jaw, lids, eyeballs, tongue, head. A shape is straight;
 it serves them only where the mesh alone cannot."""
@@ -54,7 +54,7 @@ def from_morphs(
     fit: InterpolationTable | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> FaceModel:
-    """A face whose tables come from named shapes as far as these reach, from the mesh alone beyond.
+    """A face whose tables are made from named shapes where these suffice, else from the mesh alone.
 
     parts, points, bound, name, definitions, fit, notes: as `author`. morphs: displacements float32
     (V, 3), metres, at weight 1, by the name of the shape and of the part; shapes are named as ARKit's

@@ -1,4 +1,4 @@
-"""What a part of a mesh is, guessed from its names: "EyeLeft_Mat" is an eye, "Wolf3D_Teeth" teeth."""
+"""Guesses the kind of a part from its names: "EyeLeft_Mat" is an eye, "Wolf3D_Teeth" teeth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fba.errors import OptionError
 from fba.face.model import PART_KINDS
 
 DROPPED = "none"
-"""Kind of what is left out: transparent shells before the eye, which would hide it."""
+"""Kind of parts that are left out: transparent shells before the eye, which would hide it."""
 
 
 @cache
@@ -22,7 +22,7 @@ def _words() -> tuple[tuple[str, str], ...]:
 
 
 def kind_of(*names: str) -> str | None:
-    """Kind of part from its names, the more telling first; None where none of them tells.
+    """The kind of a part by its names, the most specific first; None where no name is known.
 
     The first word of `kinds.csv` that is in a name decides; "ear" and "hat" must be words of their own,
     as they are inside "pearl" and "that".

@@ -1,4 +1,4 @@
-"""Points that the outline of a head shows: nose, lips and chin on its profile, crown, back and ears."""
+"""Feature points on the outline of a head: nose, lips and chin on its profile, crown, back and ears."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fba.arrays import Bool, Float64
 from fba.face.model import Part
 
 STEPS = 400
-"""Heights at which the profile is taken."""
+"""Number of heights at which the profile is sampled."""
 
 
 def profile_points(skin: Part, found: Mapping[str, Float64]) -> dict[str, Float64]:
@@ -94,7 +94,7 @@ def _front(skin: Part, x: float, heights: Float64) -> Float64:
 
 
 def _hill(front: Float64, inside: Bool) -> int | None:
-    """The foremost place of the profile within a stretch from which it falls back on both sides."""
+    """Index of the foremost local maximum of the profile within a stretch, or None."""
     around = np.stack([np.roll(front, shift) for shift in (-6, -3, -1, 1, 3, 6)])
     hills = inside & np.isfinite(front) & (front[None] >= np.nan_to_num(around, nan=-np.inf)).all(axis=0)
     return int(np.where(hills, front, -np.inf).argmax()) if hills.any() else None

@@ -1,4 +1,4 @@
-"""The adult head's feature points, bent to those that were found on another head."""
+"""Warps the adult head's feature points to those that were found on another head."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from fba.face.importers.assembly.pieces import Piece
 
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
 LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")
-"""Points that are not used to bend the others."""
+"""Points that are not used for the warp."""
 FREE = ("7.1", "11.5")
 """Points that stand on no surface."""
 SMOOTHING = 0.1
-"""How little the bending minds single points: some lie at one place on the adult head, apart on another."""
+"""Smoothing of the warp: points that coincide on the adult head may be apart on another."""
 
 
 def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
-    """All points: the adult head's, bent to those found, each then on the nearest surface of its kind."""
+    """(84, 3) the adult head's points, warped to those found and moved onto parts of their kind."""
     from scipy.interpolate import RBFInterpolator
     from scipy.spatial import cKDTree
 
@@ -33,7 +33,7 @@ def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float6
         if (left in known) != (right in known):
             have, lack = (left, right) if left in known else (right, left)
             known[lack] = known[have] * (-1, 1, 1) + (2 * middle, 0, 0)
-    # pupils lie behind the lids or before them, as the iris is made; they say nothing of the skin
+    # pupils may lie behind the lids or before them; they do not determine the skin
     held = [name for name in known if name not in LOCAL]
     scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
     source = np.array([adult[row[name]] for name in held])
@@ -47,7 +47,7 @@ def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float6
             points[row[name]] = known[name]
         if name in FREE:
             continue
-        # what was found is a vertex, or lies on the profile between some
+        # found points are vertices, or lie on the profile between some
         pool = (*kinds_for_point(name), ROWS.get(name, ""), str(name in known))
         if pool not in trees:
             fit = [piece for piece in pieces if piece.part.kind in kinds_for_point(name)]
@@ -63,7 +63,7 @@ def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float6
 
 
 def _outside(piece: Piece, centre: Float64) -> Float64:
-    """Vertices of a part that look away from the middle of the head: not those of sockets and throat."""
+    """(N, 3) vertices of a part that face away from the head's centre: not those of sockets and throat."""
     vertices = piece.part.vertices.astype(np.float64)
     if piece.part.kind != "skin" or piece.part.normals is None:
         return vertices

@@ -1,4 +1,4 @@
-"""Triangles that all face the same way, outwards."""
+"""Turns triangles so that all face outwards."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fba.face.importers.assembly.pieces import Piece
 
 
 def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece], int]:
-    """The pieces with the skin facing away from the centre of the head, and how many triangles turned.
+    """(pieces with the skin facing away from the centre of the head, number of triangles turned).
 
     Within the skin, triangles that run against their neighbours are turned first. When the skin was
     inside out the other pieces are taken to be so too.
@@ -21,31 +21,31 @@ def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece],
     turned, over = 0, False
     for piece in pieces:
         if piece.part.kind == "skin":
-            wrong = _against(piece.part.triangles)
-            triangles = _flipped(piece.part.triangles, wrong)
+            wrong = _opposing(piece.part.triangles)
+            triangles = _flip(piece.part.triangles, wrong)
             vertices = piece.part.vertices.astype(np.float64)
             inside_out = float(_facing(vertices, triangles, centre).sum()) < 0
             over |= inside_out
             wrong = ~wrong if inside_out else wrong
             turned += int(wrong.sum())
-            result.append(_turned(piece, wrong) if wrong.any() else piece)
+            result.append(_turn_triangles(piece, wrong) if wrong.any() else piece)
         else:
             result.append(piece)
     if over:
         for number, piece in enumerate(result):
             if piece.part.kind != "skin":
-                result[number] = _turned(piece, np.ones(len(piece.part.triangles), dtype=np.bool_))
+                result[number] = _turn_triangles(piece, np.ones(len(piece.part.triangles), dtype=np.bool_))
                 turned += len(piece.part.triangles)
     return result, turned
 
 
-def _turned(piece: Piece, wrong: Bool) -> Piece:
-    # normals of the file went with the wrong sides: they are made anew
-    part = replace(piece.part, triangles=_flipped(piece.part.triangles, wrong), normals=None)
+def _turn_triangles(piece: Piece, wrong: Bool) -> Piece:
+    # normals of the file belong to the wrong sides: they are computed again
+    part = replace(piece.part, triangles=_flip(piece.part.triangles, wrong), normals=None)
     return replace(piece, part=part)
 
 
-def _flipped(triangles: Int32, wrong: Bool) -> Int32:
+def _flip(triangles: Int32, wrong: Bool) -> Int32:
     return np.where(wrong[:, None], triangles[:, ::-1], triangles)
 
 
@@ -54,7 +54,7 @@ def _facing(vertices: Float64, triangles: Int32, centre: Float64) -> Float64:
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), (a + b + c) / 3 - centre))
 
 
-def _against(triangles: Int32) -> Bool:
+def _opposing(triangles: Int32) -> Bool:
     """bool (F,): triangles that must turn so that neighbours agree, the fewer of each connected lot."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -67,7 +67,7 @@ def _against(triangles: Int32) -> Bool:
     order = np.argsort(key, kind="stable")
     key, face, forward = key[order], face[order], forward[order]
     first = np.flatnonzero(key[1:] == key[:-1])
-    # an edge of three or more triangles says nothing of sides
+    # an edge of three or more triangles does not define sides
     crowd = np.zeros(len(key) + 1, dtype=np.bool_)
     triple = np.flatnonzero(key[2:] == key[:-2])
     crowd[triple] = crowd[triple + 1] = True

@@ -1,4 +1,4 @@
-"""How parts look that bring no colours of their own: skin, teeth, tongue, and eyes with an iris."""
+"""Default materials for parts without colours of their own: skin, teeth, tongue, eyes with an iris."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ LOOKS = {
 """Materials by kind of part."""
 WHITE, IRIS, PUPIL = (0.80, 0.78, 0.75), (0.16, 0.09, 0.05), (0.004, 0.004, 0.004)
 GREY = 0.03
-"""Colours whose channels differ less are none: what programs write who were told of no colour."""
+"""Light colours whose channels differ by less are programs' defaults, and are replaced."""
 
 
-def with_looks(pieces: Sequence[Piece], points: Float64) -> list[Piece]:
-    """The pieces, those without texture and colour with a usual one; irises are drawn on white eyes.
+def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Piece]:
+    """The pieces, with default materials for those without texture and colours, and irises on white eyes.
 
     points: (84, 3), in the same frame.
     """
@@ -51,7 +51,7 @@ def _plain(material: Material) -> bool:
 
 
 def _with_iris(part: Part, points: Float64) -> Part:
-    """An iris as wide as the lids are apart, its pupil a third of it: the standard's neutral eye."""
+    """The eye with the standard's neutral iris: as wide as the lids are apart, its pupil a third of it."""
     side = "left" if "left" in part.name else "right"
     pupil = points[row_of()["3.5" if side == "left" else "3.6"]]
     lids = ("3.1", "3.3") if side == "left" else ("3.2", "3.4")

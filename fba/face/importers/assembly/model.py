@@ -13,17 +13,17 @@ from fba.arrays import Float64, Int32
 from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly._winding import turn_outward
-from fba.face.importers.assembly.default_materials import with_looks
+from fba.face.importers.assembly.default_materials import apply_default_materials
 from fba.face.importers.assembly.pieces import Piece, assemble, shift_pieces
 from fba.face.model import FaceModel
 
 PUPILS = 0.062
 """Metres between the pupils of an adult."""
 USUAL = (0.04, 0.08)
-"""What passes as the distance between the pupils of a real head, metres."""
+"""Limits of the distance between the pupils of a real head, metres."""
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
-"""Which way is up in a file -> rows that bring it to +x left, +y up, +z forward. z-up faces look to -y."""
+"""Vertical axis of a file -> rotation to +x left, +y up, +z forward. z-up faces look to -y."""
 FREE = ("7.1", "11.5")
 EYES = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
 
@@ -59,8 +59,8 @@ def finish_import(
 ) -> FaceModel:
     """A face from the pieces of a file and its feature points, both in the file's unit.
 
-    vertices: numbers of the vertices in the file that points stand on. The face comes to metres, its
-    origin between the pupils. Pieces with shapes get tables measured from them.
+    vertices: numbers of the vertices in the file that points stand on. The face is converted to
+    metres, with its origin between the pupils. Pieces with shapes get tables measured from them.
     """
     if not pieces:
         raise ModelError(f"{os.fspath(path)}: there are no triangles in it")
@@ -74,20 +74,20 @@ def finish_import(
     eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
     parts, over = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
     placed = (points - origin) * size
-    parts = with_looks(parts, placed)
+    parts = apply_default_materials(parts, placed)
     bound = bound_by_number(parts, vertices)
     everything = np.concatenate([piece.part.vertices for piece in parts]).astype(np.float64)
     placed[bound >= 0] = everything[bound[bound >= 0]]
-    said = {"source": Path(path).name, "unit": how, **(notes or {})}
+    all_notes = {"source": Path(path).name, "unit": how, **(notes or {})}
     if over:
-        said["triangles"] = f"{over} turned to face outwards"
-    return authored(parts, placed, bound, name=name or Path(path).stem, notes=said)
+        all_notes["triangles"] = f"{over} turned to face outwards"
+    return author_pieces(parts, placed, bound, name=name or Path(path).stem, notes=all_notes)
 
 
-def authored(
+def author_pieces(
     pieces: Sequence[Piece], points: Float64, bound: Int32, *, name: str, notes: Mapping[str, str]
 ) -> FaceModel:
-    """Tables from the shapes of the pieces where they have some, else from the mesh alone."""
+    """The face of finished pieces, its tables made from their shapes if there are any, else from the mesh."""
     parts = tuple(piece.part for piece in pieces)
     # with no vertex given, the nearest are sought, upper and lower lip told apart
     held = bound if (bound >= 0).any() else None
@@ -123,9 +123,9 @@ def bound_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int
 
 
 def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, str]:
-    """How many metres a unit of the mesh is, and how that was found, in words.
+    """(metres per unit of the mesh, how that was found, in words).
 
-    points: (84, 3). unit: what the user says, taken as it is. Otherwise the unit with which the pupils
+    points: (84, 3). unit: given by the user, used unchanged. Otherwise the unit with which the pupils
     (3.5, 3.6; without them the eyes) stand as far apart as on a real head; where none does, as with
     Candide, the mesh is scaled to an adult's 62 mm. ModelError where that is unknown or `unit` not positive.
     """

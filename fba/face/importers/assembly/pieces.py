@@ -64,7 +64,7 @@ def assemble(
         guessed = [
             (p, "skin" if kind is None and len(p.part.vertices) == largest else kind) for p, kind in guessed
         ]
-    return _joined_by_kind([(p, kind or "other") for p, kind in guessed], middle)
+    return _join_by_kind([(p, kind or "other") for p, kind in guessed], middle)
 
 
 def shift_pieces(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
@@ -114,12 +114,12 @@ def _with_eyes(
     return result
 
 
-def _joined_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
+def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
     found: list[Piece] = []
 
     def add(kind: str, name: str, chosen: Sequence[Piece]) -> None:
         if chosen:
-            found.append(_joined(chosen, name, kind))
+            found.append(_join(chosen, name, kind))
 
     def of_kind(kind: str) -> list[Piece]:
         return [piece for piece, each in pieces if each == kind]
@@ -195,7 +195,7 @@ def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
     )
 
 
-def _joined(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
+def _join(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
     """Several pieces as one part; the largest gives the texture, the others' colours become vertices'."""
     if len(pieces) == 1:
         return replace(pieces[0], part=replace(pieces[0].part, name=name, kind=kind))
