@@ -69,11 +69,11 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
     vertices = np.unique(part.vertices.astype(np.float64), axis=0)
     if len(vertices) < FEWEST_VERTICES:
         return None
-    kept = np.ones(len(vertices), dtype=bool)
+    on_sphere = np.ones(len(vertices), dtype=bool)
     centre, radius = vertices.mean(axis=0), 0.0
     for _ in range(8):
-        origin = vertices[kept].mean(axis=0)
-        near = vertices[kept] - origin
+        origin = vertices[on_sphere].mean(axis=0)
+        near = vertices[on_sphere] - origin
         system = np.column_stack([2 * near, np.ones(len(near))])
         solution, _, rank, _ = np.linalg.lstsq(system, (near**2).sum(axis=1), rcond=None)
         if rank < 4:
@@ -83,13 +83,13 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
         limit = max(3 * float(np.median(away)), 1e-6 * radius)
         again = away <= limit
-        if again.sum() < FEWEST_VERTICES or (again == kept).all():
+        if again.sum() < FEWEST_VERTICES or (again == on_sphere).all():
             break
-        kept = again
+        on_sphere = again
     if not radius > 0:
         return None
-    away = np.abs(np.linalg.norm(vertices[kept] - centre, axis=1) - radius)
-    return centre, radius, float(np.sqrt((away**2).mean())), float(kept.mean())
+    away = np.abs(np.linalg.norm(vertices[on_sphere] - centre, axis=1) - radius)
+    return centre, radius, float(np.sqrt((away**2).mean())), float(on_sphere.mean())
 
 
 def gaze(model: FaceModel, eye: Eyeball) -> Float64 | None:

@@ -50,7 +50,7 @@ def import_mesh(
     polygons = READERS[form](path)
     given = given_points(points) if points is not None else _points_beside(path)
     pieces = polygon_pieces(polygons, _materials(path) if form == "obj" else {})
-    places, vertices = _places(polygons, given, os.fspath(path))
+    places, vertices = _point_positions(polygons, given, os.fspath(path))
     return finish_import(pieces, places, vertices, path=path, unit=unit, up=up, kinds=kinds, name=name)
 
 
@@ -88,7 +88,7 @@ def _points_beside(path: str | os.PathLike[str]) -> GivenPoints:
     ).with_remedies(Remedy("points", "or name their file with {}", "FILE"))
 
 
-def _places(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64, dict[str, int]]:
+def _point_positions(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64, dict[str, int]]:
     """Positions (84, 3) of the points in the mesh's unit, and their vertices.
 
     A vertex says more than a position, which may be of another unit; an FbaWarning names those that
