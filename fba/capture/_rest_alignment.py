@@ -1,8 +1,8 @@
-"""The source's rest pose against the default posture: one constant rotation a joint, from geometry.
+"""Align the source's rest pose with the default posture: one constant rotation for each joint.
 
-A joint of the body is turned by W(t) . C: W(t) is the world rotation of the source joint that it was
-matched with, and C turns the default posture's bone into the direction that the source's bone has in
-the rest pose. So bones point where the source's bones point, whether it rests in T, in A, or standing.
+A joint of the body is turned by W(t) . C: W(t) is the world rotation of the source joint that it was matched
+with, and C turns the default posture's bone in the direction of the source's bone in the rest pose. So bones
+point in the directions of the source's bones, whether its rest pose is a T, an A, or standing.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
 
 SHORT = 1e-6
-"""Bones shorter than this share of the skeleton's size have no direction."""
+"""Share of the skeleton's size below which a bone has no direction."""
 
 
 @dataclass(frozen=True)
 class Bone:
     """A row of bones.csv: how the bone that begins at a joint is aligned with the source's.
 
-    base: joint from whose alignment the smallest further rotation is taken, or "facing". aims: joints
-    at the bone's other end, the first that is mapped counts. tip: the default posture's joint that a
-    source bone without a next joint points to. via: "down" where the smallest rotation goes by way of a limb
-    that hangs straight down, so that T, A and standing rest poses twist alike.
+    base: joint whose alignment is rotated as little as possible, or "facing". aims: joints at the bone's
+    other end, of which the first mapped one counts. tip: the default posture's joint that a source bone
+    without a next joint points to. via: "down" if the rotation goes via a limb that hangs straight down, so
+    that T, A and standing rest poses give the same twist.
     """
 
     joint: str
@@ -46,7 +46,7 @@ class Bone:
 
 @cache
 def bones() -> tuple[Bone, ...]:
-    """Bones of the limbs, parents first, left then right."""
+    """Return the bones of the limbs, parents first, left then right."""
     text = (files(__package__) / "bones.csv").read_text(encoding="utf-8")
     return tuple(
         Bone(row["joint"], row["base"], tuple(row["aims"].split()), row["tip"], row["via"])
@@ -57,8 +57,10 @@ def bones() -> tuple[Bone, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """upright: (3, 3), takes the source's frame to y up. corrections: joint -> C (3, 3), for sources
-    that are turned upright. aims: joint -> joint at the other end of its bone, where both are mapped.
+    """Alignment of a source with the body.
+
+    upright: (3, 3), from the source's frame to y up. corrections: joint -> C (3, 3), for upright sources.
+    aims: joint -> joint at the other end of its bone, if both are mapped.
     """
 
     upright: Float64
@@ -67,7 +69,7 @@ class Alignment:
 
 
 def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> Alignment:
-    """Corrections of all mapped joints. ModelError where the rest pose has no size or no left and right."""
+    """Return the corrections of all mapped joints. ModelError without size, or left and right."""
     rest = motion.rest()
     size = float(np.ptp(rest, axis=0).max())
     if size <= 0:
@@ -77,19 +79,19 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     ends = motion.end_offsets @ upright.T
     short = SHORT * size
 
-    def default(joint: str) -> Float64:
-        place: Float64 = skeleton.centres[skeleton.number(joint)]
-        return place
+    def default_position(joint: str) -> Float64:
+        position: Float64 = skeleton.centres[skeleton.number(joint)]
+        return position
 
     corrections: dict[str, Float64] = {}
     aims: dict[str, str] = {}
 
-    def aligned(joint: str, aim: str, start: Float64, via: str = "") -> Float64:
+    def align_bone(joint: str, aim: str, start: Float64, via: str = "") -> Float64:
         source = rest[mapped[aim]] - rest[mapped[joint]]
         if np.linalg.norm(source) <= short:
             return start
         aims[joint] = aim
-        bone = start @ (default(aim) - default(joint))
+        bone = start @ (default_position(aim) - default_position(joint))
         if via:
             down = np.array([0.0, -1.0, 0.0])
             return rotations.between(down, source) @ rotations.between(bone, down) @ start
@@ -97,7 +99,7 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
 
     spine = [joint for joint in spine_joints(skeleton) if joint in mapped]
     for joint, above in pairwise(spine):
-        corrections[joint] = aligned(joint, above, facing)
+        corrections[joint] = align_bone(joint, above, facing)
     if spine:
         corrections[spine[-1]] = facing
     corrections["sacroiliac"] = facing
@@ -108,21 +110,23 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
         start = corrections.get(bone.base, facing)
         aim = next((aim for aim in bone.aims if aim in mapped), None)
         if aim is not None:
-            corrections[bone.joint] = aligned(bone.joint, aim, start, bone.via)
+            corrections[bone.joint] = align_bone(bone.joint, aim, start, bone.via)
             continue
         corrections[bone.joint] = start
-        at_joint = ends[motion.end_parents == mapped[bone.joint]]
-        if bone.tip and len(at_joint):
-            source = at_joint.mean(axis=0)
+        tips = ends[motion.end_parents == mapped[bone.joint]]
+        if bone.tip and len(tips):
+            source = tips.mean(axis=0)
             if np.linalg.norm(source) > short:
-                turn = rotations.between(start @ (default(bone.tip) - default(bone.joint)), source)
+                turn = rotations.between(
+                    start @ (default_position(bone.tip) - default_position(bone.joint)), source
+                )
                 corrections[bone.joint] = turn @ start
     return Alignment(upright, corrections, aims)
 
 
 def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> float | None:
-    """Length of the body's legs over that of the source's, else of the arms; None where it has neither."""
-    places = motion.rest()
+    """Return the ratio of leg lengths of body and source, else of arm lengths; None without limbs."""
+    positions = motion.rest()
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
         ours = theirs = 0.0
         for side in "lr":
@@ -132,16 +136,16 @@ def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
             for a, b in pairwise(names):
                 ends = skeleton.centres[[skeleton.number(a), skeleton.number(b)]]
                 ours += float(np.linalg.norm(ends[1] - ends[0]))
-                theirs += float(np.linalg.norm(places[mapped[b]] - places[mapped[a]]))
+                theirs += float(np.linalg.norm(positions[mapped[b]] - positions[mapped[a]]))
         if theirs > 0:
             return ours / theirs
     return None
 
 
 def _facing(rest: Float64, mapped: Mapping[str, int]) -> tuple[Float64, Float64]:
-    """upright, and the rotation from the default posture's heading to that of the (upright) rest pose.
+    """Return upright, and the rotation from the default posture's heading to that of the upright rest pose.
 
-    Heading only: a rest pose stands on its feet, so a lean of its joints is its proportions.
+    Only the heading: a rest pose stands on its feet, so if its joints lean, that is due to its proportions.
     """
     left = np.zeros(3)
     for a, b in (("l_hip", "r_hip"), ("l_shoulder", "r_shoulder"), ("l_knee", "r_knee")):

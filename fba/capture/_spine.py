@@ -1,13 +1,13 @@
-"""The source's few spine joints spread over the vertebrae of the body.
+"""Distribute the rotations of the source's few spine joints over the vertebrae of the body.
 
-A source has two to six joints between hips and head, the body twenty-four. Along the spine, the source's
-rotations hold in the middle of its bones; between these middles the vertebrae turn by spherical
-interpolation, from the pelvis up to the skull base. Then all vertebrae of a source bone are turned together
-by the little that their line still lacks, so that it points exactly where the source's bone points.
+A source has two to six joints between hips and head, the body twenty-four. In the middle of each source
+bone, a vertebra has the bone's rotation; between these, rotations are interpolated spherically, from the
+pelvis up to the skull base. Then all vertebrae of a source bone turn together by a small correction, so that
+the line from the first to the last points exactly in the direction of the source's bone.
 
-With fewer groups of the standard (Spine1, the simple spine of four joints, to Spine5, all of them), the
-vertebrae that may turn take over the bones: each carries the line to the next one, along the source's, and
-then all turn a little more, so that the bones of the source are missed by as little as these few can.
+With fewer groups of the standard (from Spine1, the simple spine of four joints, to Spine5, all of them), each
+vertebra that may turn carries the line to the next such one, along the source's spine. Then all turn a little
+more, so that the errors of the bones' directions become as small as possible.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from fba.parameters import baps
 GROUPS = 5
 """Groups Spine1 to Spine5."""
 CHUNK = 2048
-"""Frames worked on at a time."""
+"""Frames solved at once."""
 STEPS = 5
+"""Iterations of the least squares."""
 KEEP = 0.05
-"""Weight of turning a part no further than it must, against a bone's direction."""
+"""Weight of small turns, relative to the directions of bones."""
 
 
 def joints(skeleton: Skeleton) -> list[str]:
-    """From the root up to the skull base."""
+    """Return the joints from the root up to the skull base."""
     if "skullbase" not in skeleton:
         return [skeleton.names[0]]
     joint = skeleton.number("skullbase")
@@ -43,7 +44,7 @@ def joints(skeleton: Skeleton) -> list[str]:
 
 
 def turning(skeleton: Skeleton, groups: int) -> list[str]:
-    """The vertebrae of the standard's groups Spine1 up to a number, root upwards."""
+    """Return the vertebrae of the standard's groups Spine1 up to a number, from the root upwards."""
     allowed = {b.joint for b in baps() if b.group_name in {f"Spine{n}" for n in range(1, groups + 1)}}
     return [joint for joint in joints(skeleton) if joint in allowed]
 
@@ -51,41 +52,44 @@ def turning(skeleton: Skeleton, groups: int) -> list[str]:
 def spread(
     skeleton: Skeleton,
     wanted: dict[str, Float64],
-    places: dict[str, Float64],
+    positions: dict[str, Float64],
     anchors: list[str],
     groups: int,
     with_anchors: bool,
 ) -> None:
-    """Replaces the rotations of anchors in wanted by those of all vertebrae that turn.
+    """Replace the rotations of anchors in wanted by those of all vertebrae that turn.
 
-    anchors: joints of the spine that the source has, root first and upwards, two at least. wanted: joint ->
-    (T, 3, 3), rotations of the bones above them; the last one's is its own. places: anchor -> (T, 3), the
-    source's places of the anchors. groups: of the standard. with_anchors: the anchors turn besides the
-    groups.
+    wanted: joint -> (T, 3, 3), rotation of the bone above it, or of the joint itself for the last. anchors:
+    joints of the spine that the source has, from the root upwards, at least two. positions: anchor -> (T, 3),
+    in the source. groups: number of the standard's groups. with_anchors: the anchors turn, too.
     """
     chain = joints(skeleton)
     first, last = chain.index(anchors[0]), chain.index(anchors[-1])
     centres = np.array([skeleton.centres[skeleton.number(joint)] for joint in chain])
     height = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
-    at = [height[chain.index(joint)] for joint in anchors]
-    keys = [at[0], *((a + b) / 2 for a, b in pairwise(at)), at[-1]]
+    anchor_heights = [height[chain.index(joint)] for joint in anchors]
+    keys = [
+        anchor_heights[0],
+        *((a + b) / 2 for a, b in pairwise(anchor_heights)),
+        anchor_heights[-1],
+    ]
     turned = [wanted[anchors[0]], *(wanted[joint] for joint in anchors)]
 
-    def rotation(where: float) -> Float64:
-        upper = int(np.clip(np.searchsorted(keys, where), 1, len(keys) - 1))
+    def rotation_at(level: float) -> Float64:
+        upper = int(np.clip(np.searchsorted(keys, level), 1, len(keys) - 1))
         low, high = keys[upper - 1], keys[upper]
-        share = float(np.clip((where - low) / max(high - low, 1e-12), 0.0, 1.0))
+        share = float(np.clip((level - low) / max(high - low, 1e-12), 0.0, 1.0))
         return rotations.part(turned[upper - 1], turned[upper], share)
 
-    def place(where: float) -> Float64:
-        upper = int(np.clip(np.searchsorted(at, where), 1, len(at) - 1))
-        low, high = at[upper - 1], at[upper]
-        share = float(np.clip((where - low) / max(high - low, 1e-12), 0.0, 1.0))
-        result: Float64 = places[anchors[upper - 1]] * (1 - share) + places[anchors[upper]] * share
+    def position_at(level: float) -> Float64:
+        upper = int(np.clip(np.searchsorted(anchor_heights, level), 1, len(anchor_heights) - 1))
+        low, high = anchor_heights[upper - 1], anchor_heights[upper]
+        share = float(np.clip((level - low) / max(high - low, 1e-12), 0.0, 1.0))
+        result: Float64 = positions[anchors[upper - 1]] * (1 - share) + positions[anchors[upper]] * share
         return result
 
-    turn_too = {*turning(skeleton, groups), *(anchors if with_anchors else ())}
-    free = [joint for joint in chain[first + 1 : last + 1] if joint in turn_too]
+    turning_joints = {*turning(skeleton, groups), *(anchors if with_anchors else ())}
+    free = [joint for joint in chain[first + 1 : last + 1] if joint in turning_joints]
     if not free:
         return
     pinned = anchors if groups >= GROUPS or with_anchors else [anchors[0], *free]
@@ -98,36 +102,37 @@ def spread(
         low, high = chain.index(low_joint), chain.index(high_joint)
         inside = [n for n in range(low, high) if n == low or chain[n] in free]
         ends = [*inside[1:], high]
-        bent = {n: rotation((height[n] + height[end]) / 2) for n, end in zip(inside, ends, strict=True)}
+        bent = {n: rotation_at((height[n] + height[end]) / 2) for n, end in zip(inside, ends, strict=True)}
         line = sum(
             (bent[n] @ (centres[end] - centres[n]) for n, end in zip(inside, ends, strict=True)),
             np.zeros(3),
         )
-        way = place(height[high]) - place(height[low])
+        way = position_at(height[high]) - position_at(height[low])
         length = np.linalg.norm(way, axis=1).min()
         turn = rotations.between_all(line, way) if length > 1e-9 else np.eye(3)
         for n in inside:
             wanted[chain[n]] = turn @ bent[n]
     wanted[anchors[-1]] = head
     if pinned != anchors:
-        lines = [places[above] - places[below] for below, above in pairwise(anchors)]
+        lines = [positions[above] - positions[below] for below, above in pairwise(anchors)]
         at_ends = [chain.index(joint) for joint in anchors]
         own = sorted({first, *(chain.index(joint) for joint in free if joint != anchors[-1])})
         before = np.stack([wanted[chain[n]] for n in own])
         course = np.stack(lines)
         for begin in range(0, before.shape[1], CHUNK):  # matrices of a whole capture would not fit
-            few = slice(begin, begin + CHUNK)
-            before[:, few] = _settled(list(before[:, few]), own, centres, at_ends, list(course[:, few]))
+            chunk = slice(begin, begin + CHUNK)
+            before[:, chunk] = _refine(list(before[:, chunk]), own, centres, at_ends, list(course[:, chunk]))
         wanted.update({chain[n]: part for n, part in zip(own, before, strict=True)})
 
 
-def _settled(
+def _refine(
     parts: list[Float64], own: list[int], centres: Float64, ends: list[int], lines: list[Float64]
 ) -> list[Float64]:
-    """Parts of the spine, turned a little more, so that all source bones together are missed by the least.
+    """Return parts of the spine, turned so that the errors of all source bones become as small as possible.
 
-    parts: rotations (T, 3, 3) of the vertebrae own, and of those above them up to the next. centres: (N, 3)
-    of the chain. ends: numbers of the anchors in it; lines: (T, 3), the source's from each to the next.
+    parts: rotations (T, 3, 3) of the vertebrae own, and of those above them up to the next one. centres: (N,
+    3), of the chain. ends: numbers of the anchors in it. lines: (T, 3), from each anchor to the next in the
+    source.
     """
     count, frames = len(parts), len(parts[0])
     below = np.searchsorted(own, np.arange(len(centres) - 1), side="right") - 1

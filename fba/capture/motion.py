@@ -1,4 +1,4 @@
-"""Captured motion of a skeleton, whatever file it came from: `SkeletonMotion`."""
+"""`SkeletonMotion`: captured motion of a skeleton from a file of any format."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from fba.errors import ModelError
 
 @dataclass(frozen=True, eq=False)
 class SkeletonMotion:
-    """Joints that turn over time, in the units and the frame of the source.
+    """Motion of joints, in the units and the coordinate frame of the source.
 
     names: J joint names. parents: int64 (J,), -1 for the root, which comes first; parents come before
         children. offsets: float64 (J, 3), from the parent, in the rest pose (all rotations identity).
     rotations: float64 (T, J, 4), unit quaternions (w, x, y, z) relative to the parent.
-    positions: float64 (T, 3), of the root. rate: frames a second.
+    positions: float64 (T, 3), of the root. rate: frames per second.
     end_parents: int64 (E,), end_offsets: float64 (E, 3): ends of the last bones, where known.
     name: of the performance.
 
-    Raises ModelError where the parts contradict each other or are not finite.
+    Raises ModelError if the parts contradict each other or are not finite.
     """
 
     names: tuple[str, ...]
@@ -78,9 +78,10 @@ class SkeletonMotion:
         return len(self.positions)
 
     def resample(self, rate: Fraction | int | str) -> SkeletonMotion:
-        """The same motion at another frame rate, turned by slerp; first frame stays, no extrapolation.
+        """Return the same motion at another frame rate, from the first frame on, without extrapolation.
 
-        ValueError for a rate that is not positive, or where there would be too many frames.
+        Rotations are interpolated spherically. ValueError for a rate that is not positive, or too many
+        frames.
         """
         rate = Fraction(rate)
         if rate <= 0:
@@ -93,31 +94,31 @@ class SkeletonMotion:
             raise ValueError(
                 f"resample: {count} frames at {rate} frames/s are too many (at most {MAX_FRAMES})"
             )
-        at = np.arange(count) * float(ratio)
-        before = np.minimum(at.astype(np.intp), len(self) - 1)
+        times = np.arange(count) * float(ratio)
+        before = np.minimum(times.astype(np.intp), len(self) - 1)
         after = np.minimum(before + 1, len(self) - 1)
-        weight = (at - before).astype(np.float64)
+        weight = (times - before).astype(np.float64)
         positions = self.positions[before] * (1 - weight[:, None]) + self.positions[after] * weight[:, None]
         turned = rotations.interpolate(self.rotations, before, after, weight)
         return replace(self, rate=rate, rotations=turned, positions=positions)
 
     def world(self) -> tuple[Float64, Float64]:
-        """Forward kinematics: world rotations (T, J, 4), quaternions, and joint positions (T, J, 3)."""
+        """Return world rotations (T, J, 4), quaternions, and joint positions (T, J, 3)."""
         turned = np.array(self.rotations)
-        places = np.empty((len(self), len(self.names), 3))  # every joint is written below
+        positions = np.empty((len(self), len(self.names), 3))  # every joint is written below
         for joint, parent in enumerate(self.parents):
             if parent < 0:
-                places[:, joint] = self.positions
+                positions[:, joint] = self.positions
                 continue
             turned[:, joint] = rotations.multiply(turned[:, parent], self.rotations[:, joint])
             offset = rotations.matrices(turned[:, parent]) @ self.offsets[joint]
-            places[:, joint] = places[:, parent] + offset
-        return turned, places
+            positions[:, joint] = positions[:, parent] + offset
+        return turned, positions
 
     def rest(self) -> Float64:
-        """(J, 3): joint positions in the rest pose, the root at its offset."""
-        places = np.array(self.offsets)
+        """Return joint positions (J, 3) in the rest pose, the root at its offset."""
+        positions = np.array(self.offsets)
         for joint, parent in enumerate(self.parents):
             if parent >= 0:
-                places[joint] += places[parent]
-        return places
+                positions[joint] += positions[parent]
+        return positions

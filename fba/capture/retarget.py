@@ -1,4 +1,4 @@
-"""Target rotations of the body's joints from a captured motion, then the BAPs that reach them."""
+"""Find target rotations of the body's joints from a captured motion, and the BAPs that reach them."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from fba.errors import FbaWarning, Remedy
 from fba.parameters import BAP_COUNT, baps
 
 CHUNK = 2048
-"""Frames solved at a time: joint matrices of a long capture would not fit into memory."""
+"""Frames solved at once: joint matrices of a long capture would not fit into memory."""
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 LOOSE = 1e-3
-"""Weight of a free preference against a bone's direction."""
+"""Weight of staying close to the source's angles, relative to a bone's direction."""
 STIFF = {"thumb": 0.3, "index": 0.1, "middle": 0.1, "ring": 0.1, "pinky": 0.1}
-"""The same for fingers, which are often straight: the weight keeps their knuckles from turning far.
-Thumbs have a larger one: they bend in another plane in every source, and bones that pointed exactly as the
-source's would need angles that thumbs do not reach and the standard's I planes do not carry."""
+"""The same for fingers, which are often straight: the weight keeps their knuckles from turning far. That of
+thumbs is larger: each source bends them in another plane, and to point exactly as in the source, they would
+need angles that thumbs do not reach and the standard's I planes do not carry."""
 FOREARM_SHARE = 0.5
 """Share of the hand's twist that the forearm takes, whose radius and ulna turn about each other."""
 CLAVICLE_SHARE = 0.5
@@ -42,10 +42,11 @@ def find_targets(
     groups: int,
     with_anchors: bool,
 ) -> Targets:
-    """Target rotations of the body's joints for a captured motion.
+    """Return target rotations of the body's joints for a captured motion.
 
-    mapped: joint of the body -> number of the source's joint. groups: of the spine that share its rotations
-    out, 0 for only the joints that the source has; with_anchors: the source's own joints besides the groups.
+    mapped: joint of the body -> number of the source's joint. groups: number of groups of vertebrae that
+    share the spine's rotations, 0 for only the joints of the source. with_anchors: the source's joints turn,
+    too.
     """
     skeleton = solver.skeleton
     alignment = rest_alignment.align(motion, mapped, skeleton)
@@ -81,9 +82,9 @@ def find_targets(
 
 
 def metres_per_unit(targets: Targets, scale: float | None) -> float:
-    """Metres of the body for one unit of the source: scale where given, else from the lengths of limbs.
+    """Return metres of the body for one unit of the source: scale, or if None, from the lengths of limbs.
 
-    Raises ValueError where scale is no positive number. Warns (FbaWarning) where no limb tells the unit.
+    Raises ValueError if scale is no positive number. Warns (FbaWarning) if there is no limb to compare.
     """
     if scale is None:
         unit = rest_alignment.scale(targets.motion, targets.mapped, targets.skeleton)
@@ -103,9 +104,10 @@ def metres_per_unit(targets: Targets, scale: float | None) -> float:
 
 
 def solve_baps(targets: Targets, scale: float, origin: str, floor: str, plant: bool) -> Int32:
-    """BAPs, int32 (T, 296), that reach the target rotations and positions; may change the legs' targets.
+    """Return BAPs, int32 (T, 296), that reach the target rotations and positions; may change targets of legs.
 
-    scale: metres for one unit of the source. origin, floor, plant: as `fba.capture.from_skeleton` has them.
+    scale: metres for one unit of the source. origin, floor, plant: origin, ground and plant of
+    `fba.capture.from_skeleton`.
     """
     count = len(targets.motion)
     skeleton = targets.skeleton
@@ -114,8 +116,8 @@ def solve_baps(targets: Targets, scale: float, origin: str, floor: str, plant: b
     if floor != "none":
         root = plant_feet(targets, root, scale, floor, plant)
     if origin != "source":
-        place = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
-        root[:, [0, 2]] -= (place - skeleton.centres[0])[[0, 2]]
+        centre = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
+        root[:, [0, 2]] -= (centre - skeleton.centres[0])[[0, 2]]
     numbers = {joint: skeleton.number(joint) for joint in targets.rotations}
     previous = None
     for begin in range(0, count, CHUNK):
@@ -131,7 +133,7 @@ def solve_baps(targets: Targets, scale: float, origin: str, floor: str, plant: b
 
 
 def _swing(targets: Targets, joint: str) -> None:
-    """Turns a joint so that its bone points where it is to; the twist comes second."""
+    """Turn a joint so that its bone points in its target direction; the twist comes second."""
     if joint not in targets.aims:
         return
     axes, *_ = targets.axes(joint)
@@ -144,13 +146,13 @@ def _swing(targets: Targets, joint: str) -> None:
 
 
 def _bend_hinge(targets: Targets, upper: str, lower: str) -> None:
-    """Turns a shoulder or hip and bends the elbow or knee below it so that the lower bone points right."""
+    """Turn a shoulder or hip and bend the elbow or knee below it to point the lower bone in its direction."""
     if targets.aims.get(upper) != lower or lower not in targets.aims:
         return
     upper_bone, lower_bone = targets.bone(upper, lower), targets.bone(lower, targets.aims[lower])
     axes, *_ = targets.axes(lower)
     if abs(axes[0] @ lower_bone) > abs(axes[1] @ lower_bone):
-        _swing(targets, lower)  # a twist outside the flexion swings the bone anywhere by itself
+        _swing(targets, lower)  # with the twist outermost, the joint alone points the bone in any direction
         return
     limits = baps()[targets.solver.convention.freedoms(lower)[0]].i_limits or (0, 0)
     hinge = hinges.Hinge(upper_bone, lower_bone, axes[0], axes[1], 1.0 if sum(limits) > 0 else -1.0)
@@ -165,7 +167,7 @@ def _bend_hinge(targets: Targets, upper: str, lower: str) -> None:
 
 
 def _turn_clavicle(targets: Targets, side: str) -> None:
-    """Turns both joints of the clavicle so that together they point at the shoulder."""
+    """Turn both joints of the clavicle so that together they point at the shoulder."""
     inner, outer, shoulder = f"{side}_sternoclavicular", f"{side}_acromioclavicular", f"{side}_shoulder"
     if targets.aims.get(inner) != shoulder:
         return
@@ -189,7 +191,7 @@ def _turn_clavicle(targets: Targets, side: str) -> None:
 
 
 def _twist_forearm(targets: Targets, side: str) -> None:
-    """Gives the forearm its share of the hand's twist."""
+    """Give the forearm its share of the hand's twist."""
     elbow, wrist = f"{side}_elbow", f"{side}_wrist"
     if elbow not in targets.rotations or wrist not in targets.mapped or wrist not in targets.skeleton:
         return
@@ -199,7 +201,7 @@ def _twist_forearm(targets: Targets, side: str) -> None:
 
 
 def _curl_finger(targets: Targets, finger: str) -> None:
-    """Turns a finger's knuckle so that it curls in the plane in which the source's does."""
+    """Turn a finger's knuckle so that the finger curls in the same plane as the source's."""
     joints = [f"{finger}{n}" for n in (1, 2, 3)]
     joints = joints[: next((n for n, j in enumerate(joints) if j not in targets.aims), 3)]
     if len(joints) < 2:
@@ -232,7 +234,7 @@ def _curl_finger(targets: Targets, finger: str) -> None:
 
 
 def _root_positions(targets: Targets, scale: float) -> Float64:
-    """(T, 3): where the root must be for the middle of the hips to be where the source's is."""
+    """Return positions (T, 3) of the root for which the middle of the hips is where the source's is."""
     centres, number = targets.skeleton.centres, targets.skeleton.number
     hips = [j for j in ("l_hip", "r_hip") if j in targets.mapped]
     if len(hips) == 2 and "sacroiliac" in targets.skeleton:
@@ -240,7 +242,7 @@ def _root_positions(targets: Targets, scale: float) -> Float64:
         pelvis = centres[number("sacroiliac")]
         own = centres[[number(j) for j in hips]].mean(axis=0)
         lower = targets.rotations["sacroiliac"] @ (own - pelvis)
-        place: Float64 = middle - lower - targets.rotations["HumanoidRoot"] @ (pelvis - centres[0])
-        return place
+        position: Float64 = middle - lower - targets.rotations["HumanoidRoot"] @ (pelvis - centres[0])
+        return position
     start: Float64 = targets.source_positions[:, targets.mapped["HumanoidRoot"]] * scale
     return start

@@ -1,4 +1,4 @@
-"""Captured skeleton motion -> body animation parameters."""
+"""Retarget captured skeleton motion to BAPs."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ ORIGINS = ("source", "start", "middle")
 GROUNDS = ("floor", "source", "none")
 SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spines.GROUPS}
 MOST_FRAMES = 500_000
-"""More than an hour at 120 frames/s; every frame needs some 20 kB while it is worked on."""
+"""More than an hour at 120 frames/s; retargeting needs about 20 kB for each frame."""
 LIMBS = tuple(
     tuple(f"{side}_{joint}" for joint in chain)
     for side in "lr"
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 )
-"""Of a limb that the source has at all, it should have all joints."""
+"""A source that has a joint of a limb should have them all."""
 
 
 def from_skeleton(
@@ -44,42 +44,46 @@ def from_skeleton(
     spine: str | int = "spread",
     solver: BapSolver | None = None,
 ) -> Animation:
-    """BAPs of a captured motion: a body track whose mask holds the BAPs of the joints that were found.
+    """Return the BAPs of a captured motion: a body track that sends the BAPs of the joints that were found.
 
-    rate: frames a second; the motion's own where None, else resampled (slerp). joints: source joint name ->
-    joint of the standard, in place of the built-in families of names. scale: metres of the body for one unit
-    of the source's root translation; by default the ratio of leg lengths, so the source's unit does not
-    matter and feet do not slide. origin: what stands at the default place: "source", the source's own
-    origin; "start", the first frame; "middle", the middle of the path, which keeps long walks within what a
-    stream can carry. ground: the height of the feet is corrected for the body's own proportions such that
-    they stand where the source's stand: "floor", on the ground, height 0, whatever the height of the
-    source's ground; "source", at the source's own height; "none", uncorrected. plant: what feet then still
-    lack in height, and what they slip on the ground against the source's, legs make up for by bending and
-    swinging a little, and the body by moving along; has no say where ground is "none". spine: "spread"
-    shares the spine's rotations out over the vertebrae of groups Spine1 and Spine2 and those that the
-    source's joints are, "full" over all; both keep the source's bones exactly. "simple" turns the four of
-    group Spine1 only, a number the groups Spine1 up to that: these keep the head, and the rest as closely as
-    they can. "joints" turns one vertebra for each joint of the source. solver: skeleton and axes; the
-    default body where None.
+    rate: frames per second; None for the motion's own, else it is resampled. joints: source joint name ->
+    joint of the standard, replaces the built-in families of names. scale: metres of the body for one unit
+    of the source's root translation; None for the ratio of leg lengths, so that the source's unit does not
+    matter and feet do not slide.
 
-    Bones point where the source's bones point; the spine's parts turn the vertebrae that carry them;
-    where the source turns about an axis that a joint lacks, the joint before or after it turns instead.
-    BAPs 181..183 are millimetres from the default standing place. Angles are within +-pi; they are not
-    clamped to the standard's ranges. A skeleton of the standard's own joints that rests in the default
-    posture (`fba.capture._standard_skeleton`) is taken joint for joint, wherever its feet are: ground has no
-    say, and spine only where it is "simple", "full" or a number.
+    origin: what is at the body's default position: "source", the source's own origin; "start", the first
+    frame; "middle", the middle of the path, which keeps long walks within the ranges of a stream. ground: how
+    the height of the feet is corrected for the body's own proportions: "floor", feet stand on the ground at
+    height 0, whatever the height of the source's ground; "source", at the height of the source's ground;
+    "none", not corrected. plant: also bend and swing the legs a little, and move the body, so that feet have
+    exactly the height of the source's and slip no more than these; no effect with ground "none".
 
-    Raises ModelError where no family of names fits, the skeleton has no size or there are more than 500,000
-    frames, ValueError for a bad option or joint name. Warns (FbaWarning) of joints that a limb lacks: they
-    stay in the default posture. `fba.capture.retarget_report` says how close the result comes.
+    spine: "spread" divides the spine's rotations between the vertebrae of groups Spine1 and Spine2 and those
+    of the source's joints, "full" between all vertebrae; both keep the directions of the source's bones
+    exactly. "simple" turns the four vertebrae of group Spine1 only, a number those of the groups Spine1 up to
+    that one: these keep the rotation of the head, and the rest as closely as possible. "joints" turns one
+    vertebra for each joint of the source. solver: skeleton and axes; None for the default body.
+
+    Bones point in the directions of the source's bones. Where the source turns about an axis that a joint
+    lacks, the joint before or after it turns instead. BAPs 181..183 are millimetres from the default standing
+    position. Angles are within +-pi; they are not clamped to the standard's ranges. A skeleton of the
+    standard's own joints that rests in the default posture (`fba.capture._standard_skeleton`) is converted
+    joint for joint, wherever its feet are: ground has no effect, and spine only if it is "simple", "full" or
+    a number.
+
+    Raises ModelError if no family of names fits, the skeleton has no size or there are more than 500,000
+    frames, ValueError for a bad option or joint name. Warns (FbaWarning) of missing joints of a limb: they
+    stay in the default posture. `fba.capture.retarget_report` measures how close the result comes.
     """
     solver = solver if solver is not None else BapSolver()
-    _, mapped = matching.match(motion.names) if joints is None else ("", _given(motion, joints, solver))
+    _, mapped = (
+        matching.match(motion.names) if joints is None else ("", _check_joints(motion, joints, solver))
+    )
     mapped = {joint: number for joint, number in mapped.items() if joint in solver.skeleton}
     rate = motion.rate if rate is None else Fraction(rate)
     if not len(motion):
         raise ModelError("the motion has no frames")
-    frames = int((len(motion) - 1) * max(rate, Fraction(0)) / motion.rate) + 1  # before any is made
+    frames = int((len(motion) - 1) * max(rate, Fraction(0)) / motion.rate) + 1  # checked before resampling
     if frames > MOST_FRAMES:
         raise ModelError(
             f"the motion has {frames} frames at {float(rate):g} frames/s, more than {MOST_FRAMES}; "
@@ -93,12 +97,12 @@ def from_skeleton(
     groups = SPINES.get(spine, spine) if isinstance(spine, str) else spine
     if not isinstance(groups, int) or not 0 <= groups <= spines.GROUPS:
         raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {spine!r}")
-    lacking = [
+    missing = [
         joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
     ]
-    if lacking:
+    if missing:
         warnings.warn(
-            f"the source has no joints for {', '.join(lacking)}; they stay as they are",
+            f"the source has no joints for {', '.join(missing)}; they stay as they are",
             FbaWarning,
             stacklevel=2,
         )
@@ -115,14 +119,15 @@ def from_skeleton(
 
 
 def _track(motion: SkeletonMotion, values: Int32, turned: set[str]) -> Animation:
-    """The animation; turned: the joints whose BAPs are sent."""
-    moved = np.zeros(BAP_COUNT, dtype=bool)
-    moved[[b.number - 1 for b in baps() if b.joint in turned]] = True
-    track = BodyTrack(values, np.broadcast_to(moved, values.shape))
+    """Return the animation. turned: the joints whose BAPs are sent."""
+    sent = np.zeros(BAP_COUNT, dtype=bool)
+    sent[[b.number - 1 for b in baps() if b.joint in turned]] = True
+    track = BodyTrack(values, np.broadcast_to(sent, values.shape))
     return Animation(motion.rate, np.arange(len(motion)), None, track, motion.name)
 
 
-def _given(motion: SkeletonMotion, joints: Mapping[str, str], solver: BapSolver) -> dict[str, int]:
+def _check_joints(motion: SkeletonMotion, joints: Mapping[str, str], solver: BapSolver) -> dict[str, int]:
+    """Return joint of the standard -> number of the source joint; ValueError for unknown joints."""
     result = {}
     for source, joint in joints.items():
         if joint not in solver.skeleton:

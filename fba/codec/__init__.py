@@ -1,4 +1,7 @@
-"""The FBA codec: numbers to bits and back (ISO/IEC 14496-2, FBA object; predictive mode)."""
+"""The FBA codec: from numbers to bits and back (ISO/IEC 14496-2, FBA object; predictive mode).
+
+May use: parameters and the data model.
+"""
 
 from fba.codec._decoder import Damage, Decoder, decode
 from fba.codec._encoder import Encoder, EncoderStatistics, encode, encode_with_statistics

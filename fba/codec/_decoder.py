@@ -1,4 +1,4 @@
-"""From bits to an animation: the incremental `Decoder`, and `decode`, which is one pushed to its end."""
+"""Decode FBA streams: the incremental `Decoder`, and `decode` for a complete stream."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, but_recognised
 
 _CHUNK = 1 << 16
-"""Bytes that `decode` hands over at a time, so that blocks do not pile up."""
+"""Bytes that `decode` passes to the decoder at once, so that few blocks are in memory."""
 _DOUBTFUL = 8
-"""Planes before damage that may have been misread: a start code that stands in them is believed."""
+"""Number of planes before damage that may have been misread: a start code in them counts as one."""
 _LARGE_PLANE = 4096
-"""Bytes beyond which a plane that is still incomplete is not tried again for every byte that comes."""
+"""Bytes beyond which an incomplete plane is not tried again with every byte that comes."""
 
 
 @dataclass(frozen=True)
 class Damage:
-    """Something that a salvaging decoder stepped over.
+    """Damage that a salvaging decoder skipped.
 
-    error: what was wrong. start, stop: bytes of the stream that were lost, from the first byte of the
-    damaged plane to where decoding went on (or the end). Where a plane before that one, which was given
-    out, turned out to hold a start code, decoding goes on there, and start is stop.
+    error: what was wrong. start, stop: bytes of the stream that were lost, from the first byte of the damaged
+    plane to where decoding continued (or the end). If decoding continues at a start code in an earlier plane,
+    which had been returned already, start equals stop.
     """
 
     error: FbaError
@@ -45,13 +45,13 @@ class Damage:
 class Decoder:
     """Decodes an FBA stream that arrives in chunks of any size, down to a byte.
 
-    bap_steps: "iso" or "visage", the table of BAP quantiser steps that the stream was made with; no bit
-    of it tells. on_error: "raise", or "salvage" to go on after damage at the next start code that an
-    I plane follows; what was lost is then listed in `damage`.
+    bap_steps: "iso" or "visage", the table of BAP quantiser steps that the stream was made with; the stream
+    itself does not say. on_error: "raise", or "salvage" to continue after damage at the next start code
+    before an I plane; `damage` then lists what was lost.
 
-    `push` and `finish` return the frames whose planes are complete, as soon as they are. What `push`
-    decoded before damage it returns first: the error is raised by the call after that. `finish` raises
-    at once, and what it still decoded is in the `blocks` of its error.
+    `push` and `finish` return frames as soon as their planes are complete. `push` first returns the frames
+    before damage; the next call raises the error. `finish` raises at once; frames that it still decoded are
+    in the `blocks` of its error.
 
     Raises BitstreamError on damage, UnsupportedError for DCT segments (object_coding_type 1, whose
     tables are in no public source); ValueError on wrong arguments. ISO/IEC 14496-2, FBA object.
@@ -69,32 +69,34 @@ class Decoder:
         self._buffer = Buffer()
         self._bit = 0  # next bit to decode, in the buffer
         self._scanned = 0  # byte up to which no start code was found, while looking for one
-        self._retry_at = 0  # bytes that must be there before an incomplete plane is tried again
+        self._retry_at = 0  # length of the buffer from which on an incomplete plane is tried again
         self._step: Callable[[bool], Iterator[Block] | None] = self._find_object
         self._error: BitstreamError | UnsupportedError | None = None
         self._finished = False
         self._objects = 0
-        self._object_end = 0  # byte of the stream at which the last object was over
-        self._seems = ""  # what a stream that begins with no head seems to be
-        self._no_head: BitstreamError | None = None  # why what the stream begins with is none
+        self._object_end = 0  # byte of the stream at which the last object ended
+        self._kind = ""  # what data without an object start code seems to be
+        self._start_error: BitstreamError | None = None  # why the stream does not begin with an object
         self._clock = StreamClock()
         self._lost_from = 0
-        self._doubtful: deque[int] = deque(maxlen=_DOUBTFUL)  # where the last planes begin in the stream
+        self._doubtful: deque[int] = deque(
+            maxlen=_DOUBTFUL
+        )  # bits of the stream at which the last planes begin
         self._reader = PlaneReader(bap_steps)
         self._code_bit: int | None = None  # where the start code before the next plane begins
 
     # ---- what users call
 
     def push(self, chunk: bytes | bytearray | memoryview) -> list[Frame]:
-        """Take in bytes; the frames that they complete."""
+        """Add bytes; return the frames that they complete."""
         return [frame for block in self.push_blocks(chunk) for frame in block.frames()]
 
     def finish(self) -> list[Frame]:
-        """Say that no more bytes come; the last frames. Raises where the stream ends inside a plane."""
+        """End the stream; return the last frames. Raises if the stream ends inside a plane."""
         return [frame for block in self.finish_blocks() for frame in block.frames()]
 
     def push_blocks(self, chunk: bytes | bytearray | memoryview) -> list[Block]:
-        """Like `push`, in blocks of planes: what to use for speed."""
+        """Do the same as `push`, with blocks of planes, which is faster."""
         if self._finished:
             raise ValueError("this decoder is finished; make a new one for another stream")
         self._raise_pending()
@@ -110,20 +112,21 @@ class Decoder:
         return blocks
 
     def finish_blocks(self) -> list[Block]:
-        """Like `finish`, in blocks."""
+        """Do the same as `finish`, with blocks of planes."""
         self._raise_pending()
         if self._finished:
             return []
         blocks = self._advance(final=True)
         self._finished = True
         if self._error is not None:
-            self._error.blocks = blocks  # there is no later call that could raise it
+            self._error.blocks = blocks  # no later call could raise it
             raise self._error
         return blocks
 
-    # ---- the states: each decodes what it can, or returns None where it needs more bytes
+    # ---- states: each decodes what it can, or returns None if it needs more bytes
 
     def _advance(self, *, final: bool) -> list[Block]:
+        """Return all blocks that can be decoded. final: no more bytes come."""
         blocks: list[Block] = []
         while self._error is None:
             self._lost_from = self._bit
@@ -136,28 +139,30 @@ class Decoder:
                 if not self._salvage:
                     self._error = error
                 else:
-                    self._lose(error)
+                    self._skip_damage(error)
         return blocks
 
     def _find_object(self, final: bool) -> Iterator[Block] | None:
-        """Look for the object start code; headers of the systems around it may stand before it."""
+        """Look for the object start code; headers of other layers may come before it."""
         buffer = self._buffer
-        if self._objects == 0 and self._scanned == 0 and self._no_head is None:
+        if self._objects == 0 and self._scanned == 0 and self._start_error is None:
             head = buffer.data[: min(buffer.length, 3)].tobytes()
             if head != syntax.START_CODE_PREFIX[: len(head)] or (final and buffer.length < 4):
-                self._seems = but_recognised(buffer.data[: min(buffer.length, HEAD_BYTES)].tobytes())
-                found = (
-                    f"it begins with {buffer.data[: min(buffer.length, 4)].tobytes().hex(' ')}{self._seems}"
+                self._kind = but_recognised(buffer.data[: min(buffer.length, HEAD_BYTES)].tobytes())
+                beginning = (
+                    f"it begins with {buffer.data[: min(buffer.length, 4)].tobytes().hex(' ')}{self._kind}"
                     if head
                     else "it is empty"
                 )
-                self._no_head = BitstreamError(
-                    f"no FBA stream: expected the object start code 00 00 01 ba, but {found}", plane=0, bit=0
+                self._start_error = BitstreamError(
+                    f"no FBA stream: expected the object start code 00 00 01 ba, but {beginning}",
+                    plane=0,
+                    bit=0,
                 )
                 if not self._salvage:
-                    raise self._no_head
-        while (found_code := buffer.find_start_code(self._scanned)) is not None:
-            position, code = found_code
+                    raise self._start_error
+        while (start_code := buffer.find_start_code(self._scanned)) is not None:
+            position, code = start_code
             if self._salvage and self._objects == 0 and code in syntax.PLANE_CODES:
                 if position + 4 >= buffer.length and not final:
                     break  # the first bit of the plane is not here yet
@@ -165,8 +170,8 @@ class Decoder:
                     return self._join(position)
             self._scanned = position + 4
             if code in syntax.OBJECT_CODES:
-                if self._no_head is not None and self._objects == 0:
-                    self.damage.append(Damage(self._no_head, 0, buffer.offset + position))
+                if self._start_error is not None and self._objects == 0:
+                    self.damage.append(Damage(self._start_error, 0, buffer.offset + position))
                 self._bit = 8 * self._scanned
                 self._scanned = 0
                 self._begin_object()
@@ -177,7 +182,7 @@ class Decoder:
         if final:
             if self._objects == 0:
                 raise BitstreamError(
-                    f"no FBA object start code (00 00 01 ba) in the stream{self._seems}", plane=0, bit=0
+                    f"no FBA object start code (00 00 01 ba) in the stream{self._kind}", plane=0, bit=0
                 )
             rest = buffer.offset + buffer.length - self._object_end
             if rest > 0:
@@ -187,8 +192,8 @@ class Decoder:
         return None
 
     def _join(self, position: int) -> Iterator[Block]:
-        """Start at an I plane in the middle of an object whose start is missing or damaged."""
-        error = self._no_head or BitstreamError(
+        """Start decoding at an I plane of an object whose start is missing or damaged."""
+        error = self._start_error or BitstreamError(
             "the object start code 00 00 01 ba is missing", plane=0, bit=0
         )
         self._begin_object()
@@ -199,6 +204,7 @@ class Decoder:
         return iter(())
 
     def _decode_planes(self, final: bool) -> Iterator[Block] | None:
+        """Decode the next planes, or the next start code."""
         buffer = self._buffer
         end = 8 * buffer.length
         if buffer.length < self._retry_at and not final:
@@ -227,7 +233,7 @@ class Decoder:
         try:
             planes = self._reader.read(buffer.data, self._bit, end, after_code=self._code_bit is not None)
         except (BitstreamError, UnsupportedError) as error:
-            raise self._located(error) from None
+            raise self._in_stream(error) from None
         except OutOfDataError:
             if final:
                 raise BitstreamError(
@@ -241,10 +247,10 @@ class Decoder:
         return iter([self._block(planes)] if planes is not None else [])
 
     def _resynchronise(self, final: bool) -> Iterator[Block] | None:
-        """After damage: go to the next start code of a plane or object that an I plane follows."""
+        """Look, after damage, for the next start code of an object, or of a plane that is an I plane."""
         buffer = self._buffer
-        while (found := buffer.find_start_code(self._scanned)) is not None:
-            position, code = found
+        while (start_code := buffer.find_start_code(self._scanned)) is not None:
+            position, code = start_code
             wanted = code in syntax.PLANE_CODES or code in syntax.OBJECT_CODES
             if wanted and position + 4 >= buffer.length and not final:
                 return None  # the first bit of the plane is not here yet
@@ -252,7 +258,7 @@ class Decoder:
             if not wanted or position + 4 >= buffer.length:
                 continue
             if code in syntax.PLANE_CODES and not buffer.data[position + 4] & 0x80:
-                continue  # a P plane: what it builds upon is lost
+                continue  # a P plane: the planes that it depends on are lost
             self._close_damage(position)
             self._bit = 8 * position
             self._scanned = 0
@@ -265,15 +271,15 @@ class Decoder:
         return None
 
     def _block(self, planes: Planes) -> Block:
-        """Planes with their times; the stream goes on behind them."""
+        """Return planes with their times, and move on past them."""
         settings, clock = planes.settings, self._clock
         if settings.intra:
-            for odd in clock.begin_intra(settings.frame_rate, settings.time_code):
-                self._warn(f"plane {self.planes}, bit {self._absolute(int(planes.borders[0]))}: {odd}")
+            for problem in clock.begin_intra(settings.frame_rate, settings.time_code):
+                self._warn(f"plane {self.planes}, bit {self._absolute(int(planes.borders[0]))}: {problem}")
         assert clock.rate is not None
         borders = planes.borders + 8 * self._buffer.offset
         if self._salvage:
-            self._doubtful.extend(borders[-1 - _DOUBTFUL : -1].tolist())  # behind any start code
+            self._doubtful.extend(borders[-1 - _DOUBTFUL : -1].tolist())  # after start codes
         if self._code_bit is not None:
             borders[0] = self._code_bit
         face, body = settings.face, settings.body
@@ -297,11 +303,13 @@ class Decoder:
         return block
 
     def _begin_object(self) -> None:
+        """Reset the reader for a new object."""
         self._reader.begin_object()
         self._objects += 1
         self._code_bit = None
 
     def _end_object(self, code: int) -> None:
+        """End the object at a start code of no plane; when salvaging, BitstreamError for an unknown one."""
         if self._salvage and code != syntax.END_CODE:
             raise BitstreamError(
                 f"start code 00 00 01 {code:02x} where a plane, the end code 00 00 01 b1 or a new object "
@@ -316,10 +324,11 @@ class Decoder:
     # ---- damage
 
     def _absolute(self, bit: int) -> int:
+        """Return the position in the stream of a bit in the buffer."""
         return bit + 8 * self._buffer.offset
 
-    def _located(self, error: BitstreamError | UnsupportedError) -> BitstreamError | UnsupportedError:
-        """An error of the plane at hand whose bit counts from the start of the buffer, as what users get."""
+    def _in_stream(self, error: BitstreamError | UnsupportedError) -> BitstreamError | UnsupportedError:
+        """Return an error of the current plane with its bit counted from the start of the stream."""
         assert error.bit is not None
         bit = self._absolute(error.bit)
         if isinstance(error, UnsupportedError):
@@ -327,12 +336,12 @@ class Decoder:
             return UnsupportedError(text, what=error.what, plane=self.planes, bit=bit)
         return BitstreamError(error.message, plane=self.planes, bit=bit)
 
-    def _lose(self, error: FbaError) -> None:
-        """Note damage in the plane at `_bit`, and go looking for the next place to start from."""
+    def _skip_damage(self, error: FbaError) -> None:
+        """List damage in the plane at `_lost_from`, and look for the next place to continue."""
         start = self._lost_from >> 3 if self._objects else -self._buffer.offset
-        for kept in (error, error.__cause__):  # millions may be listed: without the frames they rose from
-            if kept is not None:
-                kept.__traceback__ = kept.__context__ = None
+        for listed in (error, error.__cause__):  # there may be millions: tracebacks would fill the memory
+            if listed is not None:
+                listed.__traceback__ = listed.__context__ = None
         self.damage.append(Damage(error, self._buffer.offset + start, self._buffer.offset + start))
         self._reader.forget_values()
         self._code_bit = None
@@ -344,10 +353,12 @@ class Decoder:
         self._step = self._resynchronise
 
     def _close_damage(self, position: int) -> None:
+        """Set the end of the last damage, a byte of the buffer."""
         last, stop = self.damage[-1], self._buffer.offset + position
         self.damage[-1] = Damage(last.error, min(last.start, stop), stop)
 
     def _raise_pending(self) -> None:
+        """Raise the error that an earlier call left."""
         if self._error is not None:
             error, self._finished = self._error, True
             raise error
@@ -363,12 +374,11 @@ def decode(
     bap_steps: str = "iso",
     on_error: Literal["raise", "salvage"] = "raise",
 ) -> Animation:
-    """Decode a whole FBA stream.
+    """Return the animation of a complete FBA stream.
 
-    bap_steps, on_error: see `Decoder`; with "salvage", what was lost is told in an FbaWarning.
-    Returns the values that were sent and the masks that say which; times from frame rate, skips and
-    time codes. A stream that changes its rate comes back at the smallest rate that holds all its times.
-    Raises BitstreamError, UnsupportedError.
+    bap_steps, on_error: see `Decoder`; with "salvage", FbaWarnings say what was lost. Times come from frame
+    rate, skips and time codes. A stream that changes its rate is returned at the lowest rate at which all its
+    times are exact. Raises BitstreamError, UnsupportedError.
     """
     decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
     frames = FrameBuffer(in_place=True)

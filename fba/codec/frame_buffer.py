@@ -1,4 +1,4 @@
-"""Decoded blocks joined to frames: for `decode`, which looks at the end, and for streams that arrive."""
+"""Join decoded blocks: for `decode`, at the end of a stream, and for live streams, at any time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fba.tracks import trusted
 
 @dataclass(frozen=True)
 class DecodedFrames:
-    """All frames that were decoded so far: the fields of `fba.Animation`, and what their planes take.
+    """All frames decoded so far: the fields of `fba.Animation`, and the sizes and types of planes.
 
     plane_bits: int64 (T,). plane_intra: bool (T,), True for I planes.
     """
@@ -32,18 +32,18 @@ class DecodedFrames:
     plane_intra: Bool
 
     def animation(self, name: str = "") -> Animation:
-        """These frames as an animation. ValueError where there are none."""
+        """Return these frames as an animation. ValueError without frames."""
         if not len(self.index):
             raise ValueError("there is no frame to make an animation of")
         return Animation(self.rate, self.index, self.face, self.body, name)
 
 
 class FrameBuffer:
-    """Takes decoded blocks in stream order; `decoded` returns all their frames without a copy.
+    """Collects decoded blocks in stream order; `decoded` returns all their frames without a copy.
 
-    in_place: arrays are enlarged where they lie, so that nothing is held twice; `decoded` may then be called
-    only once, at the end. Otherwise what it returned does not change as more blocks come.
-    left_out: "a face" or "a body" that came only after `fix_parts`, "" where none did.
+    in_place: arrays grow in place, which needs less memory; `decoded` may then be called only once, at the
+    end. Otherwise arrays that it returned do not change when more blocks come. frames: their number.
+    left_out: "a face" or "a body" if one came only after `fix_parts`, else "".
     """
 
     def __init__(self, *, in_place: bool = False) -> None:
@@ -58,7 +58,7 @@ class FrameBuffer:
         self._body: dict[str, Any] = {}
 
     def fix_parts(self) -> None:
-        """From now on there is a face, and a body, only where there is one now."""
+        """From now on, ignore a face or body if there has been none so far."""
         self._parts_fixed = True
 
     def add(self, block: Block) -> None:
@@ -91,7 +91,7 @@ class FrameBuffer:
         self.frames += count
 
     def decoded(self) -> DecodedFrames:
-        """All frames so far."""
+        """Return all frames so far."""
         face = {name: field.view() for name, field in self._face.items()}
         if face and not self._face["interpolated"].any:
             face["interpolated"] = None
@@ -106,9 +106,11 @@ class FrameBuffer:
         )
 
     def _accepts(self, part: str) -> bool:
+        """Whether a new part may be added; otherwise set `left_out`."""
         if self._parts_fixed:
             self.left_out = part
         return not self._parts_fixed
 
     def _rows(self, columns: int, dtype: type[np.generic]) -> Rows:
+        """Return rows of zeros for all frames so far."""
         return Rows((columns,), dtype, self.frames, in_place=self._in_place)

@@ -1,7 +1,7 @@
-"""How planes are coded: what the header of a plane says, besides the values.
+"""Settings of planes: the content of their headers.
 
-A decoder reports these, an encoder follows them, and an EPF file lists them. Settings of a part stay
-in force until the next I plane that carries the part.
+A decoder returns them, an encoder uses them, and an EPF file lists them. Settings of a part stay in force
+until the next I plane that carries the part.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from fractions import Fraction
 from fba.arrays import Bool, UInt8
 
 RANGE_UNIT = 60
-"""Range limits are sent as multiples of this."""
+"""Range limits are multiples of this."""
 RANGE_CODE_MAX = 31
-"""Largest 5-bit range limit; 31 x 60 = 1860."""
+"""Largest 5-bit range code: a limit of 31 x 60 = 1860."""
 QUANT_MAX = 31
 
 
 @dataclass(frozen=True)
 class FrameRate:
-    """frame_rate (8 bits) + seconds / 16 (4 bits), times 1000/1001 where frequency_offset is set."""
+    """Frame rate: frame_rate (8 bits) + seconds / 16 (4 bits), times 1000/1001 if frequency_offset is set."""
 
     frame_rate: int
     seconds: int = 0
@@ -28,13 +28,13 @@ class FrameRate:
 
     @property
     def fraction(self) -> Fraction:
-        """Frames a second, exact; 0 where the header says 0."""
+        """Frames per second, exact; 0 if the header says 0."""
         rate = Fraction(self.frame_rate * 16 + self.seconds, 16)
         return rate * Fraction(1000, 1001) if self.frequency_offset else rate
 
     @classmethod
     def from_fraction(cls, rate: Fraction) -> FrameRate | None:
-        """The header fields that carry this rate exactly, or None where there are none."""
+        """Return the header fields that carry this rate exactly, or None."""
         for offset in (0, 1):
             sixteenths = rate * 16 * (Fraction(1001, 1000) if offset else 1)
             if sixteenths.denominator == 1 and 0 < sixteenths < 256 * 16:
@@ -44,7 +44,7 @@ class FrameRate:
 
 @dataclass(frozen=True)
 class TimeCode:
-    """hours (5 bits), minutes (6), marker bit, seconds (6)."""
+    """Time code: hours (5 bits), minutes (6), marker bit, seconds (6)."""
 
     hours: int
     minutes: int
@@ -61,8 +61,8 @@ class TimeCode:
 class RangeLists:
     """The four lists of range limits of a part, as 5-bit codes: limit = 60 x code, minima negated.
 
-    Each: uint8 (68,) for FAPs or (296,) for BAPs, parameter i+1 in element i, or None where the list
-    is not sent. Only the elements of masked-in parameters (FAPs: from 3 on) reach the bits.
+    Each is uint8 (68,) for FAPs or (296,) for BAPs, parameter i+1 in element i, or None if it is not sent.
+    Only the elements of sent parameters (FAPs: from 3 on) are coded.
     """
 
     i_max: UInt8 | None = None
@@ -84,7 +84,7 @@ class PartSettings:
 
     mask_types: per group (10 or 24): 0 none, 1 masked (unsent keep their last value), 2 masked (unsent
         are interpolated; FAPs only), 3 all.
-    mask: bool (68,) or (296,), what the types and group masks together send.
+    mask: bool (68,) or (296,), parameters sent, from mask types and group masks.
     quant: fap_quant or bap_quant, 0..31. gender: suggested_gender, 1 male.
     coding_type: 0 predictive, 1 DCT segments. ranges: the lists sent with this plane.
     """
@@ -99,11 +99,11 @@ class PartSettings:
 
 @dataclass(frozen=True, eq=False)
 class PlaneSettings:
-    """One plane: what its header says, and which frames of the source it codes.
+    """Settings of one plane: its header, and the frames of the source that it codes.
 
     face_frame, body_frame: number of the frame of the FAP and BAP file that it codes; None where the
         plane lacks the part.
-    face, body: what is in force for the part (repeated, the same object, on P planes).
+    face, body: settings in force for the part; on P planes the same object as on the I plane.
     start_code: a plane start code stands before it.
     """
 
@@ -120,10 +120,10 @@ class PlaneSettings:
 
 @dataclass(frozen=True)
 class PlaneInfo:
-    """Where and how one plane stood in a stream.
+    """Position and settings of one plane in a stream.
 
-    number: 0-based, in stream order. bit: where it starts, from the start of the stream. bits: its
-    length; both with the alignment and start code before it.
+    number: 0-based, in stream order. bit: where it starts, from the start of the stream. bits: its length.
+    Both include the alignment and start code before it.
     """
 
     number: int

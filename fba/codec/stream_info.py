@@ -1,4 +1,4 @@
-"""What a stream is, without keeping its values: `probe_stream`, and the `StreamInfo` it gives."""
+"""Describe a stream without storing its values: `probe_stream`, which returns `StreamInfo`."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class PartInfo:
 
 @dataclass(frozen=True)
 class StreamInfo:
-    """What `fba info` prints.
+    """Description of a stream or file, as `fba info` prints it.
 
-    format: name of the file format, "fba" for streams. size: bytes. rate: frames a second. frames:
-    frames (planes). duration, start: seconds, exact; duration runs from the first frame to one period
+    format: name of the file format, "fba" for streams. size: bytes. rate: frames per second. frames: number
+    of frames (planes). duration, start: seconds, exact; duration runs from the first frame to one period
     after the last. skipped: frames left out between frames. bits_per_second: size over duration.
 
     For FBA streams: intra_planes, start_codes (planes with one before them), plane_bits int64 (T,) and
-    plane_intra bool (T,), frame_index int64 (T,), and the damage that was stepped over.
+    plane_intra bool (T,), frame_index int64 (T,), and damage that was skipped.
     """
 
     format: str
@@ -76,7 +76,7 @@ class StreamInfo:
         return float(8 * self.size / self.duration) if self.duration else 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers and strings, for JSON."""
+        """Return plain numbers and strings, for JSON."""
 
         def part(info: PartInfo | None) -> dict[str, Any] | None:
             if info is None:
@@ -102,7 +102,7 @@ class StreamInfo:
 
     @classmethod
     def of_animation(cls, animation: Animation, format: str, size: int) -> StreamInfo:
-        """What a file of another format holds, from the animation that was read from it."""
+        """Return the description of a file of another format, from the animation in it."""
         parts: list[PartInfo | None] = []
         for track in (animation.face, animation.body):
             if track is None:
@@ -126,37 +126,39 @@ class StreamInfo:
 
 
 class _PartCount:
-    """Gathers a `PartInfo`."""
+    """Collects a `PartInfo`."""
 
     def __init__(self) -> None:
         self.settings: dict[int, PartSettings] = {}
         self.frames = 0
 
     def add(self, settings: PartSettings | None, frames: int) -> None:
+        """Count frames with these settings; None for planes without the part."""
         if settings is not None:
             self.settings[id(settings)] = settings
             self.frames += frames
 
     def info(self) -> PartInfo | None:
+        """Return the description, or None if no plane carried the part."""
         if not self.settings:
             return None
-        used = list(self.settings.values())
-        sent = np.logical_or.reduce([one.mask for one in used])
-        kinds = sorted({kind for one in used for kind in one.mask_types})
+        all_settings = list(self.settings.values())
+        sent = np.logical_or.reduce([settings.mask for settings in all_settings])
+        kinds = sorted({kind for settings in all_settings for kind in settings.mask_types})
         return PartInfo(
             tuple((np.flatnonzero(sent) + 1).tolist()),
             self.frames,
-            tuple(sorted({one.quant for one in used})),
+            tuple(sorted({settings.quant for settings in all_settings})),
             tuple(_MASK_NAMES[kind] for kind in kinds),
-            tuple(sorted({one.gender for one in used})),
+            tuple(sorted({settings.gender for settings in all_settings})),
         )
 
 
 def probe_stream(data: bytes | bytearray | memoryview, *, bap_steps: str = "iso") -> StreamInfo:
-    """What an FBA stream is: its planes, rates, parameters, bits.
+    """Return the description of an FBA stream: planes, rates, parameters, bits.
 
-    Decodes it, since nothing but the arithmetic decoder knows where a plane ends, but keeps no values.
-    Steps over damage and lists it. Raises BitstreamError where no plane can be decoded at all.
+    Decodes it, because only the arithmetic decoder finds the ends of planes, but stores no values. Skips
+    damage and lists it. Raises BitstreamError if no plane can be decoded.
     """
     decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
     face, body = _PartCount(), _PartCount()
@@ -202,6 +204,7 @@ def probe_stream(data: bytes | bytearray | memoryview, *, bap_steps: str = "iso"
 
 
 def _blocks(decoder: Decoder, data: memoryview) -> Iterator[Block]:
+    """Yield all blocks of a stream."""
     for start in range(0, len(data), _CHUNK):
         yield from decoder.push_blocks(data[start : start + _CHUNK])
     yield from decoder.finish_blocks()

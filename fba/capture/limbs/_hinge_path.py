@@ -1,9 +1,9 @@
-"""By how much a hinge's upper bone is turned, frame by frame: the search behind `fba.capture.limbs.hinges`.
+"""Find the turn of a hinge's upper bone in every frame, for `fba.capture.limbs.hinges`.
 
-Where a limb is bent, the plane of its hinge says how; where it is almost straight, the plane means little,
-and may swing round within a frame. So the whole path is sought at once: the one of least cost, where missing
-the wanted direction, bending the wrong way and turning fast all cost. First over a grid of turns (dynamic
-programming, which finds the best of all paths), then between the grid's lines (Newton's method).
+If a limb is bent, the plane of its hinge determines the turn; if it is almost straight, the plane is
+uncertain and may spin within a frame. So the path over all frames is optimised at once. Costs are: missing
+the target direction, bending the wrong way, turning fast. First over a grid of turns (dynamic programming,
+which finds the best path), then between the grid's values (Newton's method).
 """
 
 from __future__ import annotations
@@ -17,27 +17,29 @@ from fba.capture.limbs._coupled_paths import chain
 from fba.compiled import compiled, inlined
 
 STATES = 48
-"""Lines of the grid: every 7.5 degrees."""
+"""Values of the grid: every 7.5 degrees."""
 TURN = 2.0 * math.pi
 SLACK = 0.03
-"""Radians sideways that cost 1 a second."""
+"""Error in radians, sideways, that costs 1 per second."""
 BOUND = 0.05
-"""Radians sideways that cost as much again, by the sixth power: errors end below 5 degrees."""
+"""Error that costs another 1 per second, growing by the sixth power: it keeps errors below 5 degrees."""
 WRONG = 0.15
-"""Radians of bending the wrong way that cost 1 a second."""
+"""Bending the wrong way, in radians, that costs 1 per second."""
 SPEED = 2.0
-"""Radians a second of turning that cost 1 a second."""
+"""Speed of turning, in radians per second, that costs 1 per second."""
 LOYAL = 7.0
-"""Radians away from the usual turn that cost 1 a second."""
+"""Distance from the usual turn, in radians, that costs 1 per second."""
 STEPS = 12
+"""Most iterations of Newton's method."""
 LEAP = 0.2
-"""Radians that a turn changes by at most in a step of the second search."""
+"""Largest change of a turn in one iteration, in radians."""
 SETTLED = 1e-4
+"""Change in radians below which the iteration ends."""
 
 
 @inlined
 def _cost(sideways: float, natural: float, away: float) -> float:
-    """A second's cost: see the constants above."""
+    """Return the cost per second: see the constants above."""
     wrong = max(0.0, -natural) / WRONG
     square = (sideways / BOUND) ** 2
     return (sideways / SLACK) ** 2 + square * square * square + wrong * wrong + (away / LOYAL) ** 2
@@ -45,6 +47,7 @@ def _cost(sideways: float, natural: float, away: float) -> float:
 
 @inlined
 def _away(turn: float, usual: float) -> float:
+    """Return the distance from the usual turn, in -pi..pi."""
     difference = turn - usual
     return difference - TURN * math.floor(difference / TURN + 0.5)
 
@@ -52,12 +55,11 @@ def _away(turn: float, usual: float) -> float:
 def follow(
     sideways: Float64, natural: Float64, ease: Float64, usual: float, period: float, path: Float64
 ) -> None:
-    """Fills path, float64 (T,): turns in radians, without jumps of whole turns.
+    """Fill path, float64 (T,): turns in radians, without jumps of full turns.
 
-    sideways, natural: (T, 3), of the wanted direction: what is left sideways of the hinge, and how far it
-    lies to the side that the hinge bends to, both as a . (1, cos turn, sin turn). ease: (T,), 1 or less,
-    by which turning since the frame before costs less. usual: the turn where nothing says otherwise.
-    period: seconds a frame.
+    sideways, natural: (T, 3), a of a . (1, cos turn, sin turn), which is how far the target direction is off
+    the hinge's plane, and how far on the side that the hinge bends to. ease: (T,), 1 or less, factor of the
+    cost of turning since the frame before. usual: the turn without any other cost. period: seconds per frame.
     """
     _search(sideways, natural, ease, usual, period, path)
     centre = usual + TURN * math.floor((float(np.median(path)) - usual) / TURN + 0.5)
@@ -68,7 +70,7 @@ def follow(
 def _search(
     sideways: Float64, natural: Float64, ease: Float64, usual: float, period: float, path: Float64
 ) -> None:
-    """Fills the path with the best one over the grid: dynamic programming."""
+    """Fill path with the best one over the grid: dynamic programming."""
     count = path.shape[0]
     step = TURN / STATES
     sines = np.zeros(STATES)
@@ -115,9 +117,9 @@ def _search(
 def _refine(
     sideways: Float64, natural: Float64, ease: Float64, centre: float, period: float, path: Float64
 ) -> None:
-    """Improves the path: Newton's method, whose equations couple each frame with its neighbours only.
+    """Improve path by Newton's method, whose equations couple each frame with its neighbours only.
 
-    centre: the usual turn, with the number of whole turns that brings it closest to the path.
+    centre: the usual turn plus the number of full turns that brings it closest to the path.
     """
     count = path.shape[0]
     stiff = 2.0 / (SPEED * SPEED * period)

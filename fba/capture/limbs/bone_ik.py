@@ -1,4 +1,4 @@
-"""Joint angles that point bones in wanted directions, for joints that lack a freedom."""
+"""Find joint angles that point bones in given directions, for joints that lack a degree of freedom."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from fba import rotations
 from fba.arrays import Float64
 
 STEPS = 8
+"""Most iterations."""
 LEAP = 0.5
-"""Radians that an angle changes by at most in a step: no leaps where a bone is almost straight."""
+"""Largest change of an angle in one iteration, in radians, so that almost straight limbs do not flip."""
 SETTLED = 1e-7
+"""Change in radians below which the iteration ends."""
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A line that is to point somewhere.
+    """Target direction of a line of bones.
 
-    pieces: bones, (3,) or (T, 3), that make up the line one after another, each with how many of the axes
-    turn it, counted from the outermost. wanted: unit (T, 3).
+    pieces: the bones, (3,) or (T, 3), each with the number of axes that turn it, counted from the outermost.
+    wanted: unit (T, 3).
     """
 
     pieces: tuple[tuple[Float64, int], ...]
@@ -29,7 +31,7 @@ class Target:
 
 
 def product(axes: Float64, angles: Float64) -> Float64:
-    """Matrices (T, 3, 3): turns about axes (K, 3) by angles (T, K), outermost first."""
+    """Return matrices (T, 3, 3): turns about axes (K, 3) by angles (T, K), outermost first."""
     result = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
     for number, axis in enumerate(axes):
         result = result @ rotations.turn(axis, angles[:, number])
@@ -37,18 +39,18 @@ def product(axes: Float64, angles: Float64) -> Float64:
 
 
 def aim(axes: Float64, start: Float64, bone: Float64, wanted: Float64, weights: Float64) -> Float64:
-    """Angles (T, K) whose turns about axes (K, 3) bring bone (3,) or (T, 3) to wanted (T, 3).
+    """Return angles (T, K) whose turns about axes (K, 3) bring bone (3,) or (T, 3) to wanted (T, 3).
 
-    Of all that do, those closest to start (T, K), freedoms with small weights (K,) giving way first.
-    Start must not be far off. Directions are unit vectors.
+    Of all solutions, the one closest to start (T, K), by weights (K,): angles with small weights change most.
+    Start must be close to a solution. Directions are unit vectors.
     """
     return aim_all(axes, start, (Target(((bone, len(axes)),), wanted),), weights)
 
 
 def aim_all(axes: Float64, start: Float64, targets: Sequence[Target], weights: Float64) -> Float64:
-    """Angles (T, K) of turns about axes (K, 3), one inside the other, that meet several targets at once.
+    """Return angles (T, K) of nested turns about axes (K, 3) that reach several targets at once.
 
-    See `aim`. Where they cannot all be met, the sum of squares of what is missed is least. Gauss-Newton.
+    See `aim`. If not all can be reached, the sum of squared errors is minimal. Gauss-Newton method.
     """
     angles = np.array(start)
     count = axes.shape[0]

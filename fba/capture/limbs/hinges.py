@@ -1,14 +1,13 @@
 """Elbows and knees: joints that flex and twist, but cannot abduct.
 
-Such a hinge swings its bone in one plane only. Where the source does more, the upper bone is turned
-about its own length until the plane is right, and the hinge's twist takes that turn back for what
-hangs below: both bones keep their directions, and the hand or foot keeps its own. Everything is an
-array over frames.
+Such a hinge swings its bone in one plane only. Where the source leaves that plane, the upper bone is turned
+about its own length until the plane is right, and the hinge's twist reverses that turn for the parts below:
+both bones keep their directions, and so does the hand or foot. Everything is an array over frames.
 
-With the twist tau - phi of the hinge, a turn phi leaves c0 + c1 cos phi + c2 sin phi of the lower bone's
-direction sideways, which is zero for two phi: one bends the hinge the natural way, one the other way. Where
-the limb is almost straight, all phi leave little. `fba.capture.limbs._hinge_path` finds the path that misses
-the direction by little, bends the natural way, and does not jump.
+With the twist tau - phi of the hinge, a turn phi leaves an error c0 + c1 cos phi + c2 sin phi of the lower
+bone's direction, sideways, which is zero for two phi: with one the hinge bends the natural way, with one the
+other way. If the limb is almost straight, the error is small for all phi. `fba.capture.limbs._hinge_path`
+finds a path of small errors that bends the natural way and does not jump.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from fba.capture.limbs._hinge_path import follow
 from fba.capture.limbs.bone_ik import aim, product
 
 STIFF = 0.3
-"""Weight of the twists that were found against the lower bone's direction, in the last step: a limb that is
-bent by much less than this (radians) keeps them, and so does not swing round where its plane does."""
+"""Weight of the computed twists relative to the lower bone's direction, in the last step: a limb that is bent
+by much less than this (radians) keeps them, so that it does not spin when its plane does."""
 LOOSE = 2e-3
 """The same for flexion."""
 CLEAR_BEND = 0.3
-"""From this angle on, a bend shows which way the hinge opens; less may be a little beyond straight."""
+"""Angle in radians from which on a bend shows the hinge's direction; less may be a little beyond straight."""
 ABRUPT = 10.0
-"""Radians a second: a source that turns faster may make the result turn faster, too."""
+"""Radians per second: if the source turns faster, the result may turn faster, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +37,7 @@ class Hinge:
     """A hinge in the default posture.
 
     upper, lower: unit (3,), directions of the bones. flexion, twist: unit (3,), signed axes of the hinge,
-    flexion outermost. natural: +1 where it bends by positive flexion, -1 by negative.
+    flexion outermost. natural: +1 if it bends by positive flexion, -1 if by negative.
     """
 
     upper: Float64
@@ -49,10 +48,10 @@ class Hinge:
 
 
 def solve(hinge: Hinge, direction: Float64, local: Float64, rate: float) -> Float64:
-    """Angles (T, 3): turn about the upper bone, flexion, twist.
+    """Return angles (T, 3): turn about the upper bone, flexion, twist.
 
-    direction: (T, 3), wanted for the lower bone, and local: (T, 3, 3), wanted rotation of the lower bone,
-    both in the frame of the upper bone before it is turned. Direction comes first.
+    direction: (T, 3), local: (T, 3, 3), target direction and rotation of the lower bone, both in the frame of
+    the upper bone before it is turned. rate: frames per second. The direction has priority.
     """
     total = turn_about(local, hinge.twist)
     along = 1.0 if hinge.upper @ hinge.twist > 0 else -1.0
@@ -69,14 +68,14 @@ def solve(hinge: Hinge, direction: Float64, local: Float64, rate: float) -> Floa
 
 
 def matrices(hinge: Hinge, angles: Float64) -> tuple[Float64, Float64]:
-    """Rotations (T, 3, 3): the turn of the upper bone, and that of the hinge."""
+    """Return rotations (T, 3, 3) of the upper bone, and of the hinge."""
     return rotations.turn(hinge.upper, angles[:, 0]), product(
         np.stack([hinge.flexion, hinge.twist]), angles[:, 1:]
     )
 
 
 def turn_about(rotation: Float64, axis: Float64) -> Float64:
-    """Angles (T,), without jumps, of the turn about an axis that comes closest to each rotation."""
+    """Return angles (T,), without jumps, of the turn about an axis that comes closest to each rotation."""
     m = rotation
     vector = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
     along = np.einsum("i,tij,j->t", axis, m, axis)
@@ -85,12 +84,12 @@ def turn_about(rotation: Float64, axis: Float64) -> Float64:
 
 
 def _centred(angle: Float64) -> Float64:
-    """Moved by whole turns as a whole, to lie around 0."""
+    """Return angles (T,), shifted by a multiple of full turns so that their median is close to 0."""
     return angle - 2 * np.pi * np.rint(np.median(angle) / (2 * np.pi)) if len(angle) else angle
 
 
 def _turn(hinge: Hinge, direction: Float64, total: Float64, along: float, rate: float) -> Float64:
-    """Turns (T,) of the upper bone: the hinge's plane right where it means something, and no jumps."""
+    """Return turns (T,) of the upper bone that bring the hinge's plane close to its target, without jumps."""
     a, h, y, d = hinge.upper, hinge.flexion, hinge.twist, hinge.lower
     # sideways part of the wanted direction, seen from the turned upper bone, less that of the lower bone
     constant = direction @ a * (a @ h)
@@ -102,7 +101,7 @@ def _turn(hinge: Hinge, direction: Float64, total: Float64, along: float, rate: 
     flat = direction @ a * (a @ side)
     natural = np.stack([flat, direction @ side - flat, direction @ np.cross(a, side)], axis=1)
 
-    # usually, the limb bends the natural way with nothing left sideways
+    # the usual turn is the one with which clear bends are natural
     reach = np.hypot(natural[:, 1], natural[:, 2])
     sure = np.where(reach > CLEAR_BEND, natural[:, 1] + 1j * natural[:, 2], 0.0).sum()
     swing = np.linalg.norm(np.diff(direction, axis=0, prepend=direction[:1]), axis=1) * rate
@@ -113,7 +112,7 @@ def _turn(hinge: Hinge, direction: Float64, total: Float64, along: float, rate: 
 
 
 def _flexion(hinge: Hinge, direction: Float64, turn: Float64, twist: Float64) -> Float64:
-    """Flexion (T,) that brings the twisted lower bone closest to its direction."""
+    """Return the flexion (T,) that brings the twisted lower bone closest to its direction."""
     wanted = (rotations.turn(hinge.upper, -turn) @ direction[:, :, None])[:, :, 0]
     bone = rotations.turn(hinge.twist, twist) @ hinge.lower
     sine = np.cross(bone, wanted) @ hinge.flexion

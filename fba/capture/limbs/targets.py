@@ -1,4 +1,4 @@
-"""`Targets`: the world rotations that the body's joints are to take, as retargeting works them out."""
+"""`Targets`: the target rotations of the body's joints while a motion is retargeted."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ class Targets:
         return self.solver.skeleton
 
     def bone(self, joint: str, aim: str) -> Float64:
-        """Unit vector (3,) from one joint of the resting body to another."""
+        """Return the unit vector (3,) from one joint of the resting body to another."""
         centres, number = self.skeleton.centres, self.skeleton.number
         vector = centres[number(aim)] - centres[number(joint)]
         unit: Float64 = vector / np.linalg.norm(vector)
         return unit
 
     def direction(self, joint: str) -> Float64:
-        """Unit vectors (T, 3) in which the bone that begins at a joint is to point."""
+        """Return the target directions, unit (T, 3), of the bone that begins at a joint."""
         return self.rotations[joint] @ self.bone(joint, self.aims[joint])
 
     def axes(self, joint: str) -> tuple[Float64, Int64, Float64]:
-        """Signed axes (K, 3) of a joint, outermost first, and their numbers (3,) and signs (3,)."""
+        """Return signed axes (K, 3) of a joint, outermost first, and their numbers (3,) and signs (3,)."""
         rules = self.solver.convention
         row = rules.joints.index(joint)
         count = len(rules.freedoms(joint))
@@ -60,7 +60,7 @@ class Targets:
         return axes[:count], rules.axis[row], rules.sign[row]
 
     def parent_rotation(self, joint: str) -> Float64:
-        """Target (T, 3, 3) of the closest joint above that has one."""
+        """Return the target (T, 3, 3) of the closest joint above that has one."""
         number = self.skeleton.number(joint)
         while (number := int(self.skeleton.parents[number])) >= 0:
             if self.skeleton.names[number] in self.rotations:
@@ -68,7 +68,7 @@ class Targets:
         return np.broadcast_to(np.eye(3), (len(self.motion), 3, 3))
 
     def closest_angles(self, joint: str, local: Float64) -> Float64:
-        """Angles (T, K) about a joint's axes that come closest to the rotations local (T, 3, 3)."""
+        """Return the angles (T, K) about a joint's axes closest to the rotations local (T, 3, 3)."""
         axes, numbers, signs = self.axes(joint)
         angles = np.zeros((3, len(local)))
         frames_last = np.ascontiguousarray(np.moveaxis(local, 0, -1))

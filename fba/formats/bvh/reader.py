@@ -1,6 +1,6 @@
-"""BVH (Biovision hierarchy) text: a skeleton with offsets and channels, then a line of numbers a frame.
+"""Read BVH (Biovision hierarchy) text: a skeleton with offsets and channels, then a line for each frame.
 
-Read leniently: CR LF, tabs, any channel order, wrapped or truncated lines, a wrong frame count.
+Tolerates CR LF, tabs, any channel order, wrapped or truncated lines and a wrong frame count.
 """
 
 from __future__ import annotations
@@ -27,19 +27,22 @@ MAX_JOINTS = 4096
 MAX_RATE = 10_000
 MAX_LINES = 4 * MOST_FRAMES
 LARGEST = 1e12
-"""Lengths and angles beyond this are damage."""
+"""Largest length or angle; more is damage."""
 BATCH_LINES = 4096
+"""Lines that are parsed at once."""
 NOMINAL_RATES = tuple(
     sorted({Fraction(n) for n in range(1, 241)} | {Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120)}
            | {Fraction(n) for n in (250, 300, 480, 500, 1000)})
 )  # fmt: skip
-"""Rates that a rounded frame time is taken for."""
+"""Frame rates, one of which a rounded frame time probably means."""
 STRETCH = 1e-3
-"""Share of the skeleton's size by which a joint may move against its parent before it is worth a word."""
+"""Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 
 
 @dataclass
 class _Hierarchy:
+    """Joints in file order; channels: lower-case names. end_parents, end_offsets: of the End Sites."""
+
     names: list[str] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
     offsets: list[tuple[float, float, float]] = field(default_factory=list)
@@ -64,10 +67,10 @@ def read(
     spine: str | int = "spread",
     joints: Mapping[str, str] | None = None,
 ) -> Animation:
-    """A BVH file as BAPs (see `fba.capture.from_skeleton` for the options).
+    """Return the motion of a BVH file as BAPs; see `fba.capture.from_skeleton` for the options.
 
-    Raises FormatError for anything that is not BVH or whose skeleton is not a body; warns (FbaWarning)
-    of oddities.
+    Raises FormatError for anything that is not BVH or whose skeleton is not a body; warns (FbaWarning) of
+    irregularities.
     """
     motion = read_motion(path)
     try:
@@ -79,7 +82,7 @@ def read(
 
 
 def read_motion(path: str | Path) -> SkeletonMotion:
-    """The skeleton and its motion as the file has them. Raises FormatError, warns (FbaWarning)."""
+    """Return the skeleton and its motion as they are in the file. Raises FormatError, warns (FbaWarning)."""
     data = read_whole(path)
     kind = but_recognised(data[:HEAD_BYTES])
     if kind and not re.match(rb"(?:\xef\xbb\xbf)?\s*HIERARCHY\b", data, re.IGNORECASE):
@@ -89,7 +92,7 @@ def read_motion(path: str | Path) -> SkeletonMotion:
 
 
 def parse(text: str, *, name: str = "", path: str | Path | None = None) -> SkeletonMotion:
-    """As `read_motion`, from text. path: named in errors."""
+    """Do the same as `read_motion`, from text. path: named in errors."""
     if max(text.count("\n"), text.count("\r")) > MAX_LINES:
         raise FormatError(f"more than {MAX_LINES} lines; cut the motion into pieces", path=path)
     lines = text.splitlines()
@@ -101,10 +104,10 @@ def parse(text: str, *, name: str = "", path: str | Path | None = None) -> Skele
 
 
 def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, int]:
-    """The joints, and the line number (0-based) of MOTION. A stack of its own: files may nest deeply."""
+    """Return the joints, and the line number (0-based) of MOTION. Not recursive: files may nest deeply."""
     tree = _Hierarchy()
     stack: list[int] = []  # open braces: number of the joint, -1 for an End Site
-    waiting: int | None = None  # announced by ROOT, JOINT or End Site, its brace still to come
+    pending: int | None = None  # joint of the last ROOT or JOINT, -1 for End Site, until its brace opens
     seen_header = False
     for number, line in enumerate(lines):
         words = line.replace("{", " { ").replace("}", " } ").split()
@@ -127,9 +130,9 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                     raise fail("a JOINT must stand inside a ROOT or JOINT")
                 if len(tree.names) >= MAX_JOINTS:
                     raise fail(f"more than {MAX_JOINTS} joints")
-                waiting = len(tree.names)
+                pending = len(tree.names)
                 end = next((i for i in range(at + 1, len(words)) if words[i] == "{"), len(words))
-                tree.names.append(" ".join(words[at + 1 : end]) or f"joint{waiting}")
+                tree.names.append(" ".join(words[at + 1 : end]) or f"joint{pending}")
                 tree.parents.append(stack[-1] if stack else -1)
                 tree.offsets.append((0.0, 0.0, 0.0))
                 tree.channels.append([])
@@ -137,15 +140,15 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
             elif word == "END":
                 if not stack or stack[-1] < 0:
                     raise fail("an End Site must stand inside a joint")
-                waiting = -1
+                pending = -1
                 tree.end_parents.append(stack[-1])
                 tree.end_offsets.append((0.0, 0.0, 0.0))
                 at = next((i for i in range(at + 1, len(words)) if words[i] == "{"), len(words))
             elif word == "{":
-                if waiting is None:
+                if pending is None:
                     raise fail("a brace opens, but no ROOT, JOINT or End Site stands before it")
-                stack.append(waiting)
-                waiting = None
+                stack.append(pending)
+                pending = None
                 at += 1
             elif word == "}":
                 if not stack:
@@ -165,7 +168,7 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
             elif word == "CHANNELS":
                 at = _channels(tree, stack, words, at, path, number)
             elif word == "MOTION":
-                if stack or waiting is not None:
+                if stack or pending is not None:
                     raise fail(f"MOTION begins, but {len(stack)} braces are still open")
                 if not tree.names:
                     raise fail("there is no ROOT joint before MOTION")
@@ -180,6 +183,7 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
 def _channels(
     tree: _Hierarchy, stack: list[int], words: list[str], at: int, path: str | Path | None, line: int
 ) -> int:
+    """Read CHANNELS of a joint; return the position of the next word. line: 0-based."""
     text = words[at + 1] if at + 1 < len(words) else ""
     if not stack or stack[-1] < 0 or not re.fullmatch(r"[0-9]{1,2}", text):
         raise FormatError("CHANNELS needs a count, inside a joint", path=path, line=line + 1, token=text)
@@ -197,7 +201,7 @@ def _channels(
 
 
 def _motion_header(lines: list[str], at: int, path: str | Path | None) -> tuple[int | None, str, int]:
-    """The claimed number of frames, the frame time as text, and the line (0-based) after it."""
+    """Return the stated number of frames, the frame time as text, and the line (0-based) after it."""
     claimed: int | None = None
     for number in range(at, min(at + 50, len(lines))):
         frames = re.search(r"\bFrames\s*:?\s*([0-9]{1,18})\b", lines[number], re.IGNORECASE)
@@ -218,7 +222,7 @@ def _motion_header(lines: list[str], at: int, path: str | Path | None) -> tuple[
 def _numbers(
     lines: list[str], first: int, channels: int, claimed: int | None, path: str | Path | None
 ) -> Float64:
-    """float64 (T, channels). Only what is there is read: the claimed count allocates nothing."""
+    """Return float64 (T, channels). The stated number of frames allocates no memory."""
     if not channels:
         raise FormatError("no joint has channels, so nothing can move", path=path)
     read: list[Float64] = []
@@ -282,7 +286,7 @@ def _numbers(
 
 
 def _floats(batch: list[str], lines: list[str], at: list[int], path: str | Path | None) -> Float64:
-    """Numbers of the last rows; FormatError with the line of a word that is none."""
+    """Return the numbers of the last rows; FormatError with the line of a word that is no number."""
     try:
         return np.array([float(word) for word in batch], dtype=np.float64)
     except ValueError:
@@ -293,6 +297,7 @@ def _floats(batch: list[str], lines: list[str], at: list[int], path: str | Path 
 
 
 def _number(word: str, path: str | Path | None, line: int, any_size: bool = False) -> float:
+    """Return a number; FormatError for other words. line: 0-based. any_size: allow more than `LARGEST`."""
     try:
         value = float(word)
     except ValueError:
@@ -303,14 +308,14 @@ def _number(word: str, path: str | Path | None, line: int, any_size: bool = Fals
 
 
 def _rate(frame_time: str) -> Fraction:
-    """Frames a second. A frame time is rounded in the file: the nearest usual rate within its rounding."""
+    """Return frames per second: the nearest nominal rate that the rounded frame time of a file can mean."""
     value = float(frame_time)
     mantissa, _, exponent = frame_time.lower().partition("e")
     digits = len(mantissa.partition(".")[2]) - (int(exponent) if exponent else 0)
     tolerance = max(0.5 * 10.0**-digits * 1.01, value * 2e-5)
     near = [r for r in NOMINAL_RATES if abs(1 / float(r) - value) <= tolerance]
     if near:
-        # whole rates first: a coarse 0.033 is 30, not 29.97
+        # integral rates first: a coarse 0.033 is 30, not 29.97
         return min(
             near,
             key=lambda r: (
@@ -327,6 +332,7 @@ def _rate(frame_time: str) -> Fraction:
 def _motion(
     tree: _Hierarchy, numbers: Float64, rate: Fraction, name: str, path: str | Path | None
 ) -> SkeletonMotion:
+    """Return the motion in numbers (T, channels)."""
     from fba import rotations
 
     frames, joints = len(numbers), len(tree.names)

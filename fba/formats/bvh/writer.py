@@ -1,7 +1,7 @@
-"""Write BVH: the standard's joints in the default posture, and the BAPs as the angles of their channels.
+"""Write BVH: the standard's joints in the default posture, with BAPs as the angles of their channels.
 
-A joint's channels are its freedoms in the order in which BAPs turn it, so every number is a BAP, in degrees,
-and no angle is worked out again: nothing flips, nothing is rounded but to `DIGITS`.
+A joint's channels are its degrees of freedom in the order in which BAPs turn it, so every number is a BAP, in
+degrees: no angle is computed anew, none flips, and they are rounded only to `DIGITS`.
 """
 
 from __future__ import annotations
@@ -26,15 +26,16 @@ DIGITS = 9
 END = 0.5
 """Length of a last bone, as a share of the one before it."""
 BATCH_FRAMES = 256
+"""Frames that are formatted at once."""
 RATES = (1 / 3600, 10_000)
-"""Frames a second that the reader takes."""
-KEPT = (
+"""Smallest and largest rate, in frames per second, that the reader accepts."""
+ESSENTIAL = (
     "sacroiliac",
     "skullbase",
     *(f"{side}_{joint}" for side in "lr" for joint in ("hip", "knee", "ankle", "metatarsal")),
     *(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist")),
 )
-"""Joints that are written even where they do not move: with them it is a body."""
+"""Joints that are written even if they do not move, so that the skeleton is a body."""
 
 
 def write(
@@ -48,13 +49,13 @@ def write(
 ) -> None:
     """Write the body track as BVH, at the animation's rate; skipped frames are filled in.
 
-    joints: "all" of the skeleton, or "moving": those that move, and what makes them a body (hips, knees,
-    shoulders, ...). skeleton: the body; `Skeleton.default()` where None. axes: which way BAPs turn
-    (`fba.body.convention_names()`). unit: lengths in the file for one metre, by default centimetres.
+    joints: "all" of the skeleton, or "moving": those that move, and those that every body needs (hips, knees,
+    shoulders, ...). skeleton: the body; None for `Skeleton.default()`. axes: the convention of BAP axes
+    (`fba.body.convention_names()`). unit: units in the file for one metre, by default centimetres.
 
-    The root's OFFSET is 0, its channels are its places in the world: some programs add the two. Read again,
-    the file gives the same BAPs (`fba.capture._standard_skeleton`); times begin at 0. Raises FormatError
-    where there is no body, no frame, or too many, OptionError for an unknown option's value.
+    The root's OFFSET is 0 and its channels are world positions, because some programs add the two. Reading
+    the file returns the same BAPs (`fba.capture._standard_skeleton`); times begin at 0. Raises FormatError
+    without a body, without frames, or for too many, OptionError for an unknown value of an option.
     """
     from fba.body import BapSolver
 
@@ -69,8 +70,8 @@ def write(
         ).with_remedies(Remedy("rate", "resample first, e.g. with {}", "30", "Animation.resample"))
     values = shown_baps(animation, path, "BVH")
     solver = BapSolver(skeleton, axes)
-    kept = _kept(solver, values, joints == "moving")
-    columns, factors, shifts, text = _hierarchy(solver, kept, unit)
+    written = _select_joints(solver, values, joints == "moving")
+    columns, factors, shifts, text = _hierarchy(solver, written, unit)
     row = " ".join([f"%.{DIGITS}g"] * len(columns)) + "\n"
     with atomic(path) as file:
         file.write(text.encode())
@@ -82,8 +83,8 @@ def write(
             file.write("".join([row % tuple(frame) for frame in numbers.tolist()]).encode())
 
 
-def _kept(solver: BapSolver, values: Int32, moving: bool) -> list[int]:
-    """Numbers of the joints to write, parents first."""
+def _select_joints(solver: BapSolver, values: Int32, moving: bool) -> list[int]:
+    """Return the numbers of the joints to write, parents first."""
     names = solver.skeleton.names
     if not moving:
         return list(range(len(names)))
@@ -91,15 +92,15 @@ def _kept(solver: BapSolver, values: Int32, moving: bool) -> list[int]:
     return [
         number
         for number, name in enumerate(names)
-        if number == 0 or name in KEPT or moved[list(solver.convention.freedoms(name))].any()
+        if number == 0 or name in ESSENTIAL or moved[list(solver.convention.freedoms(name))].any()
     ]
 
 
-def _hierarchy(solver: BapSolver, kept: list[int], unit: float) -> tuple[Int64, Float64, Float64, str]:
-    """For every channel the BAP column (-1 for none), the factor and what is added; and the text."""
+def _hierarchy(solver: BapSolver, written: list[int], unit: float) -> tuple[Int64, Float64, Float64, str]:
+    """Return for every channel BAP column (-1: none), factor and summand; and the text of the hierarchy."""
     skeleton, rules = solver.skeleton, solver.convention
-    parents, place = _parents(skeleton, kept), {number: row for row, number in enumerate(kept)}
-    children: list[list[int]] = [[] for _ in kept]
+    parents, place = _parents(skeleton, written), {number: row for row, number in enumerate(written)}
+    children: list[list[int]] = [[] for _ in written]
     for row, parent in enumerate(parents):
         if parent >= 0:
             children[parent].append(row)
@@ -107,22 +108,22 @@ def _hierarchy(solver: BapSolver, kept: list[int], unit: float) -> tuple[Int64, 
     factors = [float(sign) * unit / 1000 for sign in rules.translation_sign]
     shifts = [float(centre) * unit for centre in skeleton.centres[0]]
     lines = ["HIERARCHY"]
-    # a stack of its own: a skeleton may be a chain of thousands
-    waiting: list[tuple[int, int]] = [(0, 0)]  # joint, or -1 - depth for a brace to close
-    while waiting:
-        row, depth = waiting.pop()
+    # not recursive: a skeleton may be a chain of thousands of joints
+    stack: list[tuple[int, int]] = [(0, 0)]  # row and depth of a joint; row -1 for a closing brace
+    while stack:
+        row, depth = stack.pop()
         pad = "  " * depth
         if row < 0:
             lines.append(f"{pad}}}")
             continue
-        number = kept[row]
+        number = written[row]
         name = skeleton.names[number]
         parent = parents[row]
-        offset = skeleton.centres[number] - skeleton.centres[kept[parent] if parent >= 0 else number]
+        offset = skeleton.centres[number] - skeleton.centres[written[parent] if parent >= 0 else number]
         lines += [
             f"{pad}{'JOINT' if depth else 'ROOT'} {name}",
             f"{pad}{{",
-            f"{pad}  OFFSET {_three(offset * unit)}",
+            f"{pad}  OFFSET {_format_vector(offset * unit)}",
         ]
         own, axes, signs = _turns(solver, name)
         letters = " ".join(f"{'XYZ'[axis]}rotation" for axis in axes)
@@ -131,22 +132,27 @@ def _hierarchy(solver: BapSolver, kept: list[int], unit: float) -> tuple[Int64, 
         columns += own
         factors += [sign * np.degrees(1e-5) for sign in signs]
         shifts += [0.0, 0.0, 0.0]
-        waiting.append((-1, depth))
+        stack.append((-1, depth))
         if children[row]:
-            waiting += [(child, depth + 1) for child in reversed(children[row])]
+            stack += [(child, depth + 1) for child in reversed(children[row])]
         else:
             end = offset * END * unit if depth else np.zeros(3)
-            lines += [f"{pad}  End Site", f"{pad}  {{", f"{pad}    OFFSET {_three(end)}", f"{pad}  }}"]
-    assert len(place) == len(kept)
+            lines += [
+                f"{pad}  End Site",
+                f"{pad}  {{",
+                f"{pad}    OFFSET {_format_vector(end)}",
+                f"{pad}  }}",
+            ]
+    assert len(place) == len(written)
     text = "\n".join(lines) + "\n"
     return np.array(columns), np.array(factors), np.array(shifts), text
 
 
-def _parents(skeleton: Skeleton, kept: list[int]) -> list[int]:
-    """For every kept joint the place in `kept` of the closest kept joint above it, -1 for the root."""
-    place = {number: row for row, number in enumerate(kept)}
+def _parents(skeleton: Skeleton, written: list[int]) -> list[int]:
+    """Return for every written joint the row of the closest written joint above it, -1 for the root."""
+    place = {number: row for row, number in enumerate(written)}
     result = []
-    for number in kept:
+    for number in written:
         parent = int(skeleton.parents[number])
         while parent >= 0 and parent not in place:
             parent = int(skeleton.parents[parent])
@@ -155,7 +161,7 @@ def _parents(skeleton: Skeleton, kept: list[int]) -> list[int]:
 
 
 def _turns(solver: BapSolver, name: str) -> tuple[list[int], list[int], list[float]]:
-    """BAP columns, axes and signs of a joint's three channels, outermost first; -1 where it has no BAP."""
+    """Return BAP columns (-1 for none), axes and signs of a joint's three channels, outermost first."""
     rules = solver.convention
     if name not in rules.joints:
         return [-1, -1, -1], [2, 0, 1], [1.0, 1.0, 1.0]
@@ -163,5 +169,6 @@ def _turns(solver: BapSolver, name: str) -> tuple[list[int], list[int], list[flo
     return rules.bap[row].tolist(), rules.axis[row].tolist(), rules.sign[row].tolist()
 
 
-def _three(vector: Float64) -> str:
+def _format_vector(vector: Float64) -> str:
+    """Return three numbers as text."""
     return " ".join(f"{float(v) + 0.0:.{DIGITS}g}" for v in np.where(np.abs(vector) < 1e-9, 0.0, vector))
