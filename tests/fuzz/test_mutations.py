@@ -30,7 +30,7 @@ def checked_process(
 ) -> Iterator[subprocess.Popen[str]]:
     """The fuzzer with every array access checked; it compiles and runs while the others are at work.
 
-    What it compiles is kept in pytest's cache, if there is one: `fba.numba_cache` sees when that is too old.
+    What it compiles is kept in pytest's cache, if there is one: `fba._numba_cache` sees when that is too old.
     """
     try:
         cache = pytestconfig.cache.mkdir("fuzz-numba")  # type: ignore[union-attr]
