@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fba.body._definition import BodyDefinition
     from fba.body.skeleton import Skeleton
-    from fba.body.solve.angle_wrap import wrapped
     from fba.body.solve.conventions import convention_names
     from fba.body.solve.limits import Excess, Limit, Limits
-    from fba.body.solve.solver import BapSolver
+    from fba.body.solve.solver import BapSolver, wrapped
 
 _MODULE_OF = {
     "BapSolver": "fba.body.solve.solver",
@@ -21,7 +20,7 @@ _MODULE_OF = {
     "Limits": "fba.body.solve.limits",
     "Skeleton": "fba.body.skeleton",
     "convention_names": "fba.body.solve.conventions",
-    "wrapped": "fba.body.solve.angle_wrap",
+    "wrapped": "fba.body.solve.solver",
 }
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Find target rotations of the body's joints from a captured motion, and the BAPs that reach them."""
+"""Find the targets of the body's joints that make it move like a captured skeleton."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from fba import rotations
-from fba.arrays import Float64, Int32
-from fba.body import BapSolver, wrapped
+from fba.arrays import Float64
+from fba.body import BapSolver
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _spine as spine
 from fba.capture.limbs import bone_ik, hinges
@@ -17,10 +17,8 @@ from fba.capture.limbs.foot_planting import plant_feet, turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FbaWarning, Remedy
-from fba.parameters import BAP_COUNT, baps
+from fba.parameters import baps
 
-CHUNK = 2048
-"""Frames solved at once: joint matrices of a long capture would not fit into memory."""
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 LOOSE = 1e-3
@@ -39,97 +37,70 @@ def find_targets(
     motion: SkeletonMotion,
     mapped: dict[str, int],
     solver: BapSolver,
+    *,
     groups: int,
     with_anchors: bool,
-) -> Targets:
-    """Return target rotations of the body's joints for a captured motion.
+    scale: float | None,
+    ground: str,
+    plant: bool,
+) -> tuple[dict[str, Float64], Float64]:
+    """Return targets of the body's joints and its root, in world axes.
 
-    mapped: joint of the body -> number of the source's joint. groups: number of groups of vertebrae that
-    share the spine's rotations, 0 for only the joints of the source. with_anchors: the source's joints turn,
-    too.
+    They are joint -> rotations (T, 3, 3), and the positions of the root (T, 3) in metres. mapped: joint of
+    the body -> number of the source's joint. groups: number of groups of vertebrae that share the spine's
+    rotations, 0 for only the joints of the source. with_anchors: the source's joints turn, too.
+    scale, ground, plant: as for `fba.capture.from_skeleton`.
     """
     skeleton = solver.skeleton
     alignment = rest_alignment.align(motion, mapped, skeleton)
     upright = alignment.upright
     source_rotations, source_positions = motion.world()
     source_positions = source_positions @ upright.T
-    targets: dict[str, Float64] = {}
+    turned: dict[str, Float64] = {}
     for joint, correction in alignment.corrections.items():
         source = mapped.get(joint, mapped["HumanoidRoot"])
-        world = upright @ rotations.matrices(source_rotations[:, source]) @ upright.T
-        targets[joint] = world @ correction
+        turned[joint] = upright @ rotations.matrices(source_rotations[:, source]) @ upright.T @ correction
     anchors = [joint for joint in spine.joints(skeleton) if joint in mapped]
     if groups and len(anchors) > 1:
         positions = {joint: source_positions[:, mapped[joint]] for joint in anchors}
-        spine.spread(skeleton, targets, positions, anchors, groups, with_anchors)
+        spine.spread(skeleton, turned, positions, anchors, groups, with_anchors)
     feet = {
-        side: targets[f"{side}_ankle"]
+        side: turned[f"{side}_ankle"]
         for side in "lr"
-        if f"{side}_ankle" in targets and f"{side}_subtalar" in skeleton
+        if f"{side}_ankle" in turned and f"{side}_subtalar" in skeleton
     }
-    result = Targets(
-        solver, motion, mapped, alignment.aims, upright, source_rotations, source_positions, targets, feet
+    targets = Targets(
+        solver, motion, mapped, alignment.aims, upright, source_rotations, source_positions, turned, feet
     )
     for side in "lr":
-        _turn_clavicle(result, side)
-        _twist_forearm(result, side)
+        _turn_clavicle(targets, side)
+        _twist_forearm(targets, side)
         for upper, lower in HINGES:
-            _bend_hinge(result, f"{side}_{upper}", f"{side}_{lower}")
-        turn_foot(result, side)
+            _bend_hinge(targets, f"{side}_{upper}", f"{side}_{lower}")
+        turn_foot(targets, side)
         for finger in FINGERS:
-            _curl_finger(result, f"{side}_{finger}")
-    return result
+            _curl_finger(targets, f"{side}_{finger}")
+    metres = _metres_per_unit(targets) if scale is None else scale
+    root = _root_positions(targets, metres)
+    if ground != "none":
+        root = plant_feet(targets, root, metres, ground, plant)
+    return targets.rotations, root
 
 
-def metres_per_unit(targets: Targets, scale: float | None) -> float:
-    """Return metres of the body for one unit of the source: scale, or if None, from the lengths of limbs.
+def _metres_per_unit(targets: Targets) -> float:
+    """Return metres of the body for one unit of the source, from the lengths of limbs.
 
-    Raises ValueError if scale is no positive number. Warns (FbaWarning) if there is no limb to compare.
+    Warns (FbaWarning) if there is no limb to compare.
     """
-    if scale is None:
-        unit = rest_alignment.scale(targets.motion, targets.mapped, targets.skeleton)
-        if unit is None:
-            text = (
-                "the source has neither whole legs nor whole arms: its unit is unknown; taken as centimetres"
-            )
-            warnings.warn(
-                FbaWarning(text).with_remedies(Remedy("scale", "give another, in metres, with {}", "0.001")),
-                stacklevel=3,
-            )
-            return 0.01
-        return unit
-    if not (np.isfinite(scale) and scale > 0):
-        raise ValueError(f"scale must be a positive number, not {scale}")
-    return float(scale)
-
-
-def solve_baps(targets: Targets, scale: float, origin: str, floor: str, plant: bool) -> Int32:
-    """Return BAPs, int32 (T, 296), that reach the target rotations and positions; may change targets of legs.
-
-    scale: metres for one unit of the source. origin, floor, plant: origin, ground and plant of
-    `fba.capture.from_skeleton`.
-    """
-    count = len(targets.motion)
-    skeleton = targets.skeleton
-    result = np.zeros((count, BAP_COUNT), dtype=np.int32)
-    root = _root_positions(targets, scale)
-    if floor != "none":
-        root = plant_feet(targets, root, scale, floor, plant)
-    if origin != "source":
-        centre = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
-        root[:, [0, 2]] -= (centre - skeleton.centres[0])[[0, 2]]
-    numbers = {joint: skeleton.number(joint) for joint in targets.rotations}
-    previous = None
-    for begin in range(0, count, CHUNK):
-        end = min(begin + CHUNK, count)
-        frames = np.zeros((end - begin, len(skeleton), 4, 4))
-        frames[:, :, range(4), range(4)] = 1.0
-        for joint, number in numbers.items():
-            frames[:, number, :3, :3] = targets.rotations[joint][begin:end]
-        frames[:, 0, :3, 3] = root[begin:end]
-        result[begin:end] = targets.solver.solve(frames, joints=list(targets.rotations), previous=previous)
-        previous = result[end - 1]
-    return wrapped(result)
+    ratio = rest_alignment.scale(targets.motion, targets.mapped, targets.skeleton)
+    if ratio is not None:
+        return ratio
+    text = "the source has neither whole legs nor whole arms: its unit is unknown; taken as centimetres"
+    warnings.warn(
+        FbaWarning(text).with_remedies(Remedy("scale", "give another, in metres, with {}", "0.001")),
+        stacklevel=4,
+    )
+    return 0.01
 
 
 def _swing(targets: Targets, joint: str) -> None:
@@ -161,9 +132,8 @@ def _bend_hinge(targets: Targets, upper: str, lower: str) -> None:
     angles = hinges.solve(
         hinge, rotations.inside(frame, targets.direction(lower)), local, float(targets.motion.rate)
     )
-    turn, bend = hinges.matrices(hinge, angles)
-    targets.rotations[upper] = frame @ turn
-    targets.rotations[lower] = targets.rotations[upper] @ bend
+    targets.rotations[upper] = frame @ rotations.turn(hinge.upper, angles[:, 0])
+    targets.rotations[lower] = targets.rotations[upper] @ bone_ik.product(axes[:2], angles[:, 1:])
 
 
 def _turn_clavicle(targets: Targets, side: str) -> None:

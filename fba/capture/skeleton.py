@@ -8,16 +8,15 @@ from fractions import Fraction
 
 import numpy as np
 
-from fba.animation import Animation, BodyTrack
-from fba.arrays import Int32
+from fba.animation import Animation
+from fba.arrays import Float64
 from fba.body import BapSolver
+from fba.body.solve.solver import solve_track
 from fba.capture import _spine as spines
 from fba.capture import _standard_skeleton as standard_skeleton
-from fba.capture import matching
+from fba.capture import matching, retarget
 from fba.capture.motion import SkeletonMotion
-from fba.capture.retarget import find_targets, metres_per_unit, solve_baps
 from fba.errors import FbaWarning, ModelError
-from fba.parameters import BAP_COUNT, baps
 
 ORIGINS = ("source", "start", "middle")
 GROUNDS = ("floor", "source", "none")
@@ -97,6 +96,8 @@ def from_skeleton(
     groups = SPINES.get(spine, spine) if isinstance(spine, str) else spine
     if not isinstance(groups, int) or not 0 <= groups <= spines.GROUPS:
         raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {spine!r}")
+    if scale is not None and not (np.isfinite(scale) and scale > 0):
+        raise ValueError(f"scale must be a positive number, not {scale}")
     missing = [
         joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
     ]
@@ -106,24 +107,28 @@ def from_skeleton(
             FbaWarning,
             stacklevel=2,
         )
-    if (
-        joints is None
-        and spine in ("spread", "joints")
-        and standard_skeleton.is_direct(motion, solver.skeleton)
-    ):
-        return _track(motion, standard_skeleton.values(motion, solver, scale, origin), set(motion.names))
-    targets = find_targets(motion, mapped, solver, groups, with_anchors=spine in ("spread", "joints"))
-    metres = metres_per_unit(targets, scale)
-    turned = {*targets.rotations, solver.skeleton.names[0]}
-    return _track(motion, solve_baps(targets, metres, origin, ground, plant), turned)
+    same_joints = spine in ("spread", "joints")
+    if joints is None and same_joints and standard_skeleton.is_direct(motion, solver.skeleton):
+        turned, root = standard_skeleton.direct_targets(motion, solver.skeleton, scale)
+    else:
+        turned, root = retarget.find_targets(
+            motion, mapped, solver, groups=groups, with_anchors=same_joints, scale=scale, ground=ground,
+            plant=plant,
+        )  # fmt: skip
+    if origin != "source":
+        centre = root[0] if origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
+        root[:, [0, 2]] -= (centre - solver.skeleton.centres[0])[[0, 2]]
 
+    def matrices(rows: slice) -> Float64:
+        frames = np.zeros((rows.stop - rows.start, len(solver.skeleton), 4, 4))
+        frames[:, :, range(4), range(4)] = 1.0
+        for joint, rotation in turned.items():
+            frames[:, solver.skeleton.number(joint), :3, :3] = rotation[rows]
+        frames[:, 0, :3, 3] = root[rows]
+        return frames
 
-def _track(motion: SkeletonMotion, values: Int32, turned: set[str]) -> Animation:
-    """Return the animation. turned: the joints whose BAPs are sent."""
-    sent = np.zeros(BAP_COUNT, dtype=bool)
-    sent[[b.number - 1 for b in baps() if b.joint in turned]] = True
-    track = BodyTrack(values, np.broadcast_to(sent, values.shape))
-    return Animation(motion.rate, np.arange(len(motion)), None, track, motion.name)
+    track = solve_track(solver, turned, len(root), matrices)
+    return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
 
 
 def _check_joints(motion: SkeletonMotion, joints: Mapping[str, str], solver: BapSolver) -> dict[str, int]:

@@ -14,8 +14,7 @@ from fba.arrays import Float64, Int32
 from fba.body.gait._curves import Interpolation
 from fba.body.gait._detection import Gait, detect
 from fba.body.skeleton import Skeleton
-from fba.body.solve.angle_wrap import wrapped
-from fba.body.solve.solver import BapSolver
+from fba.body.solve.solver import BapSolver, wrapped
 from fba.parameters import baps
 
 _STILL = 1e-6

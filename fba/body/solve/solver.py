@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float64, Int32
+from fba.arrays import Float64, Int32, Int64
 from fba.body.skeleton import Skeleton
 from fba.body.solve import pose_loops, solver_loops
 from fba.body.solve.conventions import NO_BAP, Convention, convention
 from fba.body.solve.limits import widest_limits
 from fba.errors import ModelError
-from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT
+from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, baps
+from fba.tracks import BodyTrack
 
 VALUE_LIMIT = 2**31 - 1
+BLOCK = 2048
+"""Frames of a track solved at once: joint matrices of a long capture would not fit into memory."""
+HALF_TURN = 314159
+"""pi in 1e-5 rad."""
 
 
 class BapSolver:
@@ -55,7 +60,7 @@ class BapSolver:
         self._limits[used] = ranges[self._columns]
 
     def pose(self, baps: npt.ArrayLike, out: Float64 | None = None) -> Float64:
-        """Joint matrices of a pose: float64 (J, 4, 4) for baps (296,), (T, J, 4, 4) for (T, 296).
+        """Return joint matrices of a pose: float64 (J, 4, 4) for baps (296,), (T, J, 4, 4) for (T, 296).
 
         186 columns are accepted too. A matrix takes points of the default posture's frame, relative to the
         joint's centre, into the world: its translation is the joint's position, its rotation is the
@@ -99,7 +104,7 @@ class BapSolver:
         joints: Collection[str] | None = None,
         previous: npt.ArrayLike | None = None,
     ) -> Int32:
-        """BAPs that reach these joint matrices: int32 (296,) for (J, 4, 4), (T, 296) for (T, J, 4, 4).
+        """Return BAPs that reach these joint matrices: int32 (296,) for (J, 4, 4), (T, 296) for (T, J, 4, 4).
 
         Only the rotations are used, and the root's translation. Where a joint lacks a freedom, it takes the
         closest rotation, and its children make up for the rest as far as they can. joints: the joints to
@@ -146,3 +151,56 @@ class BapSolver:
             used = self._bap >= 0
             angles[used] = values[self._bap[used]] * pose_loops.UNIT
         return angles
+
+
+def solve_track(
+    solver: BapSolver, joints: Collection[str], count: int, matrices: Callable[[slice], Float64]
+) -> BodyTrack:
+    """Return a track of count frames that sends the BAPs of these joints, with angles within +-pi.
+
+    matrices: returns the joint matrices (F, J, 4, 4) of a slice of frames, as `BapSolver.solve` takes them.
+    """
+    values = np.zeros((count, BAP_COUNT), dtype=np.int32)
+    previous = None
+    for begin in range(0, count, BLOCK):
+        block = slice(begin, min(begin + BLOCK, count))
+        values[block] = solver.solve(matrices(block), joints, previous)
+        previous = values[block][-1]
+    sent = np.zeros(BAP_COUNT, dtype=bool)
+    sent[[bap.number - 1 for bap in baps() if bap.joint in joints]] = True
+    return BodyTrack(wrapped(values), np.broadcast_to(sent, values.shape))
+
+
+def wrapped(values: npt.ArrayLike, limit: int = HALF_TURN) -> Int32:
+    """Return the same poses, int32 (T, 296), with every angle within +-pi, continuous where possible.
+
+    A column of angles that leaves +-limit (1e-5 rad) is first moved as a whole by full turns; only if
+    that does not bring it within, single values are moved, which makes jumps of a full turn. Other
+    columns stay as they are. A full turn is rounded to 628319 units, so a pose changes by less than
+    1e-5 rad. limit must be at least pi. ValueError for other shapes.
+    """
+    array = np.asarray(values)
+    columns = [b.number - 1 for b in baps() if b.unit == "1e-5 rad"]
+    if array.ndim != 2 or array.shape[1] <= max(columns):
+        raise ValueError(f"wrapped: needs BAPs of shape (T, 296), not {array.shape}")
+    if limit < HALF_TURN:
+        raise ValueError(f"wrapped: limit must be at least {HALF_TURN} (half a turn), not {limit}")
+    result = array.astype(np.int32)
+    for column in columns:
+        angles = array[:, column].astype(np.int64)
+        low, high = int(angles.min(initial=0)), int(angles.max(initial=0))
+        if -limit <= low and high <= limit:
+            continue
+        low, high = int(angles.min()), int(angles.max())
+        angles = angles - _full_turns((low + high) / 2)
+        if int(np.abs(angles).max()) > limit:
+            angles = angles - _full_turns(angles.astype(np.float64))
+        result[:, column] = angles
+    return result
+
+
+def _full_turns(angle: float | Float64) -> Int64:
+    """Return the whole turns in angles, in 1e-5 rad."""
+    full = 2e5 * np.pi
+    turns: Int64 = np.rint(np.rint(np.asarray(angle) / full) * full).astype(np.int64)
+    return turns

@@ -19,7 +19,7 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture.limbs._hinge_path import follow
-from fba.capture.limbs.bone_ik import aim, product
+from fba.capture.limbs.bone_ik import aim
 
 STIFF = 0.3
 """Weight of the computed twists relative to the lower bone's direction, in the last step: a limb that is bent
@@ -65,13 +65,6 @@ def solve(hinge: Hinge, direction: Float64, local: Float64, rate: float) -> Floa
     start = np.stack([turn, flexion, twist], axis=1)
     axes = np.stack([hinge.upper, hinge.flexion, hinge.twist])
     return aim(axes, start, hinge.lower, direction, np.array([STIFF, LOOSE, STIFF]))
-
-
-def matrices(hinge: Hinge, angles: Float64) -> tuple[Float64, Float64]:
-    """Return rotations (T, 3, 3) of the upper bone, and of the hinge."""
-    return rotations.turn(hinge.upper, angles[:, 0]), product(
-        np.stack([hinge.flexion, hinge.twist]), angles[:, 1:]
-    )
 
 
 def turn_about(rotation: Float64, axis: Float64) -> Float64:

@@ -12,17 +12,17 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64
-from fba.body import BapSolver, Skeleton, wrapped
+from fba.body import BapSolver, Skeleton
 from fba.body.solve.conventions import convention_names
+from fba.body.solve.solver import solve_track
 from fba.errors import FormatError
 from fba.formats.gltf._fap_tracks import read_face
 from fba.formats.gltf._pose import Sampler, key_times, nearest_rotation
-from fba.formats.gltf.writer import CHUNK, MARK, MOST_FRAMES
+from fba.formats.gltf.writer import MARK, MOST_FRAMES
 from fba.formats.text.frame_rates import parse_rate
 from fba.gltf import Animation as Clip
 from fba.gltf import Channel, Gltf
 from fba.gltf.values import Value, optional_member
-from fba.parameters import BAP_COUNT, baps
 
 VERSION = 1
 MOST_INDEX = 1 << 62
@@ -82,20 +82,12 @@ def _body(
     """Return the body track at times (T,). nodes: joint of the standard -> node."""
     axes = note.member("axes").choice(*convention_names())
     centre = np.array(note.member("centre").numbers(3, -LARGEST, LARGEST))
-
     standard = Skeleton.default()
-    solver = BapSolver(standard, axes)
-    values = np.zeros((len(times), BAP_COUNT), dtype=np.int32)
-    previous = None
-    for start in range(0, len(times), CHUNK):
-        rows = slice(start, start + CHUNK)
-        values[rows] = solver.solve(
-            _matrices(Sampler(gltf, channels, times[rows]), nodes, standard, centre), list(nodes), previous
-        )
-        previous = values[rows][-1]
-    sent = np.zeros(BAP_COUNT, dtype=bool)
-    sent[[bap.number - 1 for bap in baps() if bap.joint in nodes]] = True
-    return BodyTrack(wrapped(values), np.broadcast_to(sent, values.shape))
+
+    def matrices(rows: slice) -> Float64:
+        return _matrices(Sampler(gltf, channels, times[rows]), nodes, standard, centre)
+
+    return solve_track(BapSolver(standard, axes), nodes, len(times), matrices)
 
 
 def _find_joints(gltf: Gltf, root: int, standard: Skeleton) -> dict[str, int]:
