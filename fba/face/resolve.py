@@ -7,8 +7,9 @@ and expression in force.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+import copy
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -26,29 +27,59 @@ MOUTH_GROUPS = (2, 6, 8)
 """A redefined viseme stores the FAPs of these groups: jaw and inner lip, tongue, outer lip."""
 
 
-class Resolver:
-    """`resolve` for a track in pieces; remembers what earlier pieces sent.
+class FaceSettings(Protocol):
+    """The part of a `FaceModel` that decides which FAPs it shows."""
 
-    model: a face that brings `definitions` or a `fit` of its own, or None.
+    @property
+    def definitions(self) -> Definitions:
+        """The FAPs of visemes and expressions."""
+
+    @property
+    def fit(self) -> InterpolationTable | None:
+        """How unsent FAPs follow from sent ones."""
+
+
+def resolve(track: FaceTrack, model: FaceSettings | None = None) -> Float32:
+    """The FAPs that a face shows at every frame: float32 (T, 68) in FAPU, columns 0 and 1 zero.
+
+    - A FAP keeps its last value after it was sent. One never sent, or that the sender asks to have
+      interpolated (`FaceTrack.interpolated`), follows from others by the model's interpolation table
+      (`FaceModel.fit`), where a link leads to it whose source FAPs are known; else it copies its left/right
+      mate, an outer lip FAP its inner one and the other way round.
+    - viseme = definition(select1) x blend/63 + definition(select2) x (1 - blend/63);
+      expression = definition(select1) x intensity1/63 + definition(select2) x intensity2/63, one
+      expression in both places never above its full intensity. Their sum shows where nothing was sent;
+      with init_face it becomes the neutral face, to which the sent FAPs are added. A FAP to be interpolated
+      that none of these determine keeps its last value.
+    - viseme_def and expression_def make the low-level FAPs sent in the same frame (of a viseme: the
+      mouth's) the definition of select1 from that frame on; without such FAPs nothing changes.
+
+    model: a `FaceModel`, whose definitions and interpolation table are used, or None for the built-in
+    definitions and no table.
     """
+    return Resolver(model).push(track)
 
-    def __init__(self, model: Any = None) -> None:
-        definitions: Definitions = getattr(model, "definitions", None) or Definitions.default()
-        self._fit: InterpolationTable | None = getattr(model, "fit", None)
-        self._held = _Held()
-        self._visemes = definitions.visemes.copy()
-        self._expressions = definitions.expressions.copy()
-        # Which FAPs visemes, and which expressions, have a say in once any was sent.
-        self._moved = definitions.visemes.any(axis=0), definitions.expressions.any(axis=0)
+
+class Resolver:
+    """`resolve` for a track in pieces: remembers what earlier pieces sent."""
+
+    def __init__(self, model: FaceSettings | None = None) -> None:
+        self._definitions = Definitions.default() if model is None else model.definitions
+        self._fit = None if model is None else model.fit
+        self._state = _State(
+            visemes=self._definitions.visemes,
+            expressions=self._definitions.expressions,
+            values=np.zeros(FAP_COUNT, dtype=np.int32),
+            sent=np.zeros(FAP_COUNT, dtype=bool),
+            interpolated=np.zeros(FAP_COUNT, dtype=bool),
+            viseme=np.zeros(4, dtype=np.int16),
+            expression=np.zeros(6, dtype=np.int16),
+        )
 
     def copy(self) -> Resolver:
         """An independent resolver in the same state."""
-        other = Resolver.__new__(Resolver)
-        other._fit = self._fit
-        other._moved = self._moved
-        other._held = self._held.copy()
-        other._visemes = self._visemes.copy()
-        other._expressions = self._expressions.copy()
+        other = copy.copy(self)
+        other._state = copy.copy(self._state)
         return other
 
     def push(self, track: FaceTrack) -> Float32:
@@ -59,90 +90,75 @@ class Resolver:
         return result
 
     def _push_block(self, track: FaceTrack) -> Float32:
-        low, ever, asked = self._held.low_level(track)
-        sent = ever
-        filled: Array = low
-        if asked is not None:
-            sent = ever & ~asked
-            filled = np.where(sent, low, np.int32(0))
-        viseme, expression = self._held.high_level(track)
-        alone = expression[:, 4:5] == 0  # else init_face: the expression is the new neutral face
+        last, ever_sent, interpolated = self._state.hold_low_level(track)
+        sent = ever_sent
+        values: Array = last
+        if interpolated is not None:
+            sent = ever_sent & ~interpolated
+            values = np.where(sent, last, np.int32(0))
+        viseme, expression = self._state.hold_high_level(track)
+        replaces = expression[:, 4:5] == 0  # else init_face: the expression is the new neutral face
         if self._fit is not None:
-            filled, sent, from_high_level = evaluate(self._fit, filled, sent, viseme, expression)
-            # What the table makes of the expression is not put on top of the expression again.
-            alone = alone | fill(from_high_level, sent)[0].astype(bool)
-        filled, known = fill(filled, sent)
-        shown: Float32 = filled.astype(np.float32)
-        base = self._visemes_shown(track, viseme) + self._expressions_shown(track, expression)
-        if asked is not None:
-            # What nothing else tells anything about stays as it was sent.
-            moved = (base != 0) | (ever[:, :1] & self._moved[0]) | (ever[:, 1:2] & self._moved[1])
-            last = ever & ~known & ~moved
-            np.copyto(shown, low, where=last, casting="same_kind")
-            known |= last
-        shown += np.where(known & alone, np.float32(0), base)
+            values, sent, from_high_level = evaluate(self._fit, values, sent, viseme, expression)
+            # Values that the table derives from the expression must not have it added once more.
+            replaces = replaces | fill(from_high_level, sent)[0].astype(bool)
+        values, known = fill(values, sent)
+        shown: Float32 = values.astype(np.float32)
+        high_level = self._visemes_shown(track, viseme) + self._expressions_shown(track, expression)
+        if interpolated is not None:
+            by_viseme = ever_sent[:, :1] & self._definitions.visemes.any(axis=0)
+            by_expression = ever_sent[:, 1:2] & self._definitions.expressions.any(axis=0)
+            undetermined = ever_sent & ~known & ~((high_level != 0) | by_viseme | by_expression)
+            np.copyto(shown, last, where=undetermined, casting="same_kind")
+            known |= undetermined
+        shown += np.where(known & replaces, np.float32(0), high_level)
         shown[:, :2] = 0
         return shown
 
     def _visemes_shown(self, track: FaceTrack, fields: Int16) -> Float32:
-        blend = _share(fields[:, 2])
         defined = track.mask[:, 0] & (track.viseme[:, 3] == 1)
-        table = _Redefined(self._visemes, defined, fields[:, 0], track, mouth_only=True)
+        table = _redefine(self._state.visemes, defined, fields[:, 0], track, mouth_only=True)
+        self._state.visemes = table.at_end()
         if not fields[:, :2].any():
             return np.zeros((len(track), FAP_COUNT), dtype=np.float32)
+        blend = _share(fields[:, 2])
         shown: Float32 = table.look_up(fields[:, 0]) * blend + table.look_up(fields[:, 1]) * (1 - blend)
         return shown
 
     def _expressions_shown(self, track: FaceTrack, fields: Int16) -> Float32:
-        first, second = (_share(fields[:, column]) for column in (1, 3))
-        # The same expression in both places is still one expression: never more than all of it.
-        same = (fields[:, 0] == fields[:, 2])[:, None]
-        second = np.where(same, np.minimum(second, 1 - first), second)
         defined = track.mask[:, 1] & (track.expression[:, 5] == 1)
-        table = _Redefined(self._expressions, defined, fields[:, 0], track, mouth_only=False)
+        table = _redefine(self._state.expressions, defined, fields[:, 0], track, mouth_only=False)
+        self._state.expressions = table.at_end()
         if not fields[:, [0, 2]].any():
             return np.zeros((len(track), FAP_COUNT), dtype=np.float32)
+        first, second = (_share(fields[:, column]) for column in (1, 3))
+        # The same expression selected twice is still one: never above its full intensity.
+        same = (fields[:, 0] == fields[:, 2])[:, None]
+        second = np.where(same, np.minimum(second, 1 - first), second)
         shown: Float32 = table.look_up(fields[:, 0]) * first + table.look_up(fields[:, 2]) * second
         return shown
 
 
-def resolve(track: FaceTrack, model: Any = None) -> Float32:
-    """What the face shows at every frame: float32 (T, 68) in FAPU, columns 0 and 1 zero.
-
-    - A FAP keeps its last value after it was sent. One never sent, or that the sender asks to have
-      interpolated (`FaceTrack.interpolated`), follows from others by the model's interpolation table
-      (`FaceModel.fit`), where a link leads to it whose sources are there; else it copies its left/right
-      mate, an outer lip FAP its inner one and the other way round.
-    - viseme = definition(select1) x blend/63 + definition(select2) x (1 - blend/63);
-      expression = definition(select1) x intensity1/63 + definition(select2) x intensity2/63, one
-      expression in both places never above its full intensity. Their sum shows where nothing was sent;
-      with init_face it becomes the neutral face, to which the sent FAPs are added. A FAP that is asked
-      to be interpolated though none of all this moves it keeps its last value.
-    - viseme_def and expression_def make the low-level FAPs sent in the same frame (of a viseme: the
-      mouth's) the definition of select1 from that frame on; without such FAPs nothing changes.
-
-    model: a face with `definitions` (`Definitions`) and a `fit` (`InterpolationTable`) of its own, such
-    as a `FaceModel`, or None for the built-in definitions and no table.
-    """
-    return Resolver(model).push(track)
-
-
 @dataclass
-class _Held:
-    """The last values sent, and masks of those ever sent."""
+class _State:
+    """Definitions in force after the last frame, the last values sent, and masks of those ever sent.
 
-    values: Int32 = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=np.int32))
-    sent: Bool = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
-    viseme: Int16 = field(default_factory=lambda: np.zeros(4, dtype=np.int16))
-    expression: Int16 = field(default_factory=lambda: np.zeros(6, dtype=np.int16))
-    asked: Bool = field(default_factory=lambda: np.zeros(FAP_COUNT, dtype=bool))
+    Arrays are replaced, never changed, so that a shallow copy is independent.
+    """
 
-    def copy(self) -> _Held:
-        return _Held(*(getattr(self, one.name).copy() for one in fields(self)))
+    visemes: Float32
+    expressions: Float32
+    values: Int32
+    sent: Bool
+    interpolated: Bool
+    viseme: Int16
+    expression: Int16
 
-    def low_level(self, track: FaceTrack) -> tuple[Int32, Bool, Bool | None]:
-        """Each (T, 68): values last sent, which of all FAPs were ever sent, and which low-level ones
-        are to be interpolated, None where none are."""
+    def hold_low_level(self, track: FaceTrack) -> tuple[Int32, Bool, Bool | None]:
+        """Values last sent, masks of the FAPs ever sent and of those to be interpolated, each (T, 68).
+
+        The last is None where no FAP is to be interpolated.
+        """
         if track.mask[:, 2:].all():
             values, sent = track.values, np.ones_like(track.mask)
             sent[:, :2] = np.logical_or.accumulate(track.mask[:, :2], axis=0) | self.sent[:2]
@@ -150,18 +166,19 @@ class _Held:
             values = hold(track.values, track.mask, self.values)
             sent = np.asarray(np.logical_or.accumulate(track.mask, axis=0)) | self.sent
         self.values, self.sent = values[-1].copy(), sent[-1].copy()
-        return values, sent, self._asked(track)
+        return values, sent, self._hold_interpolated(track)
 
-    def _asked(self, track: FaceTrack) -> Bool | None:
-        if track.interpolated is None and not self.asked.any():
+    def _hold_interpolated(self, track: FaceTrack) -> Bool | None:
+        if track.interpolated is None and not self.interpolated.any():
             return None
         own = track.interpolated if track.interpolated is not None else np.zeros_like(track.mask)
-        says = np.asarray((track.mask | own).any(axis=1))
-        asked = own if says.all() else hold(own, says[:, None], self.asked)
-        self.asked = asked[-1].copy()
-        return asked
+        not_empty = np.asarray((track.mask | own).any(axis=1))
+        result = own if not_empty.all() else hold(own, not_empty[:, None], self.interpolated)
+        self.interpolated = result[-1].copy()
+        return result
 
-    def high_level(self, track: FaceTrack) -> tuple[Int16, Int16]:
+    def hold_high_level(self, track: FaceTrack) -> tuple[Int16, Int16]:
+        """Fields of the viseme (T, 4) and the expression (T, 6) in force."""
         viseme = hold(track.viseme, track.mask[:, :1], self.viseme)
         expression = hold(track.expression, track.mask[:, 1:2], self.expression)
         self.viseme, self.expression = viseme[-1].copy(), expression[-1].copy()
@@ -170,10 +187,8 @@ class _Held:
 
 def _share(amounts: Int16) -> Float32:
     """(T, 1) blend or intensity as a share of its largest; quantised ones may lie a little outside."""
-    share: Float32 = np.clip(amounts, 0, INTENSITY_MAX).astype(np.float32)[:, None] / np.float32(
-        INTENSITY_MAX
-    )
-    return share
+    clipped: Float32 = np.clip(amounts, 0, INTENSITY_MAX).astype(np.float32)[:, None]
+    return clipped / np.float32(INTENSITY_MAX)
 
 
 def hold(values: Array, mask: Bool, before: Array) -> Array:
@@ -188,33 +203,38 @@ def hold(values: Array, mask: Bool, before: Array) -> Array:
     return held
 
 
-class _Redefined:
-    """Definitions in force at each frame, where frames may redefine them. Updates `table` in place."""
+@dataclass(frozen=True, eq=False)
+class _DefinitionsInForce:
+    """Definitions in force at each frame.
 
-    def __init__(
-        self,
-        table: Float32,
-        defined: Bool,
-        select: Int16,
-        track: FaceTrack,
-        *,
-        mouth_only: bool,
-    ) -> None:
-        stored = np.array([f.group in MOUTH_GROUPS if mouth_only else f.group > 1 for f in faps()])
-        events = np.flatnonzero(defined & (select > 0) & track.mask[:, stored].any(axis=1))
-        mask = track.mask[events] & stored
-        rows = fill(np.where(mask, track.values[events], 0), mask)[0].astype(np.float32)
-        self._rows = np.concatenate([table, rows])
-        self._in_force: Intp | None = None
-        if len(events):
-            count = len(table)
-            row = np.broadcast_to(np.arange(count), (len(track), count)).copy()
-            row[events, select[events]] = count + np.arange(len(events))
-            self._in_force = np.maximum.accumulate(row, axis=0)
-            table[:] = self._rows[self._in_force[-1]]
+    rows: (K, 68), a table of definitions and those that redefine them. in_force: (T, selects), the row of
+    each select at each frame, or None where none is redefined.
+    """
+
+    rows: Float32
+    in_force: Intp | None
 
     def look_up(self, select: Int16) -> Float32:
-        """(T, 68) definition of the selected item at each frame."""
-        if self._in_force is None:
-            return self._rows[select]
-        return self._rows[self._in_force[np.arange(len(select)), select]]
+        """(T, 68) definition of the selected viseme or expression at each frame."""
+        if self.in_force is None:
+            return self.rows[select]
+        return self.rows[self.in_force[np.arange(len(select)), select]]
+
+    def at_end(self) -> Float32:
+        """(selects, 68): the table in force after the last frame."""
+        return self.rows if self.in_force is None else self.rows[self.in_force[-1]]
+
+
+def _redefine(
+    table: Float32, defined: Bool, select: Int16, track: FaceTrack, *, mouth_only: bool
+) -> _DefinitionsInForce:
+    """The definitions of a table, each replaced from the frame on that defines it: (T,) `defined`."""
+    stored = np.array([f.group in MOUTH_GROUPS if mouth_only else f.group > 1 for f in faps()])
+    events = np.flatnonzero(defined & (select > 0) & track.mask[:, stored].any(axis=1))
+    if not len(events):
+        return _DefinitionsInForce(table, None)
+    mask = track.mask[events] & stored
+    new = fill(np.where(mask, track.values[events], 0), mask)[0].astype(np.float32)
+    rows = np.broadcast_to(np.arange(len(table)), (len(track), len(table))).copy()
+    rows[events, select[events]] = len(table) + np.arange(len(events))
+    return _DefinitionsInForce(np.concatenate([table, new]), np.maximum.accumulate(rows, axis=0))

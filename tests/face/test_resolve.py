@@ -26,6 +26,7 @@ def simple_definitions() -> Definitions:
 
 class Model:
     definitions = simple_definitions()
+    fit = None
 
 
 def test_shape_and_type() -> None:

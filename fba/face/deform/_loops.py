@@ -1,7 +1,7 @@
 """The deformer's loops over vertices and triangles, compiled (see `fba.compiled`).
 
-A frame: the neutral face is copied, every active FAP adds its shifts, normals are summed over the
-triangles of the parts that changed, and each part is then turned and placed together with the head.
+For each frame the neutral face is copied, every FAP that is not 0 adds its shifts, normals are summed over
+the triangles of the parts that changed, and the transforms of each part and of the head are applied.
 """
 
 from __future__ import annotations
@@ -23,16 +23,22 @@ ZERO, ONE = np.float32(0), np.float32(1)
 
 @compiled
 def copy(source: Array, target: Array) -> None:
-    """Faster than `target[:] = source`, which counts in rows and columns; and sooner compiled: that has words
-    for shapes that do not fit."""
-    flat, place = source.reshape(-1), target.reshape(-1)
-    for k in range(len(flat)):
-        place[k] = flat[k]
+    """Copy a contiguous array to another of its shape.
+
+    Runs faster than `target[:] = source`, which iterates over rows and columns, and compiles faster, as it
+    needs no error for shapes that differ.
+    """
+    values, result = source.reshape(-1), target.reshape(-1)
+    for k in range(len(values)):
+        result[k] = values[k]
 
 
 @compiled
 def add_shifts(values: Float64, shifts: Shifts, moved: Array, touched: Int64) -> None:
-    """Add to `moved` (V, 3) what the FAPs (68,) do; touched[part] becomes 1 where they do something."""
+    """Add to vertices `moved` (V, 3) the shifts by FAPs `values` (68,).
+
+    touched: (P,), set to 1 for each part that a FAP other than 0 has a FaceDefMesh for.
+    """
     for track in range(len(shifts.column)):
         value = values[shifts.column[track]]
         if value == 0.0:
@@ -41,7 +47,7 @@ def add_shifts(values: Float64, shifts: Shifts, moved: Array, touched: Int64) ->
         while interval < last and value > shifts.upper[interval]:
             interval += 1
         touched[shifts.part[track]] = 1
-        # Through an array, so that the sum below is one of numbers of the tables' own precision.
+        # The detour through an array rounds to the tables' dtype, so that the sums below stay in it.
         shifts.amount[0] = value - shifts.anchor[interval]
         steps = shifts.amount[0]
         start, stop = int(shifts.start[interval]), int(shifts.start[interval + 1])
@@ -64,7 +70,7 @@ def add_shifts(values: Float64, shifts: Shifts, moved: Array, touched: Int64) ->
 
 @compiled
 def compose(values: Float64, transforms: Transforms, poses: Float64) -> None:
-    """poses (P + 1, 3, 4): the product of each part's transforms, and last the head's."""
+    """Write to `poses` (P + 1, 3, 4) the product of each part's transforms, and last that of the head's."""
     one = np.empty((3, 4))
     product = np.empty((3, 4))
     for part in range(len(poses)):
@@ -76,14 +82,14 @@ def compose(values: Float64, transforms: Transforms, poses: Float64) -> None:
             value = values[transforms.column[k]]
             if value == 0.0:
                 continue
-            single(int(transforms.kind[k]), value, transforms.amount[k], transforms.centre[k], one)
+            transform_matrix(int(transforms.kind[k]), value, transforms.amount[k], transforms.centre[k], one)
             multiply(pose, one, product)
             copy(product, pose)
 
 
 @compiled
-def single(kind: int, value: float, amount: Float64, centre: Float64, result: Float64) -> None:
-    """result (3, 4): one transform; kind as in `deformer_tables.KIND_ORDER`."""
+def transform_matrix(kind: int, value: float, amount: Float64, centre: Float64, result: Float64) -> None:
+    """Write one transform to `result` (3, 4); kind: index in `flat_tables.KIND_ORDER`."""
     x, y, z = value * amount[0], value * amount[1], value * amount[2]
     result[:] = 0.0
     if kind == 0:
@@ -108,7 +114,7 @@ def single(kind: int, value: float, amount: Float64, centre: Float64, result: Fl
 
 @compiled
 def multiply(outer: Float64, inner: Float64, result: Float64) -> None:
-    """result = outer . inner, all (3, 4), as if below them stood 0 0 0 1."""
+    """Write outer . inner to `result`; all (3, 4), with 0 0 0 1 as the fourth row."""
     for i in range(3):
         for j in range(4):
             result[i, j] = outer[i, 0] * inner[0, j] + outer[i, 1] * inner[1, j] + outer[i, 2] * inner[2, j]
@@ -117,14 +123,14 @@ def multiply(outer: Float64, inner: Float64, result: Float64) -> None:
 
 @compiled
 def poses_of_frames(values: Float64, transforms: Transforms, poses: Float64) -> None:
-    """values (T, 68) -> poses (T, P + 1, 3, 4)."""
+    """`compose` for FAPs `values` (T, 68); poses: (T, P + 1, 3, 4)."""
     for frame in range(len(values)):
         compose(values[frame], transforms, poses[frame])
 
 
 @compiled
 def sum_normals(moved: Float32, surface: Surface, part: int) -> None:
-    """Add the triangles of a part, as vectors of twice their area, to the sums of their corners."""
+    """Sum, for each corner, the normals of a part's triangles, as long as twice their area."""
     sum_x, sum_y, sum_z = surface.sums[0], surface.sums[1], surface.sums[2]
     for k in range(int(surface.changing_start[part]), int(surface.changing_start[part + 1])):
         sum_x[k] = sum_y[k] = sum_z[k] = 0.0
@@ -152,14 +158,14 @@ def sum_normals(moved: Float32, surface: Surface, part: int) -> None:
 def turn_normals(
     turn: Float32, source: Float32, neutral: Float32, units: Float32, start: int, stop: int
 ) -> None:
-    """units (3, N) from start to stop: source (3, N) turned by `turn` (3, 3) and made unit vectors.
+    """Write normals `source` (3, N), rotated by `turn` (3, 3) and normalised, to `units` (3, N).
 
-    Where triangles have no area, or no direction together, the neutral normal stands in.
+    Only columns start to stop. A sum without a direction is replaced by the neutral normal.
     """
     xx, xy, xz = turn[0, 0], turn[0, 1], turn[0, 2]
     yx, yy, yz = turn[1, 0], turn[1, 1], turn[1, 2]
     zx, zy, zz = turn[2, 0], turn[2, 1], turn[2, 2]
-    # A row first, then a part of it: in one step it would no longer be known to be contiguous.
+    # Index the row first, then slice it: the compiler knows only then that the slice is contiguous.
     from_x, from_y, from_z = source[0][start:stop], source[1][start:stop], source[2][start:stop]
     rest_x, rest_y, rest_z = neutral[0][start:stop], neutral[1][start:stop], neutral[2][start:stop]
     to_x, to_y, to_z = units[0][start:stop], units[1][start:stop], units[2][start:stop]
@@ -175,10 +181,13 @@ def turn_normals(
 
 
 @compiled
-def place_normals(
+def write_normals(
     surface: Surface, touched: bool, part: int, turn: Float32, start: int, out: Float32
 ) -> None:
-    """out (N, 3): normals of a part, whose vertices begin at `start`; touched: its sums are new."""
+    """Write the normals of a part to `out` (N, 3).
+
+    start: the part's first vertex. touched: use the new sums of normals, not the neutral ones.
+    """
     neutral, units = surface.neutral, surface.units
     first, stop = int(surface.changing_start[part]), int(surface.changing_start[part + 1])
     turn_normals(turn, surface.sums if touched else neutral, neutral, units, first, stop)
@@ -192,8 +201,8 @@ def place_normals(
 
 
 @compiled
-def place(pose: Array, moved: Array, out: Array) -> None:
-    """out (N, 3) = pose (3, 4) applied to moved (N, 3)."""
+def transform_points(pose: Array, moved: Array, out: Array) -> None:
+    """Write points `moved` (N, 3), transformed by `pose` (3, 4), to `out` (N, 3)."""
     xx, xy, xz, x0 = pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3]
     yx, yy, yz, y0 = pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3]
     zx, zy, zz, z0 = pose[2, 0], pose[2, 1], pose[2, 2], pose[2, 3]
@@ -206,7 +215,7 @@ def place(pose: Array, moved: Array, out: Array) -> None:
 
 @compiled
 def cofactors(pose: Float64, result: Float32) -> None:
-    """result (3, 3): how `pose` turns the vectors that stand upright on a surface, up to a factor."""
+    """Write to `result` (3, 3) the matrix that transforms normals as `pose` does surfaces, up to a factor."""
     largest = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -224,20 +233,32 @@ def cofactors(pose: Float64, result: Float32) -> None:
 
 
 class Scratch(NamedTuple):
-    """What a frame needs room for."""
+    """Working arrays for one frame."""
 
     moved: Float32
     """(V, 3) vertices after all shifts."""
     touched: Int64
-    """(P,) whether a FaceDefMesh of an active FAP moves the part."""
+    """(P,) 1 where a FaceDefMesh of a FAP that is not 0 moves the part."""
     poses: Float64
     """(P + 1, 3, 4), the head's last."""
-    whole: Float64
-    """(3, 4) a part's pose within the head's."""
+    combined: Float64
+    """(3, 4) the transforms of a part, then those of the head."""
     pose: Float32
-    """(3, 4) the same, for the vertices."""
+    """(3, 4) `combined` in the vertices' precision."""
     turn: Float32
-    """(3, 3) the same, for the normals."""
+    """(3, 3) `combined` for normals."""
+
+
+def allocate_scratch(vertices: int, parts: int) -> Scratch:
+    """Working arrays for a face of so many vertices and parts."""
+    return Scratch(
+        moved=np.empty((vertices, 3), dtype=np.float32),
+        touched=np.zeros(parts, dtype=np.int64),
+        poses=np.empty((parts + 1, 3, 4)),
+        combined=np.empty((3, 4)),
+        pose=np.empty((3, 4), dtype=np.float32),
+        turn=np.empty((3, 3), dtype=np.float32),
+    )
 
 
 @compiled
@@ -253,7 +274,10 @@ def deform_frames(
     out: Float32,
     normals: Float32,
 ) -> None:
-    """values (T, 68), rest (V, 3) -> out (T, V, 3), normals (T, V, 3), or (0, V, 3) for none."""
+    """Write the vertices for FAPs `values` (T, 68) to `out` and their normals to `normals`, both (T, V, 3).
+
+    rest: (V, 3) neutral vertices. normals: (0, V, 3) for none. with_head: apply the head's transforms.
+    """
     for frame in range(len(values)):
         copy(rest, scratch.moved)
         scratch.touched[:] = 0
@@ -262,19 +286,19 @@ def deform_frames(
         head = len(scratch.poses) - 1
         for part in range(head):
             if with_head:
-                multiply(scratch.poses[head], scratch.poses[part], scratch.whole)
+                multiply(scratch.poses[head], scratch.poses[part], scratch.combined)
             else:
-                copy(scratch.poses[part], scratch.whole)
-            copy(scratch.whole, scratch.pose)
+                copy(scratch.poses[part], scratch.combined)
+            copy(scratch.combined, scratch.pose)
             start, stop = int(part_start[part]), int(part_start[part + 1])
-            place(scratch.pose, scratch.moved[start:stop], out[frame, start:stop])
+            transform_points(scratch.pose, scratch.moved[start:stop], out[frame, start:stop])
             if len(normals) == 0:
                 continue
-            cofactors(scratch.whole, scratch.turn)
+            cofactors(scratch.combined, scratch.turn)
             touched = scratch.touched[part] == 1
             if touched:
                 sum_normals(scratch.moved, surface, part)
-            place_normals(surface, touched, part, scratch.turn, start, normals[frame, start:stop])
+            write_normals(surface, touched, part, scratch.turn, start, normals[frame, start:stop])
 
 
 @compiled
@@ -287,7 +311,10 @@ def points_of_frames(
     with_head: bool,
     out: Float64,
 ) -> None:
-    """values (T, 68), rest (N, 3), owner (N,), the part of each point or -1 -> out (T, N, 3)."""
+    """Write the positions of points for FAPs `values` (T, 68) to `out` (T, N, 3).
+
+    rest: (N, 3) neutral points. owner: (N,) the part whose transforms each point follows, or -1.
+    """
     head = len(transforms.start) - 2
     poses = np.empty((head + 1, 3, 4))
     touched = np.zeros(head, dtype=np.int64)
@@ -300,6 +327,6 @@ def points_of_frames(
             own = out[frame, point : point + 1]
             copy(moved[point], own)
             if owner[point] >= 0:
-                place(poses[owner[point]], own, own)
+                transform_points(poses[owner[point]], own, own)
             if with_head:
-                place(poses[head], own, own)
+                transform_points(poses[head], own, own)

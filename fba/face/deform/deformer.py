@@ -1,4 +1,4 @@
-"""Turns FAPs into vertices: moves a face model by its FaceDefTables.
+"""Moves the vertices of a face model by FAPs, through its FaceDefTables.
 
 ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
 """
@@ -16,62 +16,52 @@ from fba.face.deform.flat_tables import (
     VALUE_MAX,
     all_vertices,
     bound_points,
-    flat_shifts,
-    flat_transforms,
+    flatten_shifts,
+    flatten_transforms,
 )
-from fba.face.deform.normals import surface
+from fba.face.deform.normals import build_surface
 from fba.face.feature_points import names
 from fba.face.model import FaceModel
 from fba.mesh.meshes import result_array
 from fba.parameters import FAP_COUNT, faps
 
 BLOCK = 64
-"""Frames per call of the compiled loop: an interrupt can only get through between calls."""
+"""Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
 
 
 class Deformer:
     """Moves a face: `Deformer(model)(faps)` gives its vertices.
 
     1. Every FAP that is not 0 moves the vertices of its FaceDefMesh along their piecewise linear paths,
-       by value x FAPU; what several FAPs do to a vertex adds up.
-    2. Then each part gets its own transforms, about the centres given, which stay where they are:
+       by value x FAPU; the shifts of several FAPs add up.
+    2. Then each part's own transforms are applied, about their fixed centres:
        translations . rotations . scales, the outermost first, as in a Transform node. Of several
-       rotations (or scales) that of the lower FAP is further out, so an eye's yaw (23, 24) stands around
+       rotations (or scales) that of the lower FAP is further out, so an eye's yaw (23, 24) is outside
        its pitch (25, 26); only the head's pitch is innermost, so that the head turns by
-       yaw . roll . pitch (49 . 50 . 48). Of one FAP's, the one listed first is further out.
-    3. Then all parts together get the transforms of `HEAD`, nested in the same way.
+       yaw . roll . pitch (49 . 50 . 48). Of several of one FAP, the one listed first is further out.
+    3. Then the transforms of `HEAD` are applied to all parts, nested in the same way.
 
     A rotation turns by value x FAPU x amount (radians about each axis), a translation shifts by that
-    much, a scale makes each axis 1 + value x FAPU x amount times as long.
+    vector, a scale multiplies each axis by 1 + value x FAPU x amount.
 
-    The model's tables are copied into flat arrays; later calls allocate nothing but their result. A
-    Deformer may be used by several threads, one after the other; for speed give each its own.
+    The constructor copies the model's tables into flat arrays; calls allocate nothing but their result.
+    Threads that share a Deformer wait for each other; for speed, give each its own.
     Raises ModelError for displacements too large for 32-bit floats.
     """
 
     def __init__(self, model: FaceModel) -> None:
-        # numba is imported here, with the first face that moves
-        from fba.face.deform import _loops as loops
+        from fba.face.deform import _loops as loops  # imports numba: not before a face is to move
 
         self.model = model
         self._loops = loops
         sizes = [len(part.vertices) for part in model.parts]
         self._part_start: Int64 = np.cumsum([0, *sizes], dtype=np.int64)
-        self._shifts = flat_shifts(model, all_vertices(model), np.float32)
-        self._transforms = flat_transforms(model)
-        moved = np.zeros(len(model.vertices), dtype=bool)
-        moved[self._shifts.rows] = True
-        self._surface = surface(model, moved)
-        self._scratch = loops.Scratch(
-            moved=np.empty_like(model.vertices),
-            touched=np.zeros(len(sizes), dtype=np.int64),
-            poses=np.empty((len(sizes) + 1, 3, 4)),
-            whole=np.empty((3, 4)),
-            pose=np.empty((3, 4), dtype=np.float32),
-            turn=np.empty((3, 3), dtype=np.float32),
-        )
-        self._point_shifts = flat_shifts(model, bound_points(model), np.float64)
-        self._owner = _owners(model)
+        self._shifts = flatten_shifts(model, all_vertices(model), np.float32)
+        self._transforms = flatten_transforms(model)
+        self._surface = build_surface(model, self._shifts.rows)
+        self._point_shifts = flatten_shifts(model, bound_points(model), np.float64)
+        self._owner = _find_owners(model)
+        self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts))
         self._lock = threading.Lock()
 
     def __call__(
@@ -81,9 +71,9 @@ class Deformer:
         (T, V, 3) for (T, 68).
 
         faps: numbers of any type, as `resolve` gives them, in the units of the standard; columns 0 and 1
-        (viseme, expression) do nothing. out: written to and returned. normals: filled with the unit
-        normals, made anew from the triangles that the FAPs move, smooth across the seams of a part. Both
-        float32, C-contiguous, of the result's shape.
+        (viseme, expression) are ignored. out: written to and returned. normals: filled with unit normals,
+        computed from the triangles that the FAPs move, smooth across the seams of a part. Both float32,
+        C-contiguous, of the result's shape.
 
         Raises ValueError for another shape or type, RangeError for FAPs that are not finite or do not
         fit 32 bits.
@@ -109,21 +99,21 @@ class Deformer:
         """Transforms of each part within the head: float64 (P, 4, 4) for FAPs (68,), (T, P, 4, 4) for (T,
         68), in the order of `model.parts`.
 
-        The matrix of an eyeball takes it from its neutral place, looking ahead, to where it looks now,
-        in the frame of the head; `head_matrices . part_matrices` takes it to the world. Parts
-        without transforms have the identity; FaceDefMesh has no part in it. Errors as when called.
+        The matrix of an eyeball rotates it from looking straight ahead to its current gaze, in the frame of
+        the head; `head_matrices . part_matrices` is that in the world. The identity for parts without
+        transforms; FaceDefMesh is not included. Errors as when called.
         """
         values, single = _frames(faps)
         matrices = self._poses(values)[:, :-1]
         return matrices[0] if single else matrices
 
     def feature_points(self, faps: npt.ArrayLike, *, local: bool = False) -> Float64:
-        """The feature points, moved: float64 (84, 3) for FAPs (68,), (T, 84, 3) for (T, 68), metres.
+        """Moved feature points: float64 (84, 3) for FAPs (68,), (T, 84, 3) for (T, 68), metres.
 
         A point bound to a vertex moves with it. Others move with the transforms of the part that they
         belong to: a pupil with the nearest eye, points of tongue and teeth with the nearest part of
         that kind, the rest with the head alone. Points that the face lacks stay NaN. local: without the
-        head's turn. Errors as when called.
+        head's transforms. Errors as when called.
         """
         values, single = _frames(faps)
         points: Float64 = np.empty((len(values), len(names()), 3))
@@ -154,8 +144,8 @@ class Deformer:
         count = len(self.model.vertices)
         shape = (count, 3) if single else (len(values), count, 3)
         out = result_array(shape, out, normals)
-        placed = out[None] if single else out
-        upright = placed[:0] if normals is None else normals[None] if single else normals
+        out_frames = out[None] if single else out
+        normal_frames = out_frames[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
             for start in range(0, len(values), BLOCK):
                 stop = start + BLOCK
@@ -168,8 +158,8 @@ class Deformer:
                     self._surface,
                     self._scratch,
                     with_head,
-                    placed[start:stop],
-                    upright[start:stop],
+                    out_frames[start:stop],
+                    normal_frames[start:stop],
                 )
         return out
 
@@ -184,7 +174,7 @@ def _frames(values: npt.ArrayLike) -> tuple[Float64, bool]:
     frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, FAP_COUNT)
     if frames.size and not (frames.min() >= -VALUE_MAX - 1 and frames.max() <= VALUE_MAX):
         good = (frames >= -VALUE_MAX - 1) & (frames <= VALUE_MAX)
-        frame, column = (int(place) for place in np.argwhere(~good)[0])
+        frame, column = (int(index) for index in np.argwhere(~good)[0])
         value = frames[frame, column]
         raise RangeError(
             f"{value:g} cannot be shown; FAPs are finite and fit 32 bits",
@@ -198,11 +188,11 @@ def _frames(values: npt.ArrayLike) -> tuple[Float64, bool]:
 
 POINT_KINDS = {"3.5": "eye", "3.6": "eye", "6": "tongue", "9.8": "teeth", "9.9": "teeth", "9.10": "teeth",
                "9.11": "teeth"}  # fmt: skip
-"""The kind of part that feature points, or groups of them, belong to where they stand on no vertex."""
+"""Kinds of parts to which feature points, or groups of them, belong if they are bound to no vertex."""
 
 
-def _owners(model: FaceModel) -> Int64:
-    """(84,): the part whose transforms move each feature point, -1 for the head alone."""
+def _find_owners(model: FaceModel) -> Int64:
+    """(84,) the part whose transforms move each feature point, -1 for the head alone."""
     owner = np.full(len(names()), -1, dtype=np.int64)
     ends = np.cumsum([len(part.vertices) for part in model.parts])
     for row, name in enumerate(names()):

@@ -1,7 +1,8 @@
-"""The FaceDefTables of a whole face as flat arrays, in the order in which the compiled loops read them."""
+"""The FaceDefTables of a face as flat arrays, in the order in which the compiled loops read them."""
 
 from __future__ import annotations
 
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,16 +16,16 @@ from fba.parameters import faps
 VALUE_MAX = 2**31 - 1
 """FAPs beyond this are refused: no stream carries more than 32 bits."""
 KIND_ORDER = ("translation", "rotation", "scale")
-"""How the transforms of one part are nested, outermost first, as in a Transform node."""
+"""The order in which the transforms of a part are nested, outermost first, as in a Transform node."""
 HEAD_PITCH, HEAD_ROLL = 48, 50
 
 
 class Shifts(NamedTuple):
-    """All FaceDefMesh of a face. One `track` is one of them, cut into intervals.
+    """All FaceDefMesh of a face. A `track` is one of them, cut into intervals.
 
-    Interval s of track m, first[m] <= s < first[m + 1], holds for values up to upper[s]. There the rows
-    [start[s], start[s + 1]) of `rows` move by slopes x (value - anchor[s]), plus, unless base[s] is -1,
-    by `bases` from row base[s] on: where they are when the value is anchor[s], the border nearer to 0.
+    Interval s of track m, first[m] <= s < first[m + 1], is for values up to upper[s]. It moves the vertices
+    in rows start[s] to start[s + 1] of `rows` by slopes x (value - anchor[s]), plus, unless base[s] is -1,
+    by `bases` from row base[s] on: the shifts at the value anchor[s], the border nearer to 0.
     """
 
     column: Int64
@@ -42,13 +43,13 @@ class Shifts(NamedTuple):
     base: Int64
     """(S,) first row in `bases`, -1 for none."""
     rows: UInt32
-    """(N,) vertices of the whole face, rising within an interval. Unsigned: no check for negative ones."""
+    """(N,) vertices of the whole face, ascending within an interval; unsigned saves a check."""
     slopes: Array
     """(N, 3) metres per step."""
     bases: Array
     """(B, 3) metres."""
     amount: Array
-    """(1,) scratch: brings a value to the tables' own precision."""
+    """(1,) scratch: rounds a value to the tables' dtype."""
 
 
 class Transforms(NamedTuple):
@@ -59,7 +60,7 @@ class Transforms(NamedTuple):
     column: Int64
     """(K,) FAP - 1."""
     kind: Int64
-    """(K,) place in `KIND_ORDER`."""
+    """(K,) index in `KIND_ORDER`."""
     amount: Float64
     """(K, 3) for one step: metres, radians about each axis, or growth."""
     centre: Float64
@@ -67,7 +68,7 @@ class Transforms(NamedTuple):
 
 
 Members = list[tuple[Intp, Intp]]
-"""For each part: the vertices of interest, in the part's own count, and the rows that they are moved in."""
+"""For each part: indices of vertices within the part, and the rows of the array in which they move."""
 
 
 def all_vertices(model: FaceModel) -> Members:
@@ -77,7 +78,7 @@ def all_vertices(model: FaceModel) -> Members:
 
 
 def bound_points(model: FaceModel) -> Members:
-    """The vertices that feature points stand on; the points are the rows."""
+    """The vertices that feature points are bound to; the rows are those of the points."""
     members = []
     for part in model.parts:
         own = model.bound - model.starts[part.name]
@@ -86,26 +87,27 @@ def bound_points(model: FaceModel) -> Members:
     return members
 
 
-def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]]) -> Shifts:
-    """What FaceDefMesh does to the given vertices, in metres, zero displacements left out.
+def flatten_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]]) -> Shifts:
+    """All FaceDefMesh for the given vertices, in metres, without displacements of zero.
 
-    Raises ModelError where a displacement is too large for numbers of that precision.
+    Raises ModelError where a displacement is too large for the dtype.
     """
-    number = {part.name: place for place, part in enumerate(model.parts)}
+    number = {part.name: k for k, part in enumerate(model.parts)}
     column, part, first, upper, anchor, base, start = ([] for _ in range(7))  # type: ignore[var-annotated]
-    most = _most_rows(model, members, number)
-    rows = np.empty(most, dtype=np.uint32)
-    slopes, bases = np.empty((most, 3), dtype=dtype), np.empty((most, 3), dtype=dtype)
+    capacity = _count_rows(model, members, number)
+    rows = np.empty(capacity, dtype=np.uint32)
+    slopes, bases = np.empty((capacity, 3), dtype=dtype), np.empty((capacity, 3), dtype=dtype)
     count = base_count = 0
     for table in model.tables:
         unit = model.fapu[faps()[table.fap - 1].unit]
         for mesh in table.meshes:
-            place = number[mesh.part]
-            cuts = _intervals(mesh, *members[place], len(model.parts[place].vertices), unit)
+            own = number[mesh.part]
             column.append(table.fap - 1)
-            part.append(place)
+            part.append(own)
             first.append(len(upper))
-            for limit, from_value, moving, per_step, at_anchor in cuts:
+            for limit, from_value, moving, per_step, at_anchor in _cut_intervals(
+                mesh, *members[own], len(model.parts[own].vertices), unit
+            ):
                 _check(per_step, at_anchor, dtype, f"FaceDefTables of FAP {table.fap}, part {mesh.part!r}")
                 upper.append(limit)
                 anchor.append(from_value)
@@ -113,9 +115,9 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
                 stop = count + len(moving)
                 rows[count:stop], slopes[count:stop] = moving, per_step
                 count = stop
-                held = at_anchor.any()
-                base.append(base_count if held else -1)
-                if held:
+                shifted = at_anchor.any()
+                base.append(base_count if shifted else -1)
+                if shifted:
                     bases[base_count : base_count + len(at_anchor)] = at_anchor
                     base_count += len(at_anchor)
     return Shifts(
@@ -133,67 +135,62 @@ def flat_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]
     )
 
 
-def _most_rows(model: FaceModel, members: Members, number: dict[str, int]) -> int:
-    """How many rows the tables have, with those of displacements that are zero."""
-    most = 0
+def _count_rows(model: FaceModel, members: Members, number: dict[str, int]) -> int:
+    """Number of rows of the tables, displacements of zero included."""
+    count = 0
     for table in model.tables:
         for mesh in table.meshes:
-            place = number[mesh.part]
-            moved = np.zeros(len(model.parts[place].vertices), dtype=bool)
+            own = number[mesh.part]
+            moved = np.zeros(len(model.parts[own].vertices), dtype=bool)
             moved[mesh.vertices] = True
-            most += int(moved[members[place][0]].sum()) * (len(mesh.borders) - 1)
-    return most
+            count += int(moved[members[own][0]].sum()) * (len(mesh.borders) - 1)
+    return count
 
 
 _Interval = tuple[float, float, Intp, Float64, Float64]
 
 
-def _intervals(mesh: FaceDefMesh, own: Intp, rows: Intp, size: int, unit: float) -> list[_Interval]:
+def _cut_intervals(mesh: FaceDefMesh, own: Intp, rows: Intp, size: int, unit: float) -> list[_Interval]:
     """(upper end, anchor, rows, metres per step, metres at the anchor) of each interval."""
-    place = np.full(size, -1)
-    place[mesh.vertices] = np.arange(len(mesh.vertices))
-    found = place[own]
-    moves, rows = mesh.displacements[found[found >= 0]], rows[found >= 0]
+    index = np.full(size, -1)  # of a vertex in the FaceDefMesh
+    index[mesh.vertices] = np.arange(len(mesh.vertices))
+    listed = index[own]
+    moves, rows = mesh.displacements[listed[listed >= 0]], rows[listed >= 0]
     borders = [float(border) for border in mesh.borders]
     zero = borders.index(0.0)
     cuts: list[_Interval] = []
     for steps in (range(zero, len(borders) - 1), range(zero - 1, -1, -1)):  # up from 0, and down from it
-        shape = np.zeros((len(rows), 3))
+        shift = np.zeros((len(rows), 3))
         for j in steps:
             anchor, end = (borders[j], borders[j + 1]) if j >= zero else (borders[j + 1], borders[j])
             per_step = moves[:, j].astype(np.float64) * unit
-            moving = _moves(per_step) | _moves(shape)
+            moving = _moves(per_step) | _moves(shift)
             limit = borders[j + 1] if j + 2 < len(borders) else np.inf
             cuts.append(
-                (limit, anchor, rows[moving], per_step.compress(moving, 0), shape.compress(moving, 0))
+                (limit, anchor, rows[moving], per_step.compress(moving, 0), shift.compress(moving, 0))
             )
-            shape += per_step * (end - anchor)
+            shift += per_step * (end - anchor)
     cuts.sort(key=lambda cut: cut[0])
     return cuts
 
 
 def _moves(shifts: Float64) -> Bool:
-    """(N,) whether any of three components is not 0; any(axis=1) takes several times as long."""
+    """(N,) whether any of three components is not 0; several times faster than any(axis=1)."""
     nonzero = shifts != 0
     moves: Bool = nonzero[:, 0] | nonzero[:, 1] | nonzero[:, 2]
     return moves
 
 
-def _check(
-    per_step: Float64,
-    at_anchor: Float64,
-    dtype: type[np.floating[Any]],
-    where: str,
-) -> None:
+def _check(per_step: Float64, at_anchor: Float64, dtype: type[np.floating[Any]], where: str) -> None:
     most = float(np.abs(per_step).max(initial=0)) * 2 * VALUE_MAX + float(np.abs(at_anchor).max(initial=0))
     if not most * len(faps()) < float(np.finfo(dtype).max):
         raise ModelError(f"{where}: displacements of up to {np.abs(per_step).max():g} m a step are too large")
 
 
-def flat_transforms(model: FaceModel) -> Transforms:
+def flatten_transforms(model: FaceModel) -> Transforms:
     """The transforms of each part, nested as `Deformer` documents. ModelError where one is too large."""
     names = [*(part.name for part in model.parts), HEAD]
-    found: list[list[tuple[tuple[int, float], int, list[float], tuple[float, ...]]]] = [[] for _ in names]
+    entries: list[list[tuple[tuple[int, float], int, list[float], tuple[float, ...]]]] = [[] for _ in names]
     for table in model.tables:
         unit = model.fapu[faps()[table.fap - 1].unit]
         # yaw 49, roll 50, pitch 48: the order of the joints of the spine that the head stands on
@@ -206,13 +203,11 @@ def flat_transforms(model: FaceModel) -> Transforms:
                     f"FaceDefTables of FAP {table.fap}, {transform.kind} of {transform.part!r}: "
                     f"{max(map(abs, amount)):g} a step is too large"
                 )
-            place = names.index(transform.part)
-            found[place].append(((kind, outward), table.fap - 1, amount, transform.centre))
-    for of_part in found:
-        of_part.sort(key=lambda entry: entry[0])
-    flat = [entry for of_part in found for entry in of_part]
+            part = names.index(transform.part)
+            entries[part].append(((kind, outward), table.fap - 1, amount, transform.centre))
+    flat = [entry for own in entries for entry in sorted(own, key=itemgetter(0))]
     return Transforms(
-        start=np.cumsum([0, *map(len, found)], dtype=np.int64),
+        start=np.cumsum([0, *map(len, entries)], dtype=np.int64),
         column=np.array([entry[1] for entry in flat], dtype=np.int64),
         kind=np.array([entry[0][0] for entry in flat], dtype=np.int64),
         amount=np.array([entry[2] for entry in flat], dtype=np.float64).reshape(-1, 3),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.deform.flat_tables import KIND_ORDER, flat_transforms
+from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
 from fba.gltf.values import Value
@@ -48,7 +48,7 @@ class FapJoint:
         frame: (4, 4), from the face's frame to that of the node's parent, scaled uniformly. rest: (4, 4), the
         node when all FAPs are 0.
         """
-        flat = flat_transforms(model)
+        flat = flatten_transforms(model)
         number = [*(part.name for part in model.parts), HEAD].index(part)
         turns, shifts = [], []
         centred = True

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.arrays import Array, Float32, Float64, Int32, Intp
-from fba.face.resolve import Resolver, hold
+from fba.face.resolve import FaceSettings, Resolver, hold
 from fba.parameters import BAP_COUNT, FAP_COUNT
 
 TURN = 2 * math.pi / 1e-5
@@ -45,7 +45,7 @@ class Timeline:
     block = BLOCK
     """Frames resolved at once."""
 
-    def __init__(self, animation: Animation, model: object = None) -> None:
+    def __init__(self, animation: Animation, model: FaceSettings | None = None) -> None:
         self.animation = animation
         self.interpolate = True
         self._resolvers: list[Resolver] = [Resolver(model)]

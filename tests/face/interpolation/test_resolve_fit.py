@@ -26,7 +26,7 @@ class Face:
 
     def __init__(self, *links: Link, definitions: Definitions | None = None) -> None:
         self.fit = InterpolationTable(links)
-        self.definitions = definitions
+        self.definitions = definitions or Definitions.default()
 
 
 def track(

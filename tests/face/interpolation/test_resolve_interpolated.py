@@ -63,6 +63,7 @@ def test_a_frame_that_says_nothing_changes_nothing() -> None:
 
 def test_the_table_serves_what_was_taken_back() -> None:
     class Fitted:
+        definitions = Definitions.default()
         fit = InterpolationTable(
             [Link(("open_jaw",), {"stretch_l_cornerlip": Function([Term(2, {"open_jaw": 1})])})]
         )

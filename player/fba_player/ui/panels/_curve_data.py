@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.face.resolve import Resolver
+from fba.face.resolve import FaceSettings, Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
 
 BLOCK = 512
@@ -46,7 +46,7 @@ class Courses:
     its times.
     """
 
-    def __init__(self, timeline: Any, model: Any = None, later: float = 0.0) -> None:
+    def __init__(self, timeline: Any, model: FaceSettings | None = None, later: float = 0.0) -> None:
         self._timeline = timeline
         self._later = later
         self._resolver = Resolver(model)
