@@ -52,7 +52,7 @@ def clips() -> Image.Image:
         with player.Offscreen(scene, SIZE, samples=4) as view:
             for column, share in enumerate(moments):
                 time = float(scene.start) + share * float(scene.duration)
-                places = np.concatenate([mesh.positions for mesh in scene.at(time).faces])
+                places = np.concatenate([mesh.positions for mesh in scene.view_at(time).faces])
                 middle = (places.min(axis=0) + places.max(axis=0)) / 2
                 gone = np.array(scene.travel(time))  # the camera adds this
                 target = tuple(float(v) for v in (middle[0], max(middle[1], 0.9), middle[2]) - gone)

@@ -41,7 +41,7 @@ def test_a_body_with_a_face(run: Run, opened: list[tuple[Any, dict[str, Any]]], 
     scene, _ = opened[0]
     assert scene.has_body
     assert scene.switches["grid"]
-    assert scene.of(scene.timeline.faps(0.0), scene.timeline.baps(0.0)).faces
+    assert scene.view_for(scene.timeline.faps(0.0), scene.timeline.baps(0.0)).faces
 
 
 def test_what_needs_a_file(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:

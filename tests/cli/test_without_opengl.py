@@ -80,7 +80,7 @@ import fba
 from fba import player
 from importlib.resources import files
 scene = player.Scene(fba.read(files("fba") / "samples" / "hello.fap"))
-print(len(scene.at(1.0).faces), player.play.__name__, player.render.__name__)
+print(len(scene.view_at(1.0).faces), player.play.__name__, player.render.__name__)
 try:
     player.Offscreen(scene)
 except fba.DisplayError as error:

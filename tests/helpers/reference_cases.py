@@ -23,8 +23,8 @@ from fba.face.model import FaceModel, point_row
 from fba.parameters import BAP_COUNT, bap_numbers
 from fba.player import Camera, Offscreen, Scene
 from fba.tracks import BodyTrack
-from fba_player.figure.face import FaceFigure
-from fba_player.figure.person import Person
+from fba_player.figure.face import FaceFigure, build_figure
+from fba_player.figure.person import Person, build_person
 from fba_player.view.switches import parse_switch
 
 FOLDER = Path(__file__).parents[1] / "player" / "gl" / "references"
@@ -81,12 +81,12 @@ class Case:
 
 @cache
 def _figure() -> FaceFigure:
-    return FaceFigure(FaceModel.default())
+    return build_figure(FaceModel.default())
 
 
 @cache
 def _person() -> Person:
-    return Person(BodyModel.default(), _figure())
+    return build_person(BodyModel.default(), _figure())
 
 
 @cache

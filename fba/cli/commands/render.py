@@ -15,7 +15,7 @@ from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_op
 from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
-    from fba_player.export.image_sequence import Numbered
+    from fba_player.export.image_files import Numbered
     from fba_player.view.protocols import Showable
 
 KINDS = ("png", "jpg", "mp4", "gif")
@@ -225,7 +225,7 @@ class _Target:
     @staticmethod
     def of(output: str, to: str | None) -> _Target:
         """What `--output` and `--to` say together."""
-        from fba_player.export.image_sequence import Numbered, is_sequence
+        from fba_player.export.image_files import Numbered, is_sequence
 
         if is_sequence(output):
             if to is not None:
@@ -240,7 +240,7 @@ class _Target:
     @property
     def film(self) -> bool:
         """Whether it is many pictures."""
-        from fba_player.export.image_sequence import is_film
+        from fba_player.export.image_files import is_film
 
         return self.pictures is not None or is_film(f"film{self.suffix}")
 

@@ -1,7 +1,12 @@
-"""Single pictures as PNG, optionally transparent, and JPEG files."""
+"""Pictures in files: single ones as PNG or JPEG, and numbered ones in place of a film.
+
+The names of numbered pictures: frames/00000.png, frames/00001.png, ...
+"""
 
 from __future__ import annotations
 
+import os
+import re
 import zlib
 from pathlib import Path
 from typing import BinaryIO
@@ -9,11 +14,15 @@ from typing import BinaryIO
 import numpy as np
 
 from fba.arrays import UInt8
-from fba.atomic import PathLike, atomic
-from fba.errors import UnsupportedError
+from fba.atomic import PathLike, atomic, write_error
+from fba.errors import FormatError, Remedy, UnsupportedError
+from fba_player.export.recorder import FILMS
 
 PICTURES = (".png", ".jpg", ".jpeg")
 JPEG_QUALITY = 90
+NUMBER = re.compile(r"%(0?\d{0,2})d")
+NAMES = "%05d.png"
+"""Names of the pictures where only a folder is given."""
 
 
 def write_picture(path: PathLike, pixels: UInt8, *, transparent: bool = False) -> Path:
@@ -56,3 +65,110 @@ def check_picture(target: Path, *, transparent: bool) -> None:
             f"{target}: only PNG pictures can be transparent; name it {target.with_suffix('.png').name}",
             what=f"transparency in {suffix}",
         )
+
+
+class Numbered:
+    """The names of a sequence of pictures.
+
+    path: a name with %05d, or %d, where the number goes, or a folder with a slash at its end.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        text = os.fspath(path)
+        if text.endswith(("/", os.sep)):
+            text = os.path.join(text, NAMES)
+        self.folder, self.name = Path(text).parent, Path(text).name
+        numbers = NUMBER.findall(self.name)
+        if len(numbers) != 1 or self.name.count("%") != 1 or "%" in str(self.folder):
+            raise UnsupportedError(
+                f"{text}: the names of numbered pictures have their number at one place of the last part, "
+                f"written %05d: e.g. frames/{NAMES}",
+                what="names of pictures",
+            )
+        digits = numbers[0].lstrip("0")
+        self._width = int(digits) if digits else 0
+        if self._width and not numbers[0].startswith("0"):
+            raise UnsupportedError(
+                f"{text}: write %0{numbers[0]}d, so that the numbers have zeros in front",
+                what="names of pictures",
+            )
+        self._before, self._after = NUMBER.split(self.name)[0], NUMBER.split(self.name)[-1]
+
+    def path(self, number: int) -> Path:
+        """Path of the picture of a frame, counted from 0."""
+        return self.folder / f"{self._before}{number:0{self._width}d}{self._after}"
+
+    def existing(self) -> list[int]:
+        """Numbers of the pictures that exist, ascending. Raises FormatError for an unreadable folder."""
+        try:
+            names = os.listdir(self.folder)
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise write_error(self.folder, error, "cannot be looked into") from error
+        pattern = re.compile(f"{re.escape(self._before)}(\\d+){re.escape(self._after)}")
+        numbers = [int(found[1]) for name in names if (found := pattern.fullmatch(name))]
+        return sorted(number for number in numbers if self.path(number).exists())
+
+
+def is_sequence(path: PathLike) -> bool:
+    """Whether a path stands for numbered pictures: it has a % in its last part, or ends with a slash."""
+    text = os.fspath(path)
+    return text.endswith(("/", os.sep)) or "%" in os.path.basename(text)
+
+
+def is_film(path: PathLike) -> bool:
+    """Whether a path stands for many pictures: a film, or numbered pictures."""
+    return os.path.splitext(os.fspath(path))[1].lower() in FILMS or is_sequence(path)
+
+
+class Sequence:
+    """A `Sink` that writes one picture per frame, from number 0.
+
+    names: see `Numbered`. count: number of pictures that will be written. transparent: PNG with an alpha
+    channel. replace: whether pictures of these names may be overwritten. The folder is made if it is missing.
+
+    Raises FormatError if such pictures exist and replace is False, or if pictures of an older, longer
+    sequence would be left; UnsupportedError for another suffix than those of pictures.
+    """
+
+    def __init__(
+        self, names: Numbered, count: int, *, transparent: bool = False, replace: bool = False
+    ) -> None:
+        check_picture(Path(names.name), transparent=transparent)
+        there = names.existing()
+        if there and not replace:
+            raise FormatError(
+                f"{_range_text(names, there)} there already; choose another folder", path=names.folder
+            ).with_remedies(Remedy("replace", "or have them replaced with {}", "True"))
+        if beyond := [number for number in there if number >= count]:
+            raise FormatError(
+                f"{_range_text(names, beyond)} left from a longer sequence, and would follow the {count} new "
+                "pictures; delete them, or choose another folder",
+                path=names.folder,
+            )
+        self.stopped = False
+        self._names, self._transparent = names, transparent
+        try:
+            names.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise write_error(names.folder, error, "the folder cannot be made") from error
+
+    def write(self, pixels: UInt8, number: int) -> None:
+        """Write a picture, uint8 (H, W, 4), as that of frame `number`."""
+        path = self._names.path(number)
+        write_picture(path, pixels, transparent=self._transparent)
+
+    def finish(self, count: int) -> Path:
+        """The folder of the pictures."""
+        return self._names.folder
+
+    def abort(self) -> None:
+        """Do nothing: finished pictures stay."""
+
+
+def _range_text(names: Numbered, numbers: list[int]) -> str:
+    first = names.path(numbers[0]).name
+    if len(numbers) == 1:
+        return f"{first} is"
+    return f"{first} to {names.path(numbers[-1]).name} ({len(numbers)} pictures) are"

@@ -80,7 +80,7 @@ class Offscreen:
         """The picture at a time, as `frame` returns it, in memory that the next call overwrites."""
         if self._target is None:
             raise ValueError("this Offscreen is closed")
-        return self._draw_view(self.scene.at(time), follow_camera(self.camera, self.scene, time))
+        return self._draw_view(self.scene.view_at(time), follow_camera(self.camera, self.scene, time))
 
     def still(self, faps: npt.ArrayLike) -> UInt8:
         """A picture of the face for FAPs (68,) as `fba.face.resolve` returns them: uint8 (H, W, 4).

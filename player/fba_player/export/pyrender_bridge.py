@@ -21,7 +21,7 @@ from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import DisplayError
 from fba_player.export.offscreen import follow_camera
-from fba_player.gl.system_libraries import missing_libraries, missing_text
+from fba_player.gl.context import missing_libraries, missing_text
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera
@@ -69,7 +69,7 @@ def to_pyrender(
     with _numpy_1_names():
         pyrender = _import_pyrender()
         shown = Scene(animation, model, body=body, axes=axes)
-        view = shown.at(t)
+        view = shown.view_at(t)
         eye = camera if isinstance(camera, Camera) else shown.camera(camera, aspect)
         scene = pyrender.Scene(bg_color=(0.5, 0.5, 0.5, 0.0), ambient_light=_ambient())
         for face in view.faces:

@@ -13,8 +13,15 @@ from typing import Any
 from fba.animation import Animation
 from fba.atomic import PathLike
 from fba.errors import FbaError, RangeError, UnsupportedError
-from fba_player.export.image_files import PICTURES, check_picture, write_picture
-from fba_player.export.image_sequence import Numbered, Sequence, is_film, is_sequence
+from fba_player.export.image_files import (
+    PICTURES,
+    Numbered,
+    Sequence,
+    check_picture,
+    is_film,
+    is_sequence,
+    write_picture,
+)
 from fba_player.export.offscreen import Offscreen
 from fba_player.export.recorder import FILMS, Recorder, exact_rate
 from fba_player.scene.scene import Scene

@@ -18,7 +18,7 @@ from fba_player.mesh.textures import RELIEF, FacePicture, texture_breadth
 from fba_player.view.view import FaceShape
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyPart
+    from fba.body.model import BodyModel, BodyPart
 
 
 SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
@@ -98,6 +98,12 @@ def detail_levels(
     if more is not None:
         columns.append(more)
     return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
+
+
+def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
+    """The slice of a part's vertices in the arrays of its model. Raises KeyError for an unknown name."""
+    start = model.starts[name]
+    return slice(start, start + len(model.part(name).vertices))
 
 
 def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:

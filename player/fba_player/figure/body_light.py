@@ -8,11 +8,12 @@ the others.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from fba.arrays import Array, Float32, Float64, Int32, Integer
+from fba.arrays import Array, Float32, Float64, Int32, Integer, Intp
 from fba.body.model import BodyModel
 from fba.cache import load_or_make, make_key
 from fba.compiled import compiled, is_compiled
@@ -46,24 +47,19 @@ FOLDS = 0.75
 """Strength of occlusion by folds: below 1, as cloth lets light through and the posture changes."""
 
 
+@dataclass(frozen=True, eq=False)
 class BodyLight:
-    """Light on a body.
+    """Light on a body; see `build_body_light`.
 
-    coarser: levels of detail by the name of each part that is drawn, None for a part without any. Occlusion
-    is computed on first use, in about a second, and stored in the disk cache.
+    coarser: levels of detail by the name of each part that is drawn, None for a part without any. ends:
+    (K, 2), the joints at both ends of its capsules, and radii: (K,), metres. Occlusion is computed on first
+    use, in about a second, and stored in the disk cache.
     """
 
-    def __init__(self, body: BodyModel, coarser: Mapping[str, DetailLevels | None]) -> None:
-        self._body = body
-        self._coarser = coarser
-        names = body.skeleton.names
-        known = [row for row in CAPSULES if row[0] in names and row[1] in names]
-        self._ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
-        tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else TALL
-        head = (
-            0.92 if "head" in {part.kind for part in body.parts} else 0.85
-        )  # up to the crown, or to the neck
-        self._radii = np.array([row[2] for row in known]) * (tall / head / TALL if tall > 0 else 1.0)
+    body: BodyModel
+    coarser: Mapping[str, DetailLevels | None]
+    ends: Intp
+    radii: Float64
 
     def shade(self, positions: Float32, normals: Float32, joints: Float64) -> Float32:
         """float32 (V, 4), as in `FaceMesh.light`; meaningless at parts that are not drawn.
@@ -72,11 +68,11 @@ class BodyLight:
         numba, nothing is in the light's way.
         """
         light = np.empty((len(positions), len(REACH)), dtype=np.float32)
-        if not is_compiled() or not len(self._ends):
+        if not is_compiled() or not len(self.ends):
             light[:] = REACH
             return light
         sampled, near, shares, folds = self._prepared
-        capsules = _capsules(joints[self._ends.ravel(), :3, 3].reshape(-1, 2, 3), self._radii)
+        capsules = _capsules(joints[self.ends.ravel(), :3, 3].reshape(-1, 2, 3), self.radii)
         past = np.empty((len(sampled), 2), dtype=np.float32)
         _shade_by_capsules(positions, normals, sampled, capsules, past)
         _spread(past, near, shares, folds, light)
@@ -86,13 +82,13 @@ class BodyLight:
     def _prepared(self) -> Prepared:
         """(N,) vertices at which light is computed; (V, NEAREST) indices into these from which each vertex is
         interpolated, and (V, NEAREST) their weights; (V,) how much of the sky folds leave each vertex."""
-        body = self._body
+        body = self.body
         rows: list[Integer] = []
         for part in body.parts:
-            if part.name not in self._coarser:
+            if part.name not in self.coarser:
                 rows.append(np.arange(min(len(part.vertices), 1)))  # not drawn
                 continue
-            coarser = self._coarser[part.name]
+            coarser = self.coarser[part.name]
             left = None if coarser is None else coarser.triangles_within(COARSE)
             rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
         near, shares = _near([part.vertices for part in body.parts], rows)
@@ -105,6 +101,17 @@ class BodyLight:
             shares,
             (1 - FOLDS * (1 - np.clip(open_, 0, 1))).astype(np.float32),
         )
+
+
+def build_body_light(body: BodyModel, coarser: Mapping[str, DetailLevels | None]) -> BodyLight:
+    """The light on a body; coarser as in `BodyLight`."""
+    names = body.skeleton.names
+    known = [row for row in CAPSULES if row[0] in names and row[1] in names]
+    ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
+    tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else TALL
+    share = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or to the neck
+    radii = np.array([row[2] for row in known]) * (tall / share / TALL if tall > 0 else 1.0)
+    return BodyLight(body, coarser, ends, radii)
 
 
 def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from fba_player.figure._face_parts import (
     detail_levels,
     known_middle,
     make_shape,
+    part_rows,
     with_triangles,
 )
 from fba_player.figure.face_light import MOUTH_OPEN, FaceLight
@@ -46,54 +47,22 @@ class Pose:
     turn: Float64
 
 
+@dataclass(eq=False)
 class FaceFigure:
-    """A face model ready to be shown.
+    """A face model ready to be shown; see `build_figure`.
 
-    model: any face. Its occlusion is computed on first use, in about a second. sway: float32 (V,), how far
-    each vertex turns with the head, whose rotation is about `centre` (3,).
+    sway: float32 (V,), how far each vertex turns with the head, whose rotation is about `centre` (3,).
+    shapes: all parts but the eyeballs, by name.
     """
 
-    def __init__(self, model: FaceModel) -> None:
-        self.model = model
-        self.deformer = Deformer(model)
-        self._pose: Pose | None = None
-        self._ranges = {
-            part.name: slice(model.starts[part.name], model.starts[part.name] + len(part.vertices))
-            for part in model.parts
-        }
-        self._eyeballs: list[tuple[Part, Eyeball]] = []
-        self._shapes: dict[str, FaceShape] = {}
-        self._extremes: dict[tuple[int, ...], Float32] = {}
-        sways = compute_sway(model)
-        for part in model.parts:
-            ball = find_eyeball(part, model) if part.kind == "eye" else None
-            if ball is None:
-                self._shapes[part.name] = self._shape(part, sways[self._ranges[part.name]])
-            else:
-                self._eyeballs.append((part, ball))
-        self._extremes.clear()
-        self._cut: dict[str, FaceShape] = {}
-        self.sway = sways
-        self.centre = _head_centre(model)
-        self._light = FaceLight(model, self.deformer, sways)
-
-    def _shape(self, part: Part, sways: Float32) -> FaceShape:
-        shape = make_shape(part, sways)
-        if shape.across is not None:  # single hairs are not simplified
-            return shape
-        rows = self._ranges[part.name]
-        poses = [self._extreme(faps)[rows] for faps in ({}, MOUTH_OPEN, GRIMACE)]
-        return replace(shape, coarser=detail_levels(part, poses))
-
-    def _extreme(self, faps: dict[int, int]) -> Float32:
-        """float32 (V, 3): the face for values by FAP number, without the head's turn."""
-        key = tuple(faps)
-        if key not in self._extremes:
-            values = np.zeros(FAP_COUNT, dtype=np.float32)
-            for number, value in faps.items():
-                values[number - 1] = value
-            self._extremes[key] = self.deformer.local(values)
-        return self._extremes[key]
+    model: FaceModel
+    deformer: Deformer
+    sway: Float32
+    centre: Float64
+    shapes: dict[str, FaceShape]
+    eyeballs: list[tuple[Part, Eyeball]]
+    light: FaceLight
+    _pose: Pose | None = field(default=None, init=False)
 
     @property
     def scale(self) -> float:
@@ -123,7 +92,7 @@ class FaceFigure:
         return Subject(centre, 0.71 * (top - low), 0.60 * (top - low))
 
     def pose(self, faps: Float32) -> Pose:
-        """The face for FAPs (68,); the last pose is kept."""
+        """The face for FAPs (68,); the last one is cached."""
         if self._pose is None or not np.array_equal(self._pose.faps, faps):
             self._pose = self._posed(faps.copy())
         return self._pose
@@ -141,32 +110,27 @@ class FaceFigure:
         on_body: whether to leave out the lower neck and shoulders. without: kinds of parts to leave out.
         """
         pose = self.pose(faps)
-        light = self._light.shade(pose.positions, pose.turn[:3, :3], matrix[:3, :3])
+        light = self.light.shade(pose.positions, pose.turn[:3, :3], matrix[:3, :3])
         axis = rotation_vector(pose.turn[:3, :3])
-        found = []
-        for name, shape in (self._on_body() if on_body else self._shapes).items():
+        meshes = []
+        for name, shape in (self._shapes_on_body if on_body else self.shapes).items():
             if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
-            rows = self._ranges[name]
+            rows = self.rows(name)
             positions, normals = pose.positions[rows], pose.normals[rows]
-            found.append(FaceMesh(shape, positions, normals, light[rows], matrix, axis, self.centre))
-        return found
-
-    @property
-    def shapes(self) -> dict[str, FaceShape]:
-        """All parts but the eyeballs, by name."""
-        return self._shapes
+            meshes.append(FaceMesh(shape, positions, normals, light[rows], matrix, axis, self.centre))
+        return meshes
 
     def rows(self, name: str) -> slice:
-        """The slice of a part's vertices in the arrays of the model."""
-        return self._ranges[name]
+        """The slice of a part's vertices in the arrays of the model. Raises KeyError for an unknown name."""
+        return part_rows(self.model, name)
 
     def shade(self, faps: Float32, frame: Float64) -> Float32:
         """float32 (V, 4), the light that reaches the model's vertices, as in `FaceMesh.light`.
 
         frame: (4, 4), the turned head's frame into the world.
         """
-        return self._light.shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
+        return self.light.shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
         """The eyeballs for FAPs (68,); matrix: (4, 4), into the world.
@@ -176,23 +140,52 @@ class FaceFigure:
         pose = self.pose(faps)
         placed = matrix if turned else matrix @ pose.turn
         return [
-            ball.pose(pose.positions[self._ranges[part.name]], pose.positions, faps, placed)
-            for part, ball in self._eyeballs
+            ball.pose(pose.positions[self.rows(part.name)], pose.positions, faps, placed)
+            for part, ball in self.eyeballs
         ]
 
     def points(self, faps: Float32, matrix: Float64) -> Float64:
         """float64 (84, 3): feature points in the world for FAPs (68,); NaN for those that the face lacks."""
-        places = self.deformer.feature_points(faps)
-        moved: Float64 = places @ matrix[:3, :3].T + matrix[:3, 3]
+        points = self.deformer.feature_points(faps)
+        moved: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
         return moved
 
-    def _on_body(self) -> dict[str, FaceShape]:
-        if not self._cut:
-            for name, shape in self._shapes.items():
-                kept = (shape.sway[shape.triangles] > CUT).all(axis=1)
-                if kept.any():
-                    self._cut[name] = with_triangles(shape, shape.triangles[kept])
-        return self._cut
+    @cached_property
+    def _shapes_on_body(self) -> dict[str, FaceShape]:
+        """The parts without the lower neck and shoulders."""
+        shapes = {}
+        for name, shape in self.shapes.items():
+            above = (shape.sway[shape.triangles] > CUT).all(axis=1)
+            if above.any():
+                shapes[name] = with_triangles(shape, shape.triangles[above])
+        return shapes
+
+
+def build_figure(model: FaceModel) -> FaceFigure:
+    """A figure of any face. Its occlusion is computed on first use, in about a second."""
+    deformer, sway = Deformer(model), compute_sway(model)
+    extremes = [_extreme_positions(deformer, faps) for faps in ({}, MOUTH_OPEN, GRIMACE)]
+    shapes, eyeballs = {}, []
+    for part in model.parts:
+        eyeball = find_eyeball(part, model) if part.kind == "eye" else None
+        if eyeball is not None:
+            eyeballs.append((part, eyeball))
+            continue
+        rows = part_rows(model, part.name)
+        shape = make_shape(part, sway[rows])
+        if shape.across is None:  # single hairs are not simplified
+            shape = replace(shape, coarser=detail_levels(part, [positions[rows] for positions in extremes]))
+        shapes[part.name] = shape
+    light = FaceLight(model, deformer, sway)
+    return FaceFigure(model, deformer, sway, _head_centre(model), shapes, eyeballs, light)
+
+
+def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
+    """float32 (V, 3): the face for values by FAP number, without the head's turn."""
+    values = np.zeros(FAP_COUNT, dtype=np.float32)
+    for number, value in faps.items():
+        values[number - 1] = value
+    return deformer.local(values)
 
 
 def _head_centre(model: FaceModel) -> Float64:

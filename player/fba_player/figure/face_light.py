@@ -13,8 +13,9 @@ from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
 from fba.cache import load_or_make
 from fba.compiled import is_compiled
 from fba.face.deform.deformer import Deformer
-from fba.face.model import FaceModel, Part, point_row
+from fba.face.model import FaceModel, point_row
 from fba_player.figure._face_light_loops import Table, blend_swaying, light_vertices
+from fba_player.figure._face_parts import part_rows
 from fba_player.figure.occlusion import BAKING, HARMONICS, Visibility, bake, weights
 
 KEY_DIRECTION, RIM_DIRECTION = ((0.70, 0.68, 0.80), (-0.55, 0.50, -0.85))
@@ -58,11 +59,7 @@ class FaceLight:
         self._last: tuple[tuple[object, ...], Float32] | None = None
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
-        self._tongues = [self._rows(part) for part in model.of_kind("tongue")]
-
-    def _rows(self, part: Part) -> slice:
-        start = self._model.starts[part.name]
-        return slice(start, start + len(part.vertices))
+        self._tongues = [part_rows(model, part.name) for part in model.of_kind("tongue")]
 
     def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
         """float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
@@ -93,7 +90,10 @@ class FaceLight:
 
     @cached_property
     def _part_lights(self) -> list[_PartLight]:
-        return [_PartLight(self.baked, self._rows(part), self._sway) for part in self._model.parts]
+        return [
+            _part_light(self.baked, part_rows(self._model, part.name), self._sway)
+            for part in self._model.parts
+        ]
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -165,16 +165,19 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 
+@dataclass(frozen=True, eq=False)
 class _PartLight:
-    """What the light at the vertices of one part is computed from."""
+    """What the light at the vertices of one part is computed from.
 
-    def __init__(self, baked: Baked, rows: slice, sway: Float32) -> None:
-        self.rows = rows
-        chosen = np.arange(rows.start, rows.stop)
-        self._table = _table(baked, chosen)
-        self._swaying = np.flatnonzero(sway[chosen] < 1)
-        self._still = _table(baked, chosen[self._swaying])
-        self._sway = sway[chosen[self._swaying]]
+    rows: of the part in the model. table: of its N vertices. swaying: those (M,) that do not go with the head
+    all the way, sway: (M,), how far, and still: their table.
+    """
+
+    rows: slice
+    table: Table
+    swaying: Intp
+    still: Table
+    sway: Float32
 
     def shade(self, share: float, lights: Float32, on_teeth: float, light: Float32) -> None:
         """Write light (N, 4): key light, sky, through, rim light.
@@ -183,18 +186,27 @@ class _PartLight:
         for what goes with the head, then, where they differ, two more rows for what stands still. on_teeth:
         the share of the missing light that is added.
         """
-        light_vertices(self._table, lights[:2], share, on_teeth, light)
-        if len(lights) > 2 and len(self._swaying):
-            still = np.empty((len(self._swaying), 4), dtype=np.float32)
-            light_vertices(self._still, lights[2:], share, on_teeth, still)
-            blend_swaying(light, still, self._swaying, self._sway)
+        light_vertices(self.table, lights[:2], share, on_teeth, light)
+        if len(lights) > 2 and len(self.swaying):
+            still = np.empty((len(self.swaying), 4), dtype=np.float32)
+            light_vertices(self.still, lights[2:], share, on_teeth, still)
+            blend_swaying(light, still, self.swaying, self.sway)
 
 
-def _table(baked: Baked, chosen: Intp) -> Table:
-    near = np.flatnonzero(baked.near[chosen])
+def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
+    """The tables of a part's rows of a model. sway: (V,), of all vertices of the model."""
+    vertices = np.arange(rows.start, rows.stop)
+    swaying = np.flatnonzero(sway[vertices] < 1)
+    still = _table(baked, vertices[swaying])
+    return _PartLight(rows, _table(baked, vertices), swaying, still, sway[vertices[swaying]])
+
+
+def _table(baked: Baked, vertices: Intp) -> Table:
+    """The visibility of some vertices of a model."""
+    near = np.flatnonzero(baked.near[vertices])
     shut, wide = (
         [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]
-        for visibility, rows in ((baked.shut, chosen), (baked.wide, chosen[near]))
+        for visibility, rows in ((baked.shut, vertices), (baked.wide, vertices[near]))
     )
     return Table(shut[0], shut[1], shut[2], wide[0], wide[1], wide[2], near)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -11,8 +11,8 @@ from fba.arrays import Float32, Float64
 from fba.body.head_attachment import HeadOnBody
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
-from fba_player.figure._face_parts import detail_levels, make_shape, with_triangles
-from fba_player.figure.body_light import BodyLight
+from fba_player.figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
+from fba_player.figure.body_light import BodyLight, build_body_light
 from fba_player.figure.face import FaceFigure
 from fba_player.view.view import Eye, FaceMesh, FaceShape
 
@@ -24,29 +24,20 @@ CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
 
+@dataclass(frozen=True, eq=False)
 class Person:
-    """Body and face, moved by joint matrices and FAPs.
+    """Body and face, moved by joint matrices and FAPs; see `build_person`.
 
-    body: a model that says where the pupils are. figure: the face to be put there. Triangles of the face
-    under the body's clothes are left out, and so are parts of kind "other" that lie wholly below the chin.
+    head: the face on the body. body_shapes, face_shapes: the parts that are drawn, by name. light: that on
+    the body.
     """
 
-    def __init__(self, body: BodyModel, figure: FaceFigure) -> None:
-        self.body = body
-        self.figure = figure
-        model = figure.model
-        skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
-        eyes = model.points[[point_row("3.5"), point_row("3.6")]]
-        self.head = HeadOnBody(body, model.vertices, eyes, skull)
-        self._face = self._face_shapes()
-        left_out = ("head", "neck") if self.head.brings_neck else ("head",)
-        self._parts = [part for part in body.parts if part.kind not in left_out]
-        self._rows = {
-            part.name: slice(start, start + len(part.vertices))
-            for part, start in zip(body.parts, body.starts.values(), strict=True)
-        }
-        self._shapes = {part.name: _shape(part, len(body.skeleton)) for part in self._parts}
-        self._light = BodyLight(body, {name: shape.coarser for name, shape in self._shapes.items()})
+    body: BodyModel
+    figure: FaceFigure
+    head: HeadOnBody
+    body_shapes: dict[str, FaceShape]
+    face_shapes: dict[str, FaceShape]
+    light: BodyLight
 
     def joints(self, faps: Float32, matrices: Float64) -> Float64:
         """Joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
@@ -60,16 +51,16 @@ class Person:
         """All parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
         positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
         self.body.skin(joints, positions, normals)
-        light = self._light.shade(positions, normals, joints)
+        light = self.light.shade(positions, normals, joints)
         meshes = [
-            _mesh_in_world(self._shapes[part.name], self._rows[part.name], positions, normals, light)
-            for part in self._parts
+            _mesh_in_world(shape, part_rows(self.body, name), positions, normals, light)
+            for name, shape in self.body_shapes.items()
         ]
         pose = self.figure.pose(faps)
         positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
         self.head.skin(pose.positions, joints, positions, upright=pose.normals, normals=normals)
         light = self.figure.shade(faps, self.frame(joints))
-        for name, shape in self._face.items():
+        for name, shape in self.face_shapes.items():
             meshes.append(_mesh_in_world(shape, self.figure.rows(name), positions, normals, light))
         return meshes
 
@@ -77,29 +68,47 @@ class Person:
         """The eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
         return self.figure.eyes(faps, self.frame(joints), turned=True)
 
-    def _face_shapes(self) -> dict[str, FaceShape]:
-        """The face's parts by name, without the triangles that clothes hide."""
-        model, found = self.figure.model, {}
-        chin = model.points[point_row("2.1")][1]
-        for name, shape in self.figure.shapes.items():
-            part = model.part(name)
-            if part.kind == "other" and part.vertices[:, 1].max() < chin:
-                continue
-            hidden = self.head.hidden[self.figure.rows(name)]
-            kept = ~hidden[shape.triangles].all(axis=1)
-            if kept.any():
-                found[name] = with_triangles(shape, shape.triangles[kept])
-        return found
+
+def build_person(body: BodyModel, figure: FaceFigure) -> Person:
+    """A person of a body, which must say where the pupils are, and a face, which is put there.
+
+    Triangles of the face under the body's clothes are left out, and so are parts of kind "other" that lie
+    wholly below the chin.
+    """
+    model = figure.model
+    skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
+    eyes = model.points[[point_row("3.5"), point_row("3.6")]]
+    head = HeadOnBody(body, model.vertices, eyes, skull)
+    left_out = ("head", "neck") if head.brings_neck else ("head",)
+    shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts if part.kind not in left_out}
+    light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
+    return Person(body, figure, head, shapes, _face_shapes(figure, head), light)
+
+
+def _face_shapes(figure: FaceFigure, head: HeadOnBody) -> dict[str, FaceShape]:
+    """The face's parts by name, without the triangles that clothes hide."""
+    model, shapes = figure.model, {}
+    chin = model.points[point_row("2.1")][1]
+    for name, shape in figure.shapes.items():
+        part = model.part(name)
+        if part.kind == "other" and part.vertices[:, 1].max() < chin:
+            continue
+        hidden = head.hidden[figure.rows(name)]
+        visible = ~hidden[shape.triangles].all(axis=1)
+        if visible.any():
+            shapes[name] = with_triangles(shape, shape.triangles[visible])
+    return shapes
 
 
 def _shape(part: BodyPart, joints: int) -> FaceShape:
     shape = make_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
-    # Where joints bend the body, vertices must be left: preserve the weights, projected a few fixed ways.
+    # Vertices must remain where joints bend the body: preserve the weights, in a few fixed projections.
     random = np.random.default_rng(7).standard_normal((joints, SEEN_WEIGHTS)) / SEEN_WEIGHTS**0.5
     carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * BEND
     coarser = detail_levels(part, [part.vertices], carried.astype(np.float32))
-    kept = replace(shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True, name="")
-    return replace(kept, coarser=coarser)
+    return replace(
+        shape, scatter=SCATTER.get(part.kind, 0.0), two_sided=False, closed=True, name="", coarser=coarser
+    )
 
 
 def _mesh_in_world(

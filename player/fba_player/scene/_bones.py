@@ -1,10 +1,12 @@
-"""The body as its joints: a capsule along every bone, a small sphere at every joint."""
+"""What is drawn of joints: a capsule along every bone, a sphere at every joint, shadows on the ground."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from fba.arrays import Float32, Float64
+from fba.arrays import Float32, Float64, Intp
 from fba.body import Skeleton
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
@@ -20,40 +22,68 @@ SPINE_RADIUS = 0.0095
 JOINT_PER_BONE = 1.22
 HEAD_RADIUS = 0.006
 SPINE = ("vl", "vt", "vc", "sacroiliac", "skullbase")
+SHADOWS = (
+    ("HumanoidRoot", 0.55, 0.42, 0.97),
+    ("l_midtarsal", 0.20, 0.55, 0.03),
+    ("r_midtarsal", 0.20, 0.55, 0.03),
+    ("l_subtalar", 0.16, 0.40, 0.04),
+    ("r_subtalar", 0.16, 0.40, 0.04),
+)
+"""Joints with a shadow: its radius (m), its darkness, and the joint's height at rest (m)."""
 
 
+@dataclass(frozen=True, eq=False)
 class Bones:
-    """Capsules of all joints of a skeleton in any pose.
+    """Bones, joints and soft shadows of a skeleton in any pose.
 
-    skeleton: gives the joints, their parents and, from the default posture, how thick each bone is.
+    parents, children: the joints (B,) at the ends of each bone. templates: float32 (B, 16), the capsules of
+    bones before their ends are known. joint_radii: (J,), metres. shadow_joints: the joints of `SHADOWS`.
     """
 
-    def __init__(self, skeleton: Skeleton) -> None:
+    parents: Intp
+    children: Intp
+    templates: Float32
+    joint_radii: Float64
+    shadow_joints: tuple[int, ...]
+
+    @classmethod
+    def from_skeleton(cls, skeleton: Skeleton) -> Bones:
+        """The bones of a skeleton, as thick as their lengths in the default posture suggest."""
         centres = np.asarray(skeleton.centres, dtype=np.float64)
-        self._child = np.flatnonzero(np.asarray(skeleton.parents) >= 0)
-        self._parent = np.asarray(skeleton.parents)[self._child]
-        length = np.linalg.norm(centres[self._child] - centres[self._parent], axis=1)
-        radius = np.clip(SLENDERNESS * length, *RADII)
-        spine = [skeleton.names[child].startswith(SPINE) for child in self._child]
-        radius = np.where(spine, SPINE_RADIUS, radius)
-        self._fixed = np.zeros((len(self._child), CAPSULE_FLOATS), dtype=np.float32)
-        self._fixed[:, 3] = radius
-        self._fixed[:, 7] = radius * 0.8
-        self._fixed[:, 11] = 1.0
-        self._fixed[:, 12:16] = BONE
+        children = np.flatnonzero(np.asarray(skeleton.parents) >= 0)
+        parents = np.asarray(skeleton.parents)[children]
+        length = np.linalg.norm(centres[children] - centres[parents], axis=1)
+        spine = [skeleton.names[child].startswith(SPINE) for child in children]
+        radius = np.where(spine, SPINE_RADIUS, np.clip(SLENDERNESS * length, *RADII))
+        templates = np.zeros((len(children), CAPSULE_FLOATS), dtype=np.float32)
+        templates[:, 3] = radius
+        templates[:, 7] = radius * 0.8
+        templates[:, 11] = 1.0
+        templates[:, 12:16] = BONE
         size = np.zeros(len(centres))
-        np.maximum.at(size, self._child, radius)
-        np.maximum.at(size, self._parent, np.where(spine, radius, np.minimum(radius, 0.02)))
-        self._sizes = np.maximum(size, RADII[0]) * JOINT_PER_BONE
+        np.maximum.at(size, children, radius)
+        np.maximum.at(size, parents, np.where(spine, radius, np.minimum(radius, 0.02)))
+        joint_radii = np.maximum(size, RADII[0]) * JOINT_PER_BONE
+        shadow_joints = tuple(skeleton.names.index(name) for name, *_ in SHADOWS)
+        return cls(parents, children, templates, joint_radii, shadow_joints)
 
     def capsules(self, matrices: Float64) -> Float32:
         """(2J - 1, 16) capsules for joint matrices (J, 4, 4): the bones, then a sphere at every joint."""
-        places = matrices[:, :3, 3]
-        bones = self._fixed.copy()
-        bones[:, 0:3] = places[self._parent]
-        bones[:, 4:7] = places[self._child]
-        bones[:, 8:11] = matrices[self._parent, :3, 2]
-        return np.concatenate([bones, spheres(places, self._sizes, JOINT)])
+        positions = matrices[:, :3, 3]
+        bones = self.templates.copy()
+        bones[:, 0:3] = positions[self.parents]
+        bones[:, 4:7] = positions[self.children]
+        bones[:, 8:11] = matrices[self.parents, :3, 2]
+        return np.concatenate([bones, spheres(positions, self.joint_radii, JOINT)])
+
+    def shadows(self, matrices: Float64) -> Float32:
+        """float32 (K, 4): soft shadows under hips and feet, fainter with height, as in `View.blobs`."""
+        shadows = []
+        for joint, (_, radius, darkness, rest) in zip(self.shadow_joints, SHADOWS, strict=True):
+            x, y, z = matrices[joint, :3, 3]
+            height = max(float(y) - rest, 0.0)
+            shadows.append((x, z, radius * (1 + height), darkness / (1 + 4 * height)))
+        return np.array(shadows, dtype=np.float32)
 
 
 class Pivots:
@@ -63,7 +93,7 @@ class Pivots:
     """
 
     def __init__(self, head: Float64, others: Float64, scale: float) -> None:
-        self._places = np.concatenate([head[None], others])
+        self._centres = np.concatenate([head[None], others])
         self._scale = scale
 
     def capsules(self, matrix: Float64) -> Float32:
@@ -71,19 +101,19 @@ class Pivots:
 
         matrix: (4, 4), the turned head's frame into the world.
         """
-        places = (self._places @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
-        bones = np.zeros((len(places) - 1, CAPSULE_FLOATS), dtype=np.float32)
-        bones[:, 0:3], bones[:, 4:7] = places[0], places[1:]
+        centres = (self._centres @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+        bones = np.zeros((len(centres) - 1, CAPSULE_FLOATS), dtype=np.float32)
+        bones[:, 0:3], bones[:, 4:7] = centres[0], centres[1:]
         bones[:, 3] = HEAD_RADIUS * 0.75 * self._scale
         bones[:, 7] = bones[:, 3] * 0.7
         bones[:, 8:12] = (0.0, 0.0, 1.0, 1.0)
         bones[:, 12:16] = BONE
-        sizes = np.full(len(places), HEAD_RADIUS * 0.8 * self._scale)
-        sizes[0] = HEAD_RADIUS * self._scale
-        return np.concatenate([bones, spheres(places, sizes, JOINT)])
+        radii = np.full(len(centres), HEAD_RADIUS * 0.8 * self._scale)
+        radii[0] = HEAD_RADIUS * self._scale
+        return np.concatenate([bones, spheres(centres, radii, JOINT)])
 
 
-def face_pivots(model: FaceModel, scale: float = 1.0) -> Pivots:
+def find_pivots(model: FaceModel, scale: float = 1.0) -> Pivots:
     """The centres of all rotations in a face's tables."""
     head, others = np.zeros(3), []
     for table in model.tables:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -10,9 +11,8 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64
 from fba.face.feature_points import names
 from fba_player.figure.face import FaceFigure
-from fba_player.scene._bones import Bones, face_pivots
+from fba_player.scene._bones import Bones, Pivots, find_pivots
 from fba_player.scene._fap_heatmap import FapHeatmap
-from fba_player.scene._ground import body_grid, face_grid, no_shadows
 from fba_player.scene._wireframe import Wireframe
 from fba_player.view.switches import Switches
 from fba_player.view.view import Colour, Dots, Extras, FaceMesh, FaceShape, Grid, View
@@ -31,6 +31,8 @@ DOT: Colour = (0.98, 0.62, 0.20, 1.0)
 DOT_RADIUS, DOT_SIZE = 3.2, 0.0022
 """Radius in pixels of a picture 720 high, and at most in metres."""
 DOT_LIFT, NAME_LIFT = 0.004, 0.006
+GRID_REACH = 7.0
+"""Radius of the grid under a body, in steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +53,17 @@ class DisplayOptions:
         self._wires = Wireframe()
         self._influence: FapHeatmap | None = None
         self._full: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
-        self._pivots = face_pivots(figure.model, figure.scale)
-        model = figure.model
-        self._known: Bool = np.asarray(np.isfinite(model.points).all(axis=1))
-        self._names = tuple(name for name, known in zip(names(), self._known, strict=True) if known)
         self._scale = figure.scale
+
+    @cached_property
+    def _pivots(self) -> Pivots:
+        return find_pivots(self._figure.model, self._scale)
+
+    @cached_property
+    def _known_points(self) -> tuple[Bool, tuple[str, ...]]:
+        """bool (84,), the feature points that the face has, and their names."""
+        known = np.asarray(np.isfinite(self._figure.model.points).all(axis=1))
+        return known, tuple(np.array(names())[known].tolist())
 
     def apply(self, view: View, switches: Switches, posture: Posture) -> View:
         """The view with the switches applied."""
@@ -87,7 +95,7 @@ class DisplayOptions:
             view = replace(view, faces=[], eyes=[], meshes=[], capsules=self._skeleton(posture))
         if switches["grid"]:
             joints = posture.joints
-            grid = self._bust_grid() if joints is None else body_grid(joints)
+            grid = self._bust_grid() if joints is None else _body_grid(joints)
             extras = replace(extras, grid=grid)
         dots = (self._dots(posture, over=len(view.marks) == 0),) if switches["points"] else ()
         background = BACKGROUNDS[str(switches["background"])]
@@ -102,14 +110,19 @@ class DisplayOptions:
             view = replace(view, eyes=[])
         if not switches["shadows"]:
             free = np.array(UNSHADED, dtype=np.float32)
-            lit = [np.broadcast_to(free, (len(mesh.positions), len(free))) for mesh in view.faces]
-            faces = [replace(mesh, light=light) for mesh, light in zip(view.faces, lit, strict=True)]
-            view = replace(view, faces=faces, blobs=no_shadows())
+            faces = [
+                replace(mesh, light=np.broadcast_to(free, (len(mesh.positions), len(free))))
+                for mesh in view.faces
+            ]
+            view = replace(view, faces=faces, blobs=view.blobs[:0])
         return view
 
     def _bust_grid(self) -> Grid:
+        """A grid of tenths of a metre below a head alone, larger or smaller with the face."""
+        x, _, z = self._figure.subject.centre
         lowest = float(self._figure.model.vertices[:, 1].min())
-        return face_grid(self._figure.subject, lowest, self._scale)
+        step = 10.0 ** round(np.log10(max(self._scale, 1e-9)) - 1)
+        return Grid(lowest, step, (x, z), step * 2 * GRID_REACH)
 
     def _in_full(self, mesh: FaceMesh) -> FaceMesh:
         """The mesh without levels of detail, as lines lie on all its triangles."""
@@ -127,26 +140,31 @@ class DisplayOptions:
     def _skeleton(self, posture: Posture) -> Float32:
         """Capsules of all joints of the body and of the head."""
         turned = posture.face @ self._figure.pose(posture.faps).turn
-        own = self._pivots.capsules(turned)
+        head = self._pivots.capsules(turned)
         if self._bones is None or posture.joints is None:
-            return own
-        return np.concatenate([self._bones.capsules(posture.joints), own])
+            return head
+        return np.concatenate([self._bones.capsules(posture.joints), head])
 
     def _dots(self, posture: Posture, *, over: bool) -> Dots:
         """Feature points with names. over: whether to draw the dots themselves."""
-        figure, model = self._figure, self._figure.model
-        places = figure.points(posture.faps, posture.face)[self._known]
+        figure, (known, point_names) = self._figure, self._known_points
+        points = figure.points(posture.faps, posture.face)[known]
         pose = figure.pose(posture.faps)
-        bound = model.bound[self._known]
+        bound = figure.model.bound[known]
         turned = (posture.face @ pose.turn)[:3, :3]
-        ways = np.where(bound[:, None] >= 0, pose.normals[bound] @ turned.T, turned[:, 2])
+        facing = np.where(bound[:, None] >= 0, pose.normals[bound] @ turned.T, turned[:, 2])
         radius = DOT_RADIUS if over else 0.0
         return Dots(
-            places.astype(np.float32),
+            points.astype(np.float32),
             DOT,
             radius,
             (DOT_LIFT if over else NAME_LIFT) * self._scale,
-            self._names,
-            ways.astype(np.float32),
+            point_names,
+            facing.astype(np.float32),
             DOT_SIZE * self._scale,
         )
+
+
+def _body_grid(joints: Float64) -> Grid:
+    """A grid of metres on the floor around the body's root."""
+    return Grid(0.0, 1.0, (float(joints[0, 0, 3]), float(joints[0, 2, 3])), GRID_REACH)

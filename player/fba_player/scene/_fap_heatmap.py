@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from weakref import WeakKeyDictionary
 
@@ -35,8 +35,6 @@ class FapHeatmap:
         self.value = ANGLE if self.fap.unit == "AU" else STEPS
         self._values = np.zeros(FAP_COUNT, dtype=np.float32)
         self._values[number - 1] = self.value
-        self.distances = self._measured()
-        self.most = float(self.distances.max(initial=0.0))
         self._shapes: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
         self._balls: dict[int, MeshShape] = {}
 
@@ -45,7 +43,7 @@ class FapHeatmap:
         """A legend of the colours in millimetres."""
         unit = "0.1 rad" if self.fap.unit == "AU" else f"+{self.value} steps of {self.fap.unit}/1024"
         moved = f"mm moved by {unit}" if self.most > LEAST else "moves no vertex of this face"
-        stops = tuple(tuple(float(v) for v in row) for row in shown(np.linspace(0, 1, SHADES)))
+        stops = tuple(tuple(float(v) for v in row) for row in heat_colours(np.linspace(0, 1, SHADES)))
         return Legend(self.fap.label, moved, self.most * 1000, stops)  # type: ignore[arg-type]
 
     def paint(self, meshes: list[FaceMesh]) -> list[FaceMesh]:
@@ -55,33 +53,40 @@ class FapHeatmap:
     def eyes(self, eyes: list[Eye]) -> list[Mesh]:
         """Eyeballs as meshes in these colours."""
         vertices, _ = sphere_mesh()
-        found = []
+        meshes = []
         for number, eye in enumerate(eyes):
             if number not in self._balls:
                 self._balls[number] = self._ball(number, vertices)
-            found.append(Mesh(self._balls[number], vertices, vertices, eye.matrix))
-        return found
+            meshes.append(Mesh(self._balls[number], vertices, vertices, eye.matrix))
+        return meshes
 
-    def _measured(self) -> Float32:
+    @cached_property
+    def most(self) -> float:
+        """The largest movement, metres."""
+        return float(self.distances.max(initial=0.0))
+
+    @cached_property
+    def distances(self) -> Float32:
         """float32 (V,): metres between the neutral face and the face with the FAP, with the neck bent."""
         figure = self._figure
         neutral, moved = figure.pose(np.zeros_like(self._values)).positions, figure.pose(self._values)
         turn = rotation_vector(moved.turn[:3, :3])
-        placed = turn_partly(moved.positions, figure.sway, turn, figure.centre)
-        distances: Float32 = np.linalg.norm(placed - neutral, axis=1).astype(np.float32)
+        turned = turn_partly(moved.positions, figure.sway, turn, figure.centre)
+        distances: Float32 = np.linalg.norm(turned - neutral, axis=1).astype(np.float32)
         return distances
 
     def _shape(self, mesh: FaceMesh) -> FaceShape:
         shape = mesh.shape
         if shape not in self._shapes:
             colours = np.full((len(mesh.positions), 4), GLOSS, dtype=np.float32)
-            colours[:, :3] = self._colours(self._of(shape, len(mesh.positions)))
+            colours[:, :3] = self._colours(self._part_distances(shape, len(mesh.positions)))
             self._shapes[shape] = replace(
                 shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None, coarser=None
             )
         return self._shapes[shape]
 
-    def _of(self, shape: FaceShape, count: int) -> Float32:
+    def _part_distances(self, shape: FaceShape, count: int) -> Float32:
+        """float32 (count,): the movement of a part's vertices; 0 for a part that is not the face's."""
         try:
             rows = self._figure.rows(shape.name)
         except KeyError:
@@ -101,10 +106,10 @@ class FapHeatmap:
     def _colours(self, distances: Float32) -> Float64:
         share = distances / max(self.most, LEAST)
         share[distances <= LEAST] = 0.0
-        return _linear(shown(share))
+        return _linear(heat_colours(share))
 
 
-def shown(shares: Floating) -> Float64:
+def heat_colours(shares: Floating) -> Float64:
     """float64 (N, 3): colours (sRGB, 0..1) for shares 0..1 of the largest movement."""
     table = _table()
     columns = [np.interp(shares, table[:, 0], table[:, column]) for column in (1, 2, 3)]

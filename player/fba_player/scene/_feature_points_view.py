@@ -5,21 +5,22 @@ Behind them the face itself is drawn in one dull colour, which hides points on i
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from fba.arrays import Float32, Float64
+from fba.arrays import Bool, Float32, Float64
 from fba.face.feature_points import row_of
 from fba_player.figure.face import FaceFigure
 from fba_player.mesh.primitives import tube_mesh
-from fba_player.scene._skin_lines import skin_lines
+from fba_player.scene._skin_lines import SkinLine, skin_lines
 from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
 
 POINT = (*srgb("#f0a04b"), 0.3)
 POINT_RADIUS = 0.00125
 PUPIL_RADIUS = 0.0008
-GHOST = (*srgb("#8b929c"), 0.12)
+DULL = (*srgb("#8b929c"), 0.12)
 EYEBALL = (*srgb("#c9cdd2"), 0.35)
 LEFT_OUT = ("lash", "brow", "hair")
 INSET = 0.0003
@@ -46,19 +47,31 @@ class PointView:
 
     def __init__(self, figure: FaceFigure) -> None:
         self._figure = figure
-        self._lines = skin_lines(figure.model)
-        self._tubes = _Tubes([(line.kind, len(line.corners)) for line in self._lines], RAISED)
-        self._rims: _Tubes | None = None
-        self._ghosts: dict[int, FaceShape] = {}
-        model = figure.model
-        self._known = np.isfinite(model.points).all(axis=1)
-        sizes = np.full(len(model.points), POINT_RADIUS)
-        sizes[[row_of()["3.5"], row_of()["3.6"]]] = PUPIL_RADIUS
-        self._sizes = sizes[self._known] * (model.fapu.ES * 1024 / 0.062)
+        self._known: Bool = np.asarray(np.isfinite(figure.model.points).all(axis=1))
+        self._dull_shapes: dict[int, FaceShape] = {}
+
+    @cached_property
+    def _radii(self) -> Float64:
+        """Radii of the feature points that the face has, metres."""
+        radii = np.full(len(self._known), POINT_RADIUS)
+        radii[[row_of()["3.5"], row_of()["3.6"]]] = PUPIL_RADIUS
+        return radii[self._known] * self._figure.scale
+
+    @cached_property
+    def _lines(self) -> list[SkinLine]:
+        return skin_lines(self._figure.model)
+
+    @cached_property
+    def _tubes(self) -> _Tubes:
+        return _make_tubes([(line.kind, len(line.corners)) for line in self._lines], RAISED)
+
+    @cached_property
+    def _rims(self) -> _Tubes:
+        return _make_tubes([(kind, RING + 1) for _ in self._figure.eyeballs for kind in ("iris", "pupil")])
 
     def marks(self, faps: Float32, matrix: Float64) -> Float32:
         """float32 (N, 16): capsules, a sphere at each feature point that the face has."""
-        return spheres(self._figure.points(faps, matrix)[self._known], self._sizes, POINT)
+        return spheres(self._figure.points(faps, matrix)[self._known], self._radii, POINT)
 
     def eyeballs(self, faps: Float32, matrix: Float64) -> Float32:
         """float32 (E, 16): capsules, plain eyeballs."""
@@ -68,77 +81,83 @@ class PointView:
         radii = [float(np.linalg.norm(eye.matrix[:3, 0])) for eye in eyes]
         return spheres([eye.matrix[:3, 3] for eye in eyes], radii, EYEBALL)
 
-    def ghost(self, faps: Float32, matrix: Float64, *, on_body: bool = False) -> list[FaceMesh]:
+    def dull_face(self, faps: Float32, matrix: Float64, *, on_body: bool = False) -> list[FaceMesh]:
         """The face in one dull colour."""
-        found = []
+        meshes = []
         for mesh in self._figure.meshes(faps, matrix, on_body=on_body, without=LEFT_OUT):
-            if id(mesh.shape) not in self._ghosts:
-                colours = np.tile(np.array(GHOST, dtype=np.float32), (len(mesh.positions), 1))
-                self._ghosts[id(mesh.shape)] = replace(
+            if id(mesh.shape) not in self._dull_shapes:
+                colours = np.tile(np.array(DULL, dtype=np.float32), (len(mesh.positions), 1))
+                self._dull_shapes[id(mesh.shape)] = replace(
                     mesh.shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0)
                 )
-            found.append(replace(mesh, shape=self._ghosts[id(mesh.shape)]))
-        return found
+            meshes.append(replace(mesh, shape=self._dull_shapes[id(mesh.shape)]))
+        return meshes
 
     def meshes(self, faps: Float32, matrix: Float64) -> list[Mesh]:
         """The lines, and the rims of irises and pupils."""
         pose = self._figure.pose(faps)
-        found = []
+        meshes = []
         if self._lines:
-            places = np.concatenate([line.places(pose.positions) for line in self._lines])
-            inside = places.mean(axis=0)
-            inside[2] = places[:, 2].min()
-            found.append(self._tubes.mesh(places, inside, matrix @ pose.turn))
+            points = np.concatenate([line.positions(pose.positions) for line in self._lines])
+            inside = points.mean(axis=0)
+            inside[2] = points[:, 2].min()
+            meshes.append(self._tubes.mesh(points, inside, matrix @ pose.turn))
         rings, middle = self._rings(faps, matrix)
-        if len(rings):
-            if self._rims is None:
-                self._rims = _Tubes([(kind, RING + 1) for _ in rings[::2] for kind in ("iris", "pupil")])
-            found.append(self._rims.mesh(np.concatenate(rings), middle, np.eye(4)))
-        return found
+        if rings:
+            meshes.append(self._rims.mesh(np.concatenate(rings), middle, np.eye(4)))
+        return meshes
 
     def _rings(self, faps: Float32, matrix: Float64) -> tuple[list[Float64], Float64]:
         """Rims of iris and pupil of each eye in the world, (RING + 1, 3) each, and a point behind them."""
         turn = np.linspace(0, 2 * np.pi, RING + 1)
-        found, behind = [], np.zeros(3)
+        rings, behind = [], np.zeros(3)
         for eye in self._figure.eyes(faps, matrix):
             radius = float(np.linalg.norm(eye.matrix[:3, 0]))
             behind = eye.matrix[:3, 3] - eye.axes[:, 2]
             for share in (eye.iris, eye.pupil):
                 ring = [np.cos(turn) * share, np.sin(turn) * share, np.full(len(turn), np.sqrt(1 - share**2))]
                 local = np.stack(ring, axis=1) * (1 + INSET / radius)
-                found.append(local @ eye.matrix[:3, :3].T + eye.matrix[:3, 3])
-        return found, behind
+                rings.append(local @ eye.matrix[:3, :3].T + eye.matrix[:3, 3])
+        return rings, behind
 
 
+@dataclass(frozen=True, eq=False)
 class _Tubes:
-    """Tubes along lines, each of a kind and with a fixed number of points."""
+    """Tubes along lines. lengths: points of each line. radii: (N,), at all points. shape: of all."""
 
-    def __init__(self, lines: list[tuple[str, int]], raised: float = 0.0) -> None:
-        self._lengths = [count for _, count in lines]
-        self._radii = np.concatenate([np.zeros(0), *(np.full(count, RADII[kind]) for kind, count in lines)])
-        colours = [np.tile([*COLOURS[kind], 0.0], (count * AROUND, 1)) for kind, count in lines]
-        starts = np.cumsum([0, *self._lengths[:-1]]) * AROUND
-        triangles = [tube_mesh(n, AROUND) + start for n, start in zip(self._lengths, starts, strict=False)]
-        self._shape = MeshShape(
-            np.concatenate([np.zeros((0, 3)), *triangles]).astype(np.int32),
-            np.concatenate([np.zeros((0, 4)), *colours]).astype(np.float32),
-            two_sided=True,
-            raised=raised,
-        )
+    lengths: tuple[int, ...]
+    radii: Float64
+    shape: MeshShape
 
-    def mesh(self, places: Float64, inside: Float64, matrix: Float64) -> Mesh:
+    def mesh(self, points: Float64, inside: Float64, matrix: Float64) -> Mesh:
         """Tubes along the points (N, 3) of all lines in turn. inside: a point deep in the head."""
         along = np.concatenate([
-            np.gradient(line, axis=0) for line in np.split(places, np.cumsum(self._lengths)[:-1])
+            np.gradient(line, axis=0) for line in np.split(points, np.cumsum(self.lengths)[:-1])
         ])  # fmt: skip
         # Lines lie on the head, so the direction out of it is never along one.
-        aside = _unit(np.cross(along, places - inside))
+        aside = _unit(np.cross(along, points - inside))
         out = _unit(np.cross(aside, along))
         turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
         normals = aside[:, None] * np.cos(turn)[:, None] + out[:, None] * np.sin(turn)[:, None]
-        positions = places[:, None] + normals * self._radii[:, None, None]
+        positions = points[:, None] + normals * self.radii[:, None, None]
         flat = [part.reshape(-1, 3).astype(np.float32) for part in (positions, normals)]
-        return Mesh(self._shape, flat[0], flat[1], matrix)
+        return Mesh(self.shape, flat[0], flat[1], matrix)
+
+
+def _make_tubes(lines: list[tuple[str, int]], raised: float = 0.0) -> _Tubes:
+    """Tubes for lines, each given by its kind and its number of points. raised: as in `MeshShape`."""
+    lengths = tuple(count for _, count in lines)
+    radii = np.concatenate([np.zeros(0), *(np.full(count, RADII[kind]) for kind, count in lines)])
+    colours = [np.tile([*COLOURS[kind], 0.0], (count * AROUND, 1)) for kind, count in lines]
+    starts = np.cumsum([0, *lengths[:-1]]) * AROUND
+    triangles = [tube_mesh(n, AROUND) + start for n, start in zip(lengths, starts, strict=False)]
+    shape = MeshShape(
+        np.concatenate([np.zeros((0, 3)), *triangles]).astype(np.int32),
+        np.concatenate([np.zeros((0, 4)), *colours]).astype(np.float32),
+        two_sided=True,
+        raised=raised,
+    )
+    return _Tubes(lengths, radii, shape)
 
 
 def _unit(vectors: Float64) -> Float64:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ Indices = Intp
 FINER = 8
 """Number of steps between two feature points."""
 RINGS = 3
-"""Distance (m) of a line's triangles from the shortest path along edges, so that lips stay apart."""
+"""A line lies within so many rings of triangles around the shortest path along edges: lips stay apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,60 +29,47 @@ class SkinLine:
     corners: Indices
     shares: Float64
 
-    def places(self, vertices: Float32) -> Float64:
+    def positions(self, vertices: Float32) -> Float64:
         """float64 (N, 3): the line's points on moved vertices (V, 3)."""
-        placed: Float64 = np.einsum("nk,nkc->nc", self.shares, vertices[self.corners].astype(np.float64))
-        return placed
+        positions: Float64 = np.einsum("nk,nkc->nc", self.shares, vertices[self.corners].astype(np.float64))
+        return positions
 
 
 def skin_lines(model: FaceModel) -> list[SkinLine]:
     """The lines of `skin_lines.csv` whose feature points lie on the skin."""
     with (files(__package__) / "skin_lines.csv").open(encoding="utf-8") as file:
         rows = [(row["kind"], row["points"].split()) for row in csv.DictReader(file)]
-    surface = _Surface(model)
+    skin = _build_skin_graph(model)
     lines = []
     for kind, names in rows:
         bound = [int(model.bound[point_row(name)]) for name in names]
-        kept = [vertex for vertex in bound if vertex in surface]
-        if len(kept) >= 2:
-            found = surface.line(kept)
-            if found is not None:
-                lines.append(SkinLine(kind, *found))
+        on_skin = [vertex for vertex in bound if vertex in skin.used]
+        if len(on_skin) >= 2:
+            line = skin.line(on_skin)
+            if line is not None:
+                lines.append(SkinLine(kind, *line))
     return lines
 
 
-class _Surface:
-    """The skin as a graph of its edges, in which vertices at the same position are one."""
+@dataclass(frozen=True, eq=False)
+class _SkinGraph:
+    """The skin as a graph of its edges, in which vertices at the same position are one.
 
-    def __init__(self, model: FaceModel) -> None:
-        from scipy.sparse import csr_matrix
+    vertices: (V, 3) of the model. triangles: (F, 3), those of the skin. node: (V,), the node of each vertex.
+    edges: a sparse matrix of lengths between nodes. used: the vertices of the triangles.
+    """
 
-        self._vertices = model.vertices.astype(np.float64)
-        parts = model.of_kind("skin") or model.parts
-        rows = [part.triangles.astype(np.intp) + model.starts[part.name] for part in parts]
-        self._triangles = np.concatenate(rows)
-        _, self._welded = np.unique(np.round(self._vertices, 7), axis=0, return_inverse=True)
-        self._welded = self._welded.ravel()
-        edges = self._welded[self._triangles][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        edges = np.unique(np.sort(edges[edges[:, 0] != edges[:, 1]], axis=1), axis=0)
-        count = int(self._welded.max()) + 1
-        first = np.zeros(count, dtype=np.intp)
-        first[self._welded] = np.arange(len(self._welded))
-        length = np.linalg.norm(
-            self._vertices[first[edges[:, 0]]] - self._vertices[first[edges[:, 1]]], axis=1
-        )
-        self._graph = csr_matrix((np.maximum(length, 1e-9), (edges[:, 0], edges[:, 1])), (count, count))
-        self._graph = self._graph + self._graph.T
-        self._on = set(np.unique(self._triangles).tolist())
-
-    def __contains__(self, vertex: int) -> bool:
-        return vertex in self._on
+    vertices: Float64
+    triangles: Indices
+    node: Indices
+    edges: Any
+    used: frozenset[int]
 
     def line(self, through: list[int]) -> tuple[Indices, Float64] | None:
         """Corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if unconnected."""
         from scipy.interpolate import CubicSpline
 
-        knots = self._vertices[through]
+        knots = self.vertices[through]
         gaps = np.sqrt(np.linalg.norm(np.diff(knots, axis=0), axis=1))
         if (gaps == 0).any():
             return None
@@ -89,47 +77,66 @@ class _Surface:
         curve = CubicSpline(at, knots, bc_type="natural") if len(at) > 2 else None
         corners, shares = [np.full(3, through[0])], [np.array([1.0, 0.0, 0.0])]
         for number in range(len(through) - 1):
-            near = self._near(through[number], through[number + 1])
+            near = self._triangles_along(through[number], through[number + 1])
             if near is None:
                 return None
             part = np.linspace(0, 1, FINER + 1)[1:-1]
-            times = at[number] + part * gaps[number]
-            wanted = knots[number] + part[:, None] * (knots[number + 1] - knots[number])
-            if curve is not None:
-                wanted = curve(times)
-            for place in wanted:
-                triangle, share = _nearest(place, self._vertices[near])
+            if curve is None:
+                points = knots[number] + part[:, None] * (knots[number + 1] - knots[number])
+            else:
+                points = curve(at[number] + part * gaps[number])
+            for point in points:
+                triangle, share = _nearest(point, self.vertices[near])
                 corners.append(near[triangle])
                 shares.append(share)
             corners.append(np.full(3, through[number + 1]))
             shares.append(np.array([1.0, 0.0, 0.0]))
         return np.array(corners, dtype=np.intp), np.array(shares)
 
-    def _near(self, start: int, end: int) -> Indices | None:
+    def _triangles_along(self, start: int, end: int) -> Indices | None:
         """Triangles (F, 3) along the shortest path between two vertices; None if there is none."""
         from scipy.sparse.csgraph import dijkstra
 
-        one, other = int(self._welded[start]), int(self._welded[end])
-        straight = float(np.linalg.norm(self._vertices[start] - self._vertices[end]))
-        _, before = dijkstra(self._graph, indices=one, return_predecessors=True, limit=4 * straight + 1e-6)
-        way = [other]
-        while way[-1] != one:
-            if before[way[-1]] < 0:
+        first, last = int(self.node[start]), int(self.node[end])
+        straight = float(np.linalg.norm(self.vertices[start] - self.vertices[end]))
+        _, before = dijkstra(self.edges, indices=first, return_predecessors=True, limit=4 * straight + 1e-6)
+        path = [last]
+        while path[-1] != first:
+            if before[path[-1]] < 0:
                 return None
-            way.append(int(before[way[-1]]))
-        chosen = np.zeros(self._graph.shape[0], dtype=bool)
-        chosen[way] = True
-        welded = self._welded[self._triangles]
+            path.append(int(before[path[-1]]))
+        reached = np.zeros(self.edges.shape[0], dtype=bool)
+        reached[path] = True
+        nodes = self.node[self.triangles]
         for _ in range(RINGS):
-            touching = chosen[welded].any(axis=1)
-            chosen[welded[touching]] = True
-        return self._triangles[touching]
+            touching = reached[nodes].any(axis=1)
+            reached[nodes[touching]] = True
+        return self.triangles[touching]
 
 
-def _nearest(place: Float64, triangles: Float64) -> tuple[int, Float64]:
+def _build_skin_graph(model: FaceModel) -> _SkinGraph:
+    from scipy.sparse import csr_matrix
+
+    vertices = model.vertices.astype(np.float64)
+    parts = model.of_kind("skin") or model.parts
+    triangles = np.concatenate([part.triangles.astype(np.intp) + model.starts[part.name] for part in parts])
+    _, node = np.unique(np.round(vertices, 7), axis=0, return_inverse=True)
+    node = node.ravel()
+    edges = node[triangles][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges = np.unique(np.sort(edges[edges[:, 0] != edges[:, 1]], axis=1), axis=0)
+    count = int(node.max()) + 1
+    vertex_of = np.zeros(count, dtype=np.intp)
+    vertex_of[node] = np.arange(len(node))
+    length = np.linalg.norm(vertices[vertex_of[edges[:, 0]]] - vertices[vertex_of[edges[:, 1]]], axis=1)
+    graph = csr_matrix((np.maximum(length, 1e-9), (edges[:, 0], edges[:, 1])), (count, count))
+    used = frozenset(np.unique(triangles).tolist())
+    return _SkinGraph(vertices, triangles, node, graph + graph.T, used)
+
+
+def _nearest(point: Float64, triangles: Float64) -> tuple[int, Float64]:
     """Index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners there."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    ab, ac, ap = b - a, c - a, place - a
+    ab, ac, ap = b - a, c - a, point - a
     d1, d2 = (ab * ap).sum(1), (ac * ap).sum(1)
     aa, bb, mixed = (ab * ab).sum(1), (ac * ac).sum(1), (ab * ac).sum(1)
     area = np.maximum(aa * bb - mixed * mixed, 1e-30)
@@ -141,15 +148,15 @@ def _nearest(place: Float64, triangles: Float64) -> tuple[int, Float64]:
     along = np.clip(d2 / np.maximum(bb, 1e-30), 0, 1)
     options.append(np.stack([np.zeros_like(along), along], axis=1))
     bc = c - b
-    along = np.clip((bc * (place - b)).sum(1) / np.maximum((bc * bc).sum(1), 1e-30), 0, 1)
+    along = np.clip((bc * (point - b)).sum(1) / np.maximum((bc * bc).sum(1), 1e-30), 0, 1)
     options.append(np.stack([1 - along, along], axis=1))
-    best, chosen, share = np.inf, 0, np.zeros(2)
+    best, nearest, share = np.inf, 0, np.zeros(2)
     for number, option in enumerate(options):
-        found = a + ab * option[:, :1] + ac * option[:, 1:]
-        away = np.linalg.norm(found - place, axis=1)
+        candidates = a + ab * option[:, :1] + ac * option[:, 1:]
+        away = np.linalg.norm(candidates - point, axis=1)
         if number == 0:
             away = np.where(inside, away, np.inf)
         row = int(away.argmin())
         if away[row] < best:
-            best, chosen, share = float(away[row]), row, option[row]
-    return chosen, np.array([1 - share[0] - share[1], share[0], share[1]])
+            best, nearest, share = float(away[row]), row, option[row]
+    return nearest, np.array([1 - share[0] - share[1], share[0], share[1]])

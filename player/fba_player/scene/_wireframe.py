@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -29,16 +30,14 @@ class Wireframe:
     def __init__(self) -> None:
         self._edges: WeakKeyDictionary[FaceShape | MeshShape, Int32] = WeakKeyDictionary()
         self._thinned: WeakKeyDictionary[FaceShape, Intp] = WeakKeyDictionary()
-        vertices, triangles = sphere_mesh(*RINGS)
-        self._ball = vertices[unique_edges(triangles)]
 
     def edges(self, faces: list[FaceMesh], meshes: list[Mesh], eyes: list[Eye], scale: float) -> Lines:
         """All edges, each once. scale: size of the face, 1 for an adult's."""
-        found = [np.zeros((0, 2, 3), dtype=np.float32)]
-        found += [world_positions(mesh)[self._of(mesh.shape)] for mesh in faces]
-        found += [_moved(mesh.positions, mesh.matrix)[self._of(mesh.shape)] for mesh in meshes]
-        found += [_moved(self._ball, eye.matrix) for eye in eyes]
-        return Lines(np.concatenate(found), WIRE, 1.0, WIRE_LIFT * scale)
+        ends = [np.zeros((0, 2, 3), dtype=np.float32)]
+        ends += [world_positions(mesh)[self._unique_edges(mesh.shape)] for mesh in faces]
+        ends += [_moved(mesh.positions, mesh.matrix)[self._unique_edges(mesh.shape)] for mesh in meshes]
+        ends += [_moved(_eyeball_edges(), eye.matrix) for eye in eyes]
+        return Lines(np.concatenate(ends), WIRE, 1.0, WIRE_LIFT * scale)
 
     def normals(self, faces: list[FaceMesh], scale: float) -> Lines:
         """A line at each vertex, or at some of many; red, green and blue stand for x, y and z."""
@@ -47,15 +46,15 @@ class Wireframe:
             if mesh.shape not in self._thinned:
                 self._thinned[mesh.shape] = _thinned(mesh, NORMAL_CELL * scale)
             rows = self._thinned[mesh.shape]
-            foot, way = world_positions(mesh)[rows], world_normals(mesh)[rows]
-            ends.append(np.stack([foot, foot + way * np.float32(NORMAL_LENGTH * scale)], axis=1))
+            foot, normal = world_positions(mesh)[rows], world_normals(mesh)[rows]
+            ends.append(np.stack([foot, foot + normal * np.float32(NORMAL_LENGTH * scale)], axis=1))
             shade = np.ones((len(rows), 2, 4), dtype=np.float32)
-            shade[..., :3] = (way * 0.5 + 0.5)[:, None]
+            shade[..., :3] = (normal * 0.5 + 0.5)[:, None]
             shade[..., 3] = NORMAL_OPACITY
             colours.append(shade)
         return Lines(np.concatenate(ends), np.concatenate(colours), 1.2, WIRE_LIFT * scale)
 
-    def _of(self, shape: FaceShape | MeshShape) -> Int32:
+    def _unique_edges(self, shape: FaceShape | MeshShape) -> Int32:
         if shape not in self._edges:
             self._edges[shape] = unique_edges(shape.triangles)
         return self._edges[shape]
@@ -64,8 +63,15 @@ class Wireframe:
 def unique_edges(triangles: Int32) -> Int32:
     """int32 (E, 2): the edges of triangles (F, 3), each once, the smaller index first."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    found: Int32 = np.unique(edges, axis=0).astype(np.int32)
-    return found
+    unique: Int32 = np.unique(edges, axis=0).astype(np.int32)
+    return unique
+
+
+@cache
+def _eyeball_edges() -> Float32:
+    """float32 (E, 2, 3): the ends of the edges of a unit sphere."""
+    vertices, triangles = sphere_mesh(*RINGS)
+    return vertices[unique_edges(triangles)]
 
 
 def _thinned(mesh: FaceMesh, cell: float) -> Intp:

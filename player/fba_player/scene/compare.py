@@ -165,7 +165,7 @@ class CompareScene(InTime[CompareTimeline]):
         """Offset of a following camera at a time, metres: the first scene's."""
         return self.scenes[0].travel(self.timeline.own_time(0, time))
 
-    def at(self, time: float) -> View:
+    def view_at(self, time: float) -> View:
         """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
         times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
         if self._arrangement == "over":
@@ -173,7 +173,7 @@ class CompareScene(InTime[CompareTimeline]):
         views = []
         gone = np.array(self.scenes[0].travel(times[0]))
         for number, (scene, own) in enumerate(zip(self.scenes, times, strict=True)):
-            view = move_view(scene.at(own), self._place(number) + gone - np.array(scene.travel(own)))
+            view = move_view(scene.view_at(own), self._place(number) + gone - np.array(scene.travel(own)))
             if self.names[number] and len(self.scenes) > 1:
                 view = _captioned(view, self.names[number], self._caption_place(number) + gone)
             views.append(view)
@@ -199,13 +199,13 @@ class CompareScene(InTime[CompareTimeline]):
     # ---- inside
 
     def _over(self, times: list[float]) -> View:
-        base = self.scenes[0].at(times[0])
+        base = self.scenes[0].view_at(times[0])
         gone = np.array(self.scenes[0].travel(times[0]))
         views = [base]
         for number, (scene, own) in enumerate(list(zip(self.scenes, times, strict=True))[1:], 1):
             kept, scene.view = scene.view, "points"
             try:
-                drawn = self._drawings[number - 1](scene.at(own), _eyes(scene))
+                drawn = self._drawings[number - 1](scene.view_at(own), _eyes(scene))
             finally:
                 scene.view = kept
             views.append(move_view(drawn, self._height(number) + gone - np.array(scene.travel(own))))

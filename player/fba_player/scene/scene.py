@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,6 @@ from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba_player.playback.timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
-from fba_player.scene._ground import no_shadows, shadows
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import InTime
 from fba_player.view.switches import SWITCHES, Switches
@@ -77,7 +77,7 @@ class Scene(InTime[Timeline]):
             self._body = body or BodyModel.default()
             self._skeleton = self._body.skeleton
             self._solver = BapSolver(self._skeleton, axes)
-            self._bones = Bones(self._skeleton)
+            self._bones = Bones.from_skeleton(self._skeleton)
 
     @property
     def view(self) -> str:
@@ -106,18 +106,18 @@ class Scene(InTime[Timeline]):
     def figure(self) -> FaceFigure:
         """The face that is shown; built on first use."""
         if self._figure is None:
-            from fba_player.figure.face import FaceFigure
+            from fba_player.figure.face import build_figure
 
-            self._figure = FaceFigure(self.model)
+            self._figure = build_figure(self.model)
         return self._figure
 
     @property
     def person(self) -> Person:
         """The body that is shown, with the face on it; built on first use; only if there is a body."""
         if self._person is None:
-            from fba_player.figure.person import Person
+            from fba_player.figure.person import build_person
 
-            self._person = Person(self._body, self.figure)
+            self._person = build_person(self._body, self.figure)
         return self._person
 
     @property
@@ -159,7 +159,7 @@ class Scene(InTime[Timeline]):
         whole = self.has_body and preset == "body"
         return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
 
-    def of(self, faps: Float32, baps: Float64) -> View:
+    def view_for(self, faps: Float32, baps: Float64) -> View:
         """The view for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), not the animation's.
 
         baps are ignored if the animation has no body.
@@ -170,7 +170,7 @@ class Scene(InTime[Timeline]):
         """The view for FAPs (68,), in the body's pose at the start."""
         return self._shown(faps, self._posed(float(self.start))[1])
 
-    def at(self, time: float) -> View:
+    def view_at(self, time: float) -> View:
         """The view at a time in seconds; before the start or after the end, the first or last frame.
 
         Raises ValueError if the time is not finite.
@@ -196,7 +196,7 @@ class Scene(InTime[Timeline]):
         return View(
             eyes=self.person.eyes(faps, turned),
             faces=self.person.meshes(faps, turned),
-            blobs=shadows(joints, self._skeleton.names),
+            blobs=self._bones.shadows(joints),
             ground=True,
         )
 
@@ -206,18 +206,17 @@ class Scene(InTime[Timeline]):
             from fba_player.scene._feature_points_view import PointView
 
             self._point_view = PointView(self.figure)
-        shown, matrix = self._point_view, self._face_matrix(joints)
-        capsules = shown.eyeballs(faps, matrix)
-        if joints is not None:
-            capsules = np.concatenate([capsules, self._bones.capsules(joints)])
-        return View(
-            meshes=shown.meshes(faps, matrix),
-            capsules=capsules,
-            marks=shown.marks(faps, matrix),
-            faces=shown.ghost(faps, matrix, on_body=joints is not None),
-            blobs=no_shadows() if joints is None else shadows(joints, self._skeleton.names),
-            ground=joints is not None,
+        points, matrix = self._point_view, self._face_matrix(joints)
+        view = View(
+            meshes=points.meshes(faps, matrix),
+            capsules=points.eyeballs(faps, matrix),
+            marks=points.marks(faps, matrix),
+            faces=points.dull_face(faps, matrix, on_body=joints is not None),
         )
+        if joints is None:
+            return view
+        capsules = np.concatenate([view.capsules, self._bones.capsules(joints)])
+        return replace(view, capsules=capsules, blobs=self._bones.shadows(joints), ground=True)
 
     def travel(self, time: float) -> tuple[float, float, float]:
         """Offset (x, y, z) of a following camera at a time, metres; zeros if it does not follow."""

@@ -218,12 +218,12 @@ class Session:
         """What is drawn at a time in seconds, after the hooks of `before_frame`."""
         scene = self.scene
         if not self.before_frame or not isinstance(scene, Scene):
-            return scene.at(time)
+            return scene.view_at(time)
         faps, baps = scene.timeline.faps(time).copy(), scene.timeline.baps(time).copy()
         for hook in tuple(self.before_frame):
             hook(faps, baps)
         self.values = (faps, baps)
-        return scene.of(faps, baps)
+        return scene.view_for(faps, baps)
 
     def toggle_view(self) -> None:
         """Switch between the figure and its feature points and bones, where the scene has both views."""

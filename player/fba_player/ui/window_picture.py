@@ -6,7 +6,7 @@ python -m fba_player.ui.window_picture talk.fba -o window.png --panels file,view
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from fba_player.gl.context import offscreen_context
 from fba_player.gl.framebuffer import Target
 from fba_player.gl.renderer import Renderer
 from fba_player.session.session import Session
+
+if TYPE_CHECKING:
+    from fba_player.ui.gui import Gui
 
 SETTLES = 4
 """Pictures until panels have found their size and position."""
@@ -35,13 +38,20 @@ class Studio:
         self._renderer: Renderer | None = None
         self._screen: Any = None
         self._colour: Any = None
+        self._gui: Gui | None = None
         try:
             with self._gl:
                 self._renderer = Renderer(self._gl)
-                self.gui = Gui(self._gl, session, hides=False)
+                self._gui = Gui(self._gl, session, hides=False)
         except Exception:
             self.close()
             raise
+
+    @property
+    def gui(self) -> Gui:
+        """The panels and the bar."""
+        assert self._gui is not None
+        return self._gui
 
     def draw(self, pictures: int = 1, delta: float = 1 / 60) -> UInt8:
         """Draw pictures, `delta` seconds apart; returns the last as uint8 (H, W, 4), top row first.
@@ -66,7 +76,7 @@ class Studio:
         if self._gl is None:
             return
         with self._gl:
-            for part in (getattr(self, "gui", None), self._renderer, self._target):
+            for part in (self._gui, self._renderer, self._target):
                 if part is not None:
                     part.close()
             self._release_screen()

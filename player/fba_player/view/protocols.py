@@ -111,7 +111,7 @@ class Showable(Protocol):
     def show(self, name: str, on: object = True) -> None:
         """Set one of `fba_player.view.switches.SWITCHES`; ValueError for an unknown name or value."""
 
-    def at(self, time: float) -> View:
+    def view_at(self, time: float) -> View:
         """Everything to be drawn at a time in seconds; ValueError if it is not finite."""
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:

@@ -9,10 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaWarning
-from fba_player.gl.context import import_moderngl
+from fba_player.gl.context import (
+    OPENGL,
+    cure,
+    how_to_install,
+    import_moderngl,
+    missing_libraries,
+    missing_text,
+)
 from fba_player.gl.framebuffer import Target
 from fba_player.gl.renderer import Renderer
-from fba_player.gl.system_libraries import OPENGL, cure, how_to_install, missing_libraries, missing_text
 from fba_player.playback.live import LiveTimeline
 from fba_player.playback.transport import Transport
 from fba_player.session.captures import Captures, draw_screenshot, read_pixels
@@ -20,10 +26,9 @@ from fba_player.session.controls import Controls
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
-from fba_player.window._fullscreen import FullScreen
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._plain_overlay import Overlay
-from fba_player.window.display import HOW_WITHOUT, start_glfw
+from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable

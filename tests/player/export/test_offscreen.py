@@ -148,7 +148,7 @@ def test_sizes_and_times_are_checked(talking: Animation) -> None:
     with pytest.raises(ValueError, match="1x1"):
         Offscreen(talking, (0, 10))
     with pytest.raises(ValueError, match="finite"):
-        Scene(talking).at(float("nan"))
+        Scene(talking).view_at(float("nan"))
     with pytest.raises(ValueError, match="no frames"):
         Scene(talking[0:0])
 

@@ -9,7 +9,7 @@ import pytest
 from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.compiled import is_compiled
-from fba_player.figure.body_light import REACH, BodyLight
+from fba_player.figure.body_light import REACH, build_body_light
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
 
@@ -18,7 +18,7 @@ def shade(joints: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float32], npt
     body = BodyModel.default()
     places, normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
     body.skin(joints, places, normals)
-    return BodyLight(body, dict.fromkeys(part.name for part in body.parts)).shade(
+    return build_body_light(body, dict.fromkeys(part.name for part in body.parts)).shade(
         places, normals, joints
     ), places
 
@@ -48,7 +48,7 @@ def test_an_arm_before_the_chest_takes_its_key_light(standing: npt.NDArray[np.fl
     moved = standing.copy()
     for name, aside in (("l_elbow", 0.15), ("l_wrist", -0.15)):
         moved[names.index(name), :3, 3] = chest + 0.25 * key + (aside, 0, 0)
-    before = BodyLight(body, dict.fromkeys(part.name for part in body.parts))
+    before = build_body_light(body, dict.fromkeys(part.name for part in body.parts))
     normals = np.empty_like(places)
     body.skin(standing, np.empty_like(places), normals)
     shaded = before.shade(places, normals, moved)

@@ -48,7 +48,7 @@ def shown(
 def backdrop(camera: Camera) -> npt.NDArray[np.int64]:
     """The same picture with the head turned out of it."""
     nobody = scene()
-    nobody.still = lambda faps: type(nobody.at(0.0))()  # type: ignore[method-assign]
+    nobody.still = lambda faps: type(nobody.view_at(0.0))()  # type: ignore[method-assign]
     with Offscreen(nobody, SIZE, camera) as view:
         return view.still(np.zeros(68))[..., :3].astype(int)
 

@@ -9,8 +9,8 @@ from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel
-from fba_player.figure.face import FaceFigure
-from fba_player.figure.person import Person
+from fba_player.figure.face import build_figure
+from fba_player.figure.person import Person, build_person
 from fba_player.gl.lod import Details, share_memory
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all light counts as free")
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all lig
 
 @pytest.fixture(scope="module")
 def person() -> Person:
-    return Person(BodyModel.default(), FaceFigure(FaceModel.default()))
+    return build_person(BodyModel.default(), build_figure(FaceModel.default()))
 
 
 def faps(**values: int) -> np.ndarray:

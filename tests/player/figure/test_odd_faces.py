@@ -93,7 +93,7 @@ def test_a_face_of_skin_alone_from_a_file(tmp_path: Path) -> None:
     small_face("skin").save(tmp_path / "egg.glb")
     with pytest.warns(FbaWarning, match="no eyes and no teeth"):
         scene = Scene(animation(False), FaceModel.load(tmp_path / "egg.glb"))
-    view = scene.at(0.0)
+    view = scene.view_at(0.0)
     assert (len(view.faces), view.eyes) == (1, [])
 
 

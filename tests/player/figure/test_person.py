@@ -14,8 +14,8 @@ from fba.body import BapSolver
 from fba.body.model import BodyModel
 from fba.face.model import FaceModel
 from fba.player import Scene
-from fba_player.figure.face import FaceFigure
-from fba_player.figure.person import Person
+from fba_player.figure.face import build_figure
+from fba_player.figure.person import Person, build_person
 from player_tracks import body_track, face_track
 
 STILL = np.zeros(68, dtype=np.float32)
@@ -23,7 +23,7 @@ STILL = np.zeros(68, dtype=np.float32)
 
 @pytest.fixture(scope="module")
 def person() -> Person:
-    return Person(BodyModel.default(), FaceFigure(FaceModel.default()))
+    return build_person(BodyModel.default(), build_figure(FaceModel.default()))
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_another_face_gets_the_neck_of_the_body(standing: np.ndarray) -> None:
     mask = replace(skin, triangles=corners.reshape(-1, 3).astype(np.int32), **arrays)
     points, bound = model.points.copy(), np.full(84, -1, dtype=np.int32)
     small = replace(model, parts=(mask, *model.parts[1:]), points=points, bound=bound, tables=())
-    person = Person(BodyModel.default(), FaceFigure(small))
+    person = build_person(BodyModel.default(), build_figure(small))
     assert not person.head.brings_neck
     neck = len(BodyModel.default().part("neck").vertices)
     assert neck in [len(mesh.positions) for mesh in person.meshes(STILL, standing)]
@@ -88,11 +88,11 @@ def test_another_face_gets_the_neck_of_the_body(standing: np.ndarray) -> None:
 def test_a_scene_shows_the_person_or_its_bones(person: Person) -> None:
     animation = Animation(25, np.arange(2), face_track([{3: 1}, {3: 200}]), body_track([{32: 5}, {32: 9000}]))  # type: ignore[arg-type]
     scene = Scene(animation)
-    shown = scene.at(0.04)
+    shown = scene.view_at(0.04)
     assert (len(shown.capsules), len(shown.meshes)) == (0, 0)
     assert len(shown.faces) > 5
     scene.view = "points"
-    bones = scene.at(0.04)
+    bones = scene.view_at(0.04)
     assert len(bones.capsules) > 100
 
 
@@ -106,6 +106,6 @@ def test_real_clips_stand_on_the_ground(shared: Path) -> None:
     """Somebody who dances: the lowest of the person is always within 6 cm of the ground."""
     scene = Scene(fba.read(shared / "data" / "greta" / "Dance.bvh"))
     for share in np.linspace(0.05, 0.95, 7):
-        view = scene.at(float(scene.start) + share * float(scene.duration))
+        view = scene.view_at(float(scene.start) + share * float(scene.duration))
         lowest = min(float(mesh.positions[:, 1].min()) for mesh in view.faces)
         assert -0.06 < lowest < 0.06

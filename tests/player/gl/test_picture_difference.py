@@ -107,7 +107,7 @@ class TestOfPictures:
         case = cases()["neutral_front"]
         scene = case.scene()
         whole = draw(case, scene)
-        at = scene.at
-        scene.at = lambda time: replace(at(time), eyes=at(time).eyes[:1])  # type: ignore[method-assign]
+        view = scene.view_at(0.0)
+        scene.view_at = lambda time: replace(view, eyes=view.eyes[:1])  # type: ignore[method-assign]
         found = difference(whole, draw(case, scene))
         assert not found.alike, str(found)

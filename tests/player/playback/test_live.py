@@ -248,7 +248,7 @@ def test_a_scene_of_a_stream_is_the_scene_of_its_file(wire: Wire) -> None:
     assert live.wait(20)
     scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
     assert (scene.title, scene.has_body) == ("wire", False)
-    ours, theirs = scene.at(0.4).faces, Scene(fba.decode(data)).at(0.4).faces
+    ours, theirs = scene.view_at(0.4).faces, Scene(fba.decode(data)).view_at(0.4).faces
     for one, other in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(one.positions, other.positions, atol=1e-6)
 

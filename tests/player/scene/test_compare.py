@@ -124,8 +124,8 @@ def test_differences_of_a_face_and_a_body_are_none() -> None:
 
 def test_two_heads_stand_apart_and_are_those_of_their_scenes(pair: CompareScene) -> None:
     camera = pair.camera("front")
-    view = pair.at(0.0)
-    alone = [scene.at(0.0) for scene in pair.scenes]
+    view = pair.view_at(0.0)
+    alone = [scene.view_at(0.0) for scene in pair.scenes]
     assert len(view.faces) == sum(len(one.faces) for one in alone)
     assert len(view.eyes) == 4
     middles = [float(eye.matrix[0, 3]) for eye in view.eyes]
@@ -140,7 +140,7 @@ def test_two_heads_stand_apart_and_are_those_of_their_scenes(pair: CompareScene)
 def test_in_profile_they_stand_beside_each_other_as_the_camera_sees_them(pair: CompareScene) -> None:
     camera = pair.camera("profile")
     matrix = camera.projection_matrix(16 / 9) @ camera.view_matrix()
-    places = [matrix @ eye.matrix[:, 3] for eye in pair.at(0.0).eyes]
+    places = [matrix @ eye.matrix[:, 3] for eye in pair.view_at(0.0).eyes]
     across = [float(place[0] / place[3]) for place in places]
     assert max(across[:2]) < -0.1
     assert min(across[2:]) > 0.1
@@ -149,11 +149,11 @@ def test_in_profile_they_stand_beside_each_other_as_the_camera_sees_them(pair: C
 def test_over_each_other_the_second_is_a_drawing(pair: CompareScene) -> None:
     pair.arrangement = "over"
     try:
-        view = pair.at(0.0)
-        assert len(view.faces) == len(pair.scenes[0].at(0.0).faces)
+        view = pair.view_at(0.0)
+        assert len(view.faces) == len(pair.scenes[0].view_at(0.0).faces)
         assert view.meshes
         assert all((mesh.shape.colours[:, :3] == mesh.shape.colours[0, :3]).all() for mesh in view.meshes)
-        assert pair.at(0.04).meshes[0].shape is view.meshes[0].shape  # renderers keep what they know
+        assert pair.view_at(0.04).meshes[0].shape is view.meshes[0].shape  # renderers keep what they know
         assert pair.scenes[1].view == "figure"
     finally:
         pair.arrangement = "side"
@@ -176,7 +176,7 @@ def test_switches_and_views_are_those_of_all(pair: CompareScene) -> None:
 def test_a_head_beside_a_body_is_as_high_as_its_head() -> None:
     scene = CompareScene([Scene(walk([0, 0])), Scene(talk([0, 0]))])
     scene.camera("front")
-    heights = [float(eye.matrix[1, 3]) for eye in scene.at(0.0).eyes]
+    heights = [float(eye.matrix[1, 3]) for eye in scene.view_at(0.0).eyes]
     assert heights[2] == pytest.approx(heights[0], abs=0.02)
     assert heights[0] > 1.4
 
@@ -186,7 +186,7 @@ def test_heads_and_bodies_in_a_row_are_all_in_the_picture() -> None:
     camera, aspect = scene.camera(None, 16 / 9), 16 / 9
     matrix = camera.projection_matrix(aspect) @ camera.view_matrix()
     across = []
-    for eye in scene.at(0.0).eyes[::2]:
+    for eye in scene.view_at(0.0).eyes[::2]:
         clip = matrix @ eye.matrix[:, 3]
         across.append(float(clip[0] / clip[3]))
     apart = np.diff(across)

@@ -15,7 +15,7 @@ from fba.face import feature_point_names, resolve
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel
 from fba.player import Offscreen, Scene
-from fba_player.figure.face import FaceFigure
+from fba_player.figure.face import build_figure
 from fba_player.scene._feature_points_view import PointView
 from fba_player.scene._skin_lines import skin_lines
 from player_tracks import body_track, face_track
@@ -34,13 +34,13 @@ def face(faps: dict[int, int]) -> Animation:
 
 @pytest.fixture(scope="module")
 def view() -> PointView:
-    return PointView(FaceFigure(FaceModel.default()))
+    return PointView(build_figure(FaceModel.default()))
 
 
 @pytest.mark.parametrize("faps", FACES, ids=["neutral", "face", "head"])
 def test_a_sphere_stands_at_every_feature_point(faps: dict[int, int]) -> None:
     animation = face(faps)
-    marks = Scene(animation, view="points").at(0.0).marks
+    marks = Scene(animation, view="points").view_at(0.0).marks
     assert animation.face is not None
     model = FaceModel.default()
     expected = Deformer(model).feature_points(resolve(animation.face, model)[0])
@@ -55,7 +55,7 @@ def test_points_that_a_face_lacks_are_left_out() -> None:
     points, bound = model.points.copy(), model.bound.copy()
     points[ROW["10.1"]], bound[ROW["10.1"]] = np.nan, -1
     scene = Scene(face({}), replace(model, points=points, bound=bound), view="points")
-    assert scene.at(0.0).marks.shape == (83, 16)
+    assert scene.view_at(0.0).marks.shape == (83, 16)
 
 
 def test_on_a_body_the_points_go_with_the_head() -> None:
@@ -73,13 +73,13 @@ def test_on_a_body_the_points_go_with_the_head() -> None:
     skull = body.skeleton.number("skullbase")
     stands = body.eyes.mean(axis=0) + body.skeleton.centres[skull] - body.bind[skull, :3, 3]
     expected = alone - scene.figure.between_eyes + stands + shift
-    np.testing.assert_allclose(scene.at(0.0).marks[:, :3], expected, atol=1e-5)
+    np.testing.assert_allclose(scene.view_at(0.0).marks[:, :3], expected, atol=1e-5)
 
 
 def test_every_bone_and_joint_has_its_capsule(walking: Animation) -> None:
     skeleton = BodyModel.default().skeleton
     assert walking.body is not None
-    capsules = Scene(walking, view="points").at(0.2).capsules[2:]  # behind the eyeballs
+    capsules = Scene(walking, view="points").view_at(0.2).capsules[2:]  # behind the eyeballs
     places = BapSolver(skeleton).pose(walking.body.values[5])[:, :3, 3]
     bones, joints = capsules[: len(places) - 1], capsules[len(places) - 1 :]
     np.testing.assert_allclose(joints[:, :3], places, atol=1e-6)
@@ -119,8 +119,8 @@ def test_lines_lie_on_the_skin_and_on_their_own_lip() -> None:
     # Where only the lower lip moves, a line along the upper one stays.
     lowered = Deformer(model).local(np.bincount([4, 51], [-300, -300], 68).astype(np.float32))
     upper, lower = lines[0], lines[1]
-    assert np.abs(upper.places(lowered) - upper.places(still))[2:-2].max() < 0.0008
-    assert np.abs(lower.places(lowered) - lower.places(still)).max() > 0.004
+    assert np.abs(upper.positions(lowered) - upper.positions(still))[2:-2].max() < 0.0008
+    assert np.abs(lower.positions(lowered) - lower.positions(still)).max() > 0.004
 
 
 def test_extreme_faps_give_finite_lines(view: PointView) -> None:
@@ -136,11 +136,11 @@ def test_the_view_is_checked_and_may_change(talking: Animation) -> None:
         Scene(talking, view="wire")
     scene = Scene(talking)
     assert scene.view == "figure"
-    assert len(scene.at(0.0).marks) == 0
+    assert len(scene.view_at(0.0).marks) == 0
     scene.view = "points"
-    assert len(scene.at(0.0).marks) == 84
+    assert len(scene.view_at(0.0).marks) == 84
     scene.view = "figure"
-    assert len(scene.at(0.0).marks) == 0
+    assert len(scene.view_at(0.0).marks) == 0
 
 
 @pytest.mark.usefixtures("opengl")
@@ -174,12 +174,12 @@ class TestPictures:
     def test_what_is_hidden_shines_through_faintly(self) -> None:
         scene = Scene(face({}), view="points")
         with Offscreen(scene, (400, 300), scene.camera("profile", 4 / 3)) as offscreen:
-            view = scene.at(0.0)
+            view = scene.view_at(0.0)
             whole = offscreen.frame(0.0).astype(int)
             behind = view.marks[:, 0] < -0.005  # the other side of the face
             assert behind.sum() > 25
             hidden = replace(view, marks=view.marks[~behind])
-            scene.at = lambda time: hidden  # type: ignore[method-assign]
+            scene.view_at = lambda time: hidden  # type: ignore[method-assign]
             without = offscreen.frame(0.0).astype(int)
         faint = np.abs(whole - without)[100:220, 100:260].max(axis=2)
         assert (faint > 4).sum() > 10

@@ -13,7 +13,7 @@ from fba.errors import FbaWarning
 from fba.face.model import FaceModel, point_row
 from fba.player import Scene, default_camera
 from fba_player.figure._face_parts import compute_sway
-from fba_player.figure.face import FaceFigure
+from fba_player.figure.face import FaceFigure, build_figure
 from player_tracks import body_track, face_track
 
 STILL = np.zeros(68, dtype=np.float32)
@@ -28,7 +28,7 @@ def faps(**values: float) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def figure() -> FaceFigure:
-    return FaceFigure(FaceModel.default())
+    return build_figure(FaceModel.default())
 
 
 def test_the_skin_follows_the_model(figure: FaceFigure) -> None:
@@ -130,7 +130,7 @@ def test_a_damaged_texture_is_told_and_the_colour_shown() -> None:
     skin = model.parts[0]
     broken = replace(skin, material=replace(skin.material, texture=b"\x89PNG no picture"))
     with pytest.warns(FbaWarning, match="texture of part 'skin' cannot be read"):
-        figure = FaceFigure(replace(model, parts=(broken, *model.parts[1:])))
+        figure = build_figure(replace(model, parts=(broken, *model.parts[1:])))
     assert figure.meshes(STILL, np.eye(4))[0].shape.picture is None
 
 
@@ -142,15 +142,15 @@ def test_the_head_goes_with_the_body() -> None:
     scene = Scene(body([{}, {181: 0, 182: 300, 183: 0}, {1: 0}]))
     names = list(scene._skeleton.names)
     assert "skullbase" in names
-    first = scene.at(0.0).eyes[0].matrix[:3, 3]
+    first = scene.view_at(0.0).eyes[0].matrix[:3, 3]
     assert 1.55 < first[1] < 1.70  # the eyes of somebody 1.75 m tall
-    moved = scene.at(0.04).eyes[0].matrix[:3, 3] - first
+    moved = scene.view_at(0.04).eyes[0].matrix[:3, 3] - first
     assert np.linalg.norm(moved) == pytest.approx(0.3, abs=1e-6)
 
 
 def test_a_face_has_shoulders_and_a_body_has_ground() -> None:
-    face = Scene(Animation(25, np.arange(1), face=face_track([{3: 1}]))).at(0.0)
-    whole = Scene(body([{}])).at(0.0)
+    face = Scene(Animation(25, np.arange(1), face=face_track([{3: 1}]))).view_at(0.0)
+    whole = Scene(body([{}])).view_at(0.0)
     assert (face.ground, len(face.capsules), len(face.eyes)) == (False, 0, 2)
     assert (whole.ground, len(whole.capsules), len(whole.eyes)) == (True, 0, 2)
     assert len(whole.faces) > len(face.faces)

@@ -15,7 +15,7 @@ from fba.body.model import BodyModel
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.player import Camera, Offscreen, Scene
-from fba_player.figure.face import FaceFigure
+from fba_player.figure.face import FaceFigure, build_figure
 from fba_player.gl._labels import placed_names
 from fba_player.scene._fap_heatmap import FapHeatmap
 from fba_player.scene._wireframe import unique_edges
@@ -36,7 +36,7 @@ def whole(faps: dict[int, int] | None = None, baps: dict[int, int] | None = None
 
 @cache
 def only_figure() -> FaceFigure:
-    return FaceFigure(FaceModel.default())
+    return build_figure(FaceModel.default())
 
 
 @pytest.fixture
@@ -127,7 +127,7 @@ class TestViews:
         faps = {3: 400, 48: 20000, 49: -40000}
         scene = shown(face(faps))
         scene.show("wireframe")
-        ends = scene.at(0.0).extras.lines[0].ends  # type: ignore[union-attr]
+        ends = scene.view_at(0.0).extras.lines[0].ends  # type: ignore[union-attr]
         model = scene.model
         moved = Deformer(model)(scene.timeline.faps(0.0))
         skin = model.parts[0]
@@ -151,48 +151,48 @@ class TestViews:
     def test_dots_stand_at_the_feature_points(self, subject: Animation) -> None:
         scene = shown(subject)
         scene.show("points")
-        dots = scene.at(0.0).extras.dots[0]  # type: ignore[union-attr]
-        marks = shown(subject, view="points").at(0.0).marks
+        dots = scene.view_at(0.0).extras.dots[0]  # type: ignore[union-attr]
+        marks = shown(subject, view="points").view_at(0.0).marks
         np.testing.assert_allclose(dots.places, marks[:, :3], atol=1e-6)
         assert len(dots.names) == 84
         assert dots.names[0] == "2.1"
 
     def test_parts_are_taken_out(self) -> None:
         scene = shown(face())
-        kinds = {mesh.shape.kind for mesh in scene.at(0.0).faces}
+        kinds = {mesh.shape.kind for mesh in scene.view_at(0.0).faces}
         assert {"skin", "teeth", "tongue", "lash"} <= kinds
         for name in ("eyes", "teeth", "hair"):
             scene.show(name, False)
-        view = scene.at(0.0)
+        view = scene.view_at(0.0)
         assert view.eyes == []
         assert {mesh.shape.kind for mesh in view.faces} == {"skin", "other"}
 
     def test_without_shadows_light_is_everywhere_the_same(self) -> None:
         scene = shown(whole())
-        assert len(scene.at(0.0).blobs) == 5
+        assert len(scene.view_at(0.0).blobs) == 5
         scene.show("shadows", False)
-        view = scene.at(0.0)
+        view = scene.view_at(0.0)
         assert len(view.blobs) == 0
         assert all((mesh.light == mesh.light[0]).all() for mesh in view.faces)
 
     def test_bones_alone_and_through_glass(self) -> None:
         scene = shown(whole())
         scene.show("skeleton", "only")
-        alone = scene.at(0.0)
+        alone = scene.view_at(0.0)
         assert (alone.faces, alone.eyes, alone.extras.shells) == ([], [], ())  # type: ignore[union-attr]
         joints = len(BodyModel.default().skeleton)
         head = 3  # the head's joint and two eyes
         assert len(alone.capsules) == 2 * joints - 1 + 2 * head - 1
         scene.show("skeleton", "through")
-        glass = scene.at(0.0)
+        glass = scene.view_at(0.0)
         np.testing.assert_array_equal(glass.capsules, alone.capsules)
         assert "skin" in {mesh.shape.kind for mesh in glass.extras.shells}  # type: ignore[union-attr]
 
     def test_a_faces_own_joints_are_what_it_turns_about(self) -> None:
         scene = shown(face({49: 30000}))
         scene.show("skeleton", "only")
-        places = scene.at(0.0).capsules[2:, :3]
-        eyes = [eye.matrix[:3, 3] for eye in shown(face({49: 30000})).at(0.0).eyes]
+        places = scene.view_at(0.0).capsules[2:, :3]
+        eyes = [eye.matrix[:3, 3] for eye in shown(face({49: 30000})).view_at(0.0).eyes]
         np.testing.assert_allclose(sorted(places[1:, 0]), sorted(e[0] for e in eyes), atol=1e-4)
         centre = scene.model.table_of[49].transforms[0].centre
         np.testing.assert_allclose(places[0], centre, atol=1e-6)  # stays where it is
@@ -200,20 +200,20 @@ class TestViews:
     def test_the_grid_is_metres_on_the_floor(self) -> None:
         scene = shown(whole(baps={181: 500, 182: 0, 183: 0}))
         scene.show("grid")
-        grid = scene.at(0.0).extras.grid  # type: ignore[union-attr]
+        grid = scene.view_at(0.0).extras.grid  # type: ignore[union-attr]
         assert (grid.height, grid.step) == (0.0, 1.0)
         alone = shown(face())
         alone.show("grid")
-        below = alone.at(0.0).extras.grid  # type: ignore[union-attr]
+        below = alone.view_at(0.0).extras.grid  # type: ignore[union-attr]
         assert below.step == pytest.approx(0.1)
         assert below.height == pytest.approx(alone.model.vertices[:, 1].min())
 
     def test_a_new_scene_has_no_extras(self) -> None:
         scene = shown(face())
-        assert scene.at(0.0).extras is None
+        assert scene.view_at(0.0).extras is None
         scene.show("grid")
         scene.show("grid", False)
-        assert scene.at(0.0).extras is None
+        assert scene.view_at(0.0).extras is None
 
 
 class TestInfluence:
@@ -243,7 +243,7 @@ class TestInfluence:
     def test_an_eye_turns(self, figure: FaceFigure) -> None:
         scene = shown(face())
         scene.show("influence", "yaw_l_eyeball")
-        view = scene.at(0.0)
+        view = scene.view_at(0.0)
         assert view.eyes == []
         left, right = view.meshes
         assert np.ptp(left.shape.colours[:, :3], axis=0).max() > 0.3
@@ -252,7 +252,7 @@ class TestInfluence:
     def test_colours_are_those_of_the_legend(self, figure: FaceFigure) -> None:
         scene = shown(face())
         scene.show("influence", 3)
-        view = scene.at(0.0)
+        view = scene.view_at(0.0)
         skin = next(mesh for mesh in view.faces if mesh.shape.name == "skin")
         legend = view.extras.legend  # type: ignore[union-attr]
         most = int(FapHeatmap(figure, 3).distances[: len(skin.positions)].argmax())
@@ -267,7 +267,7 @@ class TestInfluence:
     def test_a_fap_without_tables_moves_nothing(self) -> None:
         model = FaceModel.default()
         tables = tuple(table for table in model.tables if table.fap != 64)
-        bare = FapHeatmap(FaceFigure(replace(model, tables=tables)), 64)
+        bare = FapHeatmap(build_figure(replace(model, tables=tables)), 64)
         assert bare.most == 0
         assert "moves no vertex" in bare.legend.unit
 

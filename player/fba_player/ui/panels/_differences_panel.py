@@ -127,9 +127,9 @@ class DifferencesPanel(Panel):
 def _why_nothing_differs(scene: Any, second: int, found: Differences) -> str:
     """The text shown where nothing differs: the reason."""
     one, other = (scene.scenes[number].animation for number in (0, second))
-    if not any(
-        getattr(one, part) is not None and getattr(other, part) is not None for part in ("face", "body")
-    ):
+    both_faces = one.face is not None and other.face is not None
+    both_bodies = one.body is not None and other.body is not None
+    if not (both_faces or both_bodies):
         return "one is a face, the other a body: nothing to compare"
     return "nothing differs" if len(found.times) else "they have no time in common"
 

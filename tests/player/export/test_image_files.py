@@ -11,7 +11,7 @@ from PIL import Image
 from fba.animation import Animation
 from fba.errors import FormatError, UnsupportedError
 from fba.player import Scene, render
-from fba_player.export.image_sequence import Numbered, Sequence, is_sequence
+from fba_player.export.image_files import Numbered, Sequence, is_sequence
 
 SMALL = (24, 16)
 
