@@ -254,3 +254,15 @@ def _stack(arrays: list[Array]) -> Array:
     stacked = np.concatenate(arrays)
     stacked.flags.writeable = False
     return stacked
+
+
+def hold(values: Array, mask: Bool, before: Array) -> Array:
+    """Return values (T, N) in force at each frame: where the mask is False, the last one where it is True.
+
+    mask: (T, N), or (T, 1) for all columns together. before: (N,), in force before the first frame.
+    """
+    last = np.where(mask, np.arange(1, len(mask) + 1, dtype=np.int32)[:, None], np.int32(0))
+    np.maximum.accumulate(last, axis=0, out=last)
+    known = np.concatenate([before[None].astype(values.dtype), values])
+    held: Array = np.take_along_axis(known, np.broadcast_to(last, values.shape), axis=0)
+    return held

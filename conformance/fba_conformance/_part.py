@@ -1,4 +1,4 @@
-"""Read the FAP or BAP half of a plane, element by element, and compute its values.
+"""Read the FAP or BAP half of a plane, and its viseme and expression, element by element.
 
 ISO/IEC 14496-2, FBA object plane, predictive mode: masks, range lists, quantiser, arithmetic segments.
 """
@@ -8,7 +8,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fba.errors import UnsupportedError
-from fba.parameters import bap_groups, baps, fap_groups, faps
+from fba.parameters import (
+    EXPRESSION_FIELDS,
+    EXPRESSION_SELECT_MAX,
+    VISEME_FIELDS,
+    VISEME_SELECT_MAX,
+    bap_groups,
+    baps,
+    fap_groups,
+    faps,
+)
 from fba_conformance._reader import Levels, Reader
 from fba_conformance._textbook import FrequencyTable
 
@@ -17,6 +26,8 @@ LISTS = ("i_new_max", "i_new_min", "p_new_max", "p_new_min")
 MARKER_EVERY = 4
 """A marker bit precedes every `MARKER_EVERY`-th parameter of a group in a range list, from the first on."""
 INTENSITY_MAX = 63
+CODED_FIELDS = {"viseme": 3, "expression": 4}
+"""Number of fields in the arithmetic segment; the others are single bits after it."""
 PREDICTION_SCALE = (
     0, 1, 2, 3, 5, 7, 9, 11, 14, 17, 20, 23, 27, 31, 35, 39,
     43, 47, 52, 57, 62, 67, 72, 77, 82, 88, 94, 100, 106, 113, 120, 127,
@@ -183,3 +194,41 @@ def read_segment(reader: Reader, name: str, section: str, slots: list[Slot], *, 
         slot.value = level * slot.step + (0 if intra else slot.value)
     content = Levels(tuple(s.label for s in slots), levels, tuple(s.value for s in slots), inserted)
     reader.record(start, f"{name} segment", content, section)
+
+
+@dataclass
+class HighLevel:
+    """State of FAP 1 (`name` "viseme") or FAP 2 ("expression")."""
+
+    name: str
+    slots: list[Slot] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.fields = VISEME_FIELDS if self.name == "viseme" else EXPRESSION_FIELDS
+        self.select_max = VISEME_SELECT_MAX if self.name == "viseme" else EXPRESSION_SELECT_MAX
+
+    def begin(self, fap_quant: int) -> None:
+        """Make new slots for an I plane. Selects are never quantised; blends and intensities are."""
+        self.slots = []
+        for name in self.fields[: CODED_FIELDS[self.name]]:
+            if "select" in name:
+                step, limit = 1, self.select_max
+            elif fap_quant:
+                step, limit = fap_quant, (INTENSITY_MAX + fap_quant // 2) // fap_quant
+            else:
+                step, limit = 1, INTENSITY_MAX
+            self.slots.append(Slot(name, step, {True: (0, limit), False: (-limit, limit)}))
+
+    def read(self, reader: Reader, *, intra: bool) -> list[int]:
+        """Read the fields; return them in the standard's order."""
+        start = reader.bit
+        read_segment(reader, self.name, "fap", self.slots, intra=intra)
+        for slot in self.slots:
+            if "select" in slot.label and not 0 <= slot.value <= self.select_max:
+                raise reader.error(
+                    f"{slot.label} becomes {slot.value}, expected 0..{self.select_max}; "
+                    "the stream is damaged here or before",
+                    bit=start,
+                )
+        flags = [reader.number(name, 1, "fap") for name in self.fields[CODED_FIELDS[self.name] :]]
+        return [slot.value for slot in self.slots] + flags

@@ -14,8 +14,7 @@ from typing import Any
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, but_recognised
-from fba_conformance._high_level import HighLevel
-from fba_conformance._part import Part
+from fba_conformance._part import HighLevel, Part
 from fba_conformance._reader import (
     OBJECT_START_CODES,
     PLANE_START_CODES,

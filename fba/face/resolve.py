@@ -20,6 +20,7 @@ from fba.face.expressions import Definitions
 from fba.face.interpolation.evaluate import evaluate
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
+from fba.tracks import hold
 
 BLOCK = 4096
 """Frames resolved at once: keeps the working arrays in the processor's cache."""
@@ -189,18 +190,6 @@ def _share(amounts: Int16) -> Float32:
     """(T, 1) blend or intensity as a share of its largest; quantised ones may lie a little outside."""
     clipped: Float32 = np.clip(amounts, 0, INTENSITY_MAX).astype(np.float32)[:, None]
     return clipped / np.float32(INTENSITY_MAX)
-
-
-def hold(values: Array, mask: Bool, before: Array) -> Array:
-    """Each column keeps its last masked-in value; (T, N), or mask (T, 1) for all columns together.
-
-    before: (N,) values in force before the first frame.
-    """
-    last = np.where(mask, np.arange(1, len(mask) + 1, dtype=np.int32)[:, None], np.int32(0))
-    np.maximum.accumulate(last, axis=0, out=last)
-    known = np.concatenate([before[None].astype(values.dtype), values])
-    held: Array = np.take_along_axis(known, np.broadcast_to(last, values.shape), axis=0)
-    return held
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.body.gait._anatomy import Side
-from fba.body.gait._joint_angles import foot_angles, limb_angles
+from fba.body.gait._limb import foot_angles, limb_angles
 from fba.easing import smoothstep
 from fba.rotations import apply, axis_matrices
 

@@ -1,4 +1,4 @@
-"""Two bones and a hinge, solved in closed form: the thigh and shin of a leg, the upper arm and forearm."""
+"""Limbs of two bones and a hinge, solved in closed form, and the joint angles of rotations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Limb:
     way: float
 
     def _hinge(self) -> tuple[float, float, float]:
-        """The squared reach at a bend b is constant + 2 m cos(b - straight): constant, m, straight."""
+        """Return constant, m, straight: the squared reach at a bend b is constant + 2 m cos(b - straight)."""
         u, w = self.upper, self.lower
         along, across = u[1] * w[1] + u[2] * w[2], u[2] * w[1] - u[1] * w[2]
         constant = float(u @ u + w @ w + 2.0 * u[0] * w[0])
@@ -36,7 +36,7 @@ class Limb:
         return float(np.sqrt(constant + 2.0 * m))
 
     def length(self, bend: npt.ArrayLike) -> Float64:
-        """Metres from end to end at a bend, radians (the rotation about x, times `way`)."""
+        """Return metres from end to end at a bend, radians (the rotation about x, times `way`)."""
         constant, m, straight = self._hinge()
         result: Float64 = np.sqrt(
             constant + 2.0 * m * np.cos(self.way * np.asarray(bend, dtype=np.float64) - straight)
@@ -44,16 +44,16 @@ class Limb:
         return result
 
     def bend(self, length: npt.ArrayLike) -> Float64:
-        """The bend at which the ends are that far apart; where they cannot be, the closest."""
+        """Return the bend in radians at which the ends are length metres apart, or the closest possible."""
         constant, m, straight = self._hinge()
         cosine = (np.square(np.asarray(length, dtype=np.float64)) - constant) / (2.0 * m)
         result: Float64 = self.way * straight + np.arccos(np.clip(cosine, -1.0, 1.0))
         return result
 
     def solve(self, target: Float64, twist: npt.ArrayLike) -> tuple[Float64, Float64]:
-        """Rotations (..., 3, 3) of the upper bone and bends (...) that take the end to target (..., 3).
+        """Return rotations (..., 3, 3) of the upper bone, and bends (...), that take the end to a target.
 
-        target: from the limb's root, in the frame of its parent. twist: about the upper bone's own length,
+        target: (..., 3), from the root of the limb, in its parent. twist: about the upper bone's own length,
         the innermost of its turns (abduction, then flexion follow). Out of reach, the limb points at it.
         """
         twist = np.asarray(twist, dtype=np.float64)
@@ -67,3 +67,25 @@ class Limb:
         leant = apply(axis_matrices(2, aside), end)
         forward = np.arctan2(wanted[..., 2], wanted[..., 1]) - np.arctan2(leant[..., 2], leant[..., 1])
         return axis_matrices(0, forward) @ axis_matrices(2, aside) @ axis_matrices(1, twist), bend
+
+
+def limb_angles(rotation: Float64) -> tuple[Float64, Float64, Float64]:
+    """Return angles x, y, z in radians of rotations (..., 3, 3) = Rx . Rz . Ry, the order of a limb's joint.
+
+    Flexion is outermost, twisting innermost.
+    """
+    z = np.arcsin(np.clip(-rotation[..., 0, 1], -1.0, 1.0))
+    x = np.arctan2(rotation[..., 2, 1], rotation[..., 1, 1])
+    y = np.arctan2(rotation[..., 0, 2], rotation[..., 0, 0])
+    return x, y, z
+
+
+def foot_angles(rotation: Float64) -> tuple[Float64, Float64, Float64]:
+    """Return angles x, y, z in radians of rotations (..., 3, 3) = Rx . Ry . Rz, the order of a foot.
+
+    These are the ankle's flexion and twisting, then the subtalar joint's roll.
+    """
+    y = np.arcsin(np.clip(rotation[..., 0, 2], -1.0, 1.0))
+    x = np.arctan2(-rotation[..., 1, 2], rotation[..., 2, 2])
+    z = np.arctan2(-rotation[..., 0, 1], rotation[..., 0, 0])
+    return x, y, z

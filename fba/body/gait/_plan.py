@@ -15,7 +15,7 @@ from fba.body.gait._anatomy import Anatomy, Side
 from fba.body.gait._characters import CYCLE, PHASES, Character
 from fba.body.gait._curves import Interpolation, cosine_wave, periodic_curve, spline
 from fba.body.gait._ground import TOE_OFF, Footing, Leg
-from fba.body.gait._joint_angles import limb_angles
+from fba.body.gait._limb import limb_angles
 from fba.easing import smoothstep
 from fba.errors import ModelError
 from fba.rotations import axis_matrices

@@ -11,7 +11,7 @@ from fba.arrays import Float64
 from fba.body.gait._anatomy import Side, Writer
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import cosine_wave, periodic_curve
-from fba.body.gait._joint_angles import limb_angles
+from fba.body.gait._limb import limb_angles
 from fba.body.gait._plan import KNOTS, Plan
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver

@@ -13,9 +13,11 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.atomic import atomic
+from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FormatError, OptionError, Remedy
-from fba.formats.body_frames import shown_baps
+from fba.parameters import BAP_COUNT
 from fba.source import Path
+from fba.tracks import hold
 
 if TYPE_CHECKING:
     from fba.body import BapSolver, Skeleton
@@ -68,7 +70,7 @@ def write(
             f"{float(animation.rate):g} frames/s cannot be written as BVH, which takes 1/3600 to 10000",
             path=path,
         ).with_remedies(Remedy("rate", "resample first, e.g. with {}", "30", "Animation.resample"))
-    values = shown_baps(animation, path, "BVH")
+    values = _shown_baps(animation, path)
     solver = BapSolver(skeleton, axes)
     written = _select_joints(solver, values, joints == "moving")
     columns, factors, shifts, text = _hierarchy(solver, written, unit)
@@ -81,6 +83,27 @@ def write(
             numbers = np.where(columns >= 0, part[:, columns] * factors, 0.0) + shifts
             numbers[numbers == 0] = 0.0  # no "-0"
             file.write("".join([row % tuple(frame) for frame in numbers.tolist()]).encode())
+
+
+def _shown_baps(animation: Animation, path: Path) -> Int32:
+    """Return int32 (T, 296): the BAPs shown at every frame from the first to the last, gaps filled in."""
+    if animation.body is None:
+        raise FormatError(
+            "BVH holds a body, and this animation has only a face; write .fap, .fba or .glb", path=path
+        )
+    if not len(animation):
+        raise FormatError("BVH needs a frame at least, and this animation has none", path=path)
+    count = int(animation.index[-1]) - int(animation.index[0]) + 1
+    if count > MOST_FRAMES:
+        raise FormatError(
+            f"{count} frames from the first to the last are more than the {MOST_FRAMES} that BVH files "
+            "are read with; write pieces of it, or resample",
+            path=path,
+        )
+    body = animation.resample(animation.rate).body
+    assert body is not None
+    held: Int32 = hold(body.values, body.mask, np.zeros(BAP_COUNT, dtype=np.int32))
+    return held
 
 
 def _select_joints(solver: BapSolver, values: Int32, moving: bool) -> list[int]:

@@ -16,10 +16,10 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning, FormatError
-from fba.formats.body_frames import held_baps
 from fba.formats.gltf._joints import Clip, move, nest
 from fba.gltf.writer import Builder
 from fba.source import Path
+from fba.tracks import hold
 
 if TYPE_CHECKING:
     from fba.body import BapSolver
@@ -107,7 +107,10 @@ def _add_person(
     skeleton = Skeleton.default() if person is None else person.skeleton
     solver = BapSolver(skeleton, axes)
     nodes = nest(builder, skeleton.names, skeleton.parents)
-    turns, positions = _local_motion(solver, held_baps(animation))
+    track = animation.body
+    assert track is not None
+    baps: Int32 = hold(track.values, track.mask, np.zeros(track.values.shape[1], dtype=np.int32))
+    turns, positions = _local_motion(solver, baps)
     for joint, node in enumerate(nodes):
         shifts = positions if joint == 0 else np.broadcast_to(skeleton.offsets[joint], positions.shape)
         move(builder, clip, node, turns[joint], shifts, always=joint == 0)

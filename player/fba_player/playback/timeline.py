@@ -16,8 +16,9 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.arrays import Array, Float32, Float64, Int32, Intp
-from fba.face.resolve import FaceSettings, Resolver, hold
+from fba.face.resolve import FaceSettings, Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT
+from fba.tracks import hold
 
 TURN = 2 * math.pi / 1e-5
 """A full turn in units of a BAP."""
