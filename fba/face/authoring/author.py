@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Bool, Float64
+from fba.arrays import Float64
 from fba.errors import ModelError
 from fba.face.authoring.regions.brows_cheeks_nose import brow_cheek_nose_motions
 from fba.face.authoring.regions.ears import ear_motions
@@ -22,22 +23,21 @@ from fba.face.authoring.regions.jaw import (
     opening_angles,
     opening_shifts,
 )
-from fba.face.authoring.regions.lashes import lash_motion
-from fba.face.authoring.regions.lids import lid_motion
+from fba.face.authoring.regions.lids import lash_motion, lid_motion
 from fba.face.authoring.regions.lips import HANDLES, lip_motions
 from fba.face.authoring.regions.tongue import FAPS as TONGUE_FAPS
 from fba.face.authoring.regions.tongue import tongue_motion
-from fba.face.authoring.surface.attached_parts import LARGEST, NEAR, Anchors
+from fba.face.authoring.surface.attached_parts import LARGEST, NEAR, Anchors, attach
 from fba.face.authoring.surface.binding import Binding, bind_points, face_size, separate_lips
 from fba.face.authoring.surface.fold_limits import Limiter
-from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
+from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.motion import Motion, build_tables, split_by_part
 from fba.face.authoring.surface.motion_limits import eased_linear_motion, stop_at_folds
 from fba.face.authoring.surface.unfold import unfold
 from fba.face.expressions import Definitions
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part
-from fba.face.points import DIRECTIONS, OPEN_JAW, SHIFT_JAW, THRUST_JAW
+from fba.face.points import OPEN_JAW, SHIFT_JAW, THRUST_JAW
 from fba.face.tables import HEAD, FaceDefTransform
 from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
 
@@ -51,7 +51,6 @@ EYE_FAPS = {"left": (23, 25, 27), "right": (24, 26, 28)}
 PUPIL_FAPS = {"left": 29, "right": 30}
 HEAD_AXES = {48: (1.0, 0.0, 0.0), 49: (0.0, 1.0, 0.0), 50: (0.0, 0.0, 1.0)}
 JAW_FAPS = (OPEN_JAW, THRUST_JAW, SHIFT_JAW)
-LIP_CONTOURS = ("upper inner lip", "lower inner lip", "upper outer lip", "lower outer lip")
 LIP_POINTS = tuple(name for pair in HANDLES.values() for name in pair)
 CARRIED_KINDS = ("brow", "lash", "other")
 
@@ -79,20 +78,22 @@ def author(
     has more than a quarter of a million vertices.
     """
     parts = tuple(parts)
-    places = np.array(points, dtype=np.float64)
-    if places.shape != (len(names()), 3):
-        raise ModelError(f"feature points must have shape ({len(names())}, 3), not {places.shape}")
-    if np.isinf(places).any():
-        raise ModelError(f"feature point {names()[int(np.argwhere(np.isinf(places))[0, 0])]} is infinite")
-    places[np.isnan(places).any(axis=1)] = np.nan
+    given = np.array(points, dtype=np.float64)
+    if given.shape != (len(names()), 3):
+        raise ModelError(f"feature points must have shape ({len(names())}, 3), not {given.shape}")
+    if np.isinf(given).any():
+        raise ModelError(f"feature point {names()[int(np.argwhere(np.isinf(given))[0, 0])]} is infinite")
+    given[np.isnan(given).any(axis=1)] = np.nan
     _check_size(parts)
-    binding = bind_points(parts, places, bound)
-    surface, pool = surface_of(parts, binding.points, binding.bound)
+    binding = bind_points(parts, given, bound)
+    surface = weld_skin(parts, binding.bound)
     if bound is None:
-        binding = separate_lips(surface, parts, places, binding, face_size(places))
-    marks = landmarks(surface, binding.points, binding.bound, pool)
-    work = _Authoring(parts, marks, binding)
-    work.run()
+        binding = separate_lips(surface, parts, given, binding, face_size(given))
+    marks = find_landmarks(surface, binding.points, binding.bound)
+    limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
+    work = _Authoring(parts, marks, limiter, find_eyes(marks, parts), _attach_parts(marks, parts))
+    work.add_all()
+    _explain_far_points(work.lost, binding)
     return FaceModel(
         parts=parts,
         points=binding.points,
@@ -113,7 +114,10 @@ def author(
 
 def _check_size(parts: tuple[Part, ...]) -> None:
     if not any(part.kind == "skin" and len(part.triangles) for part in parts):
-        raise ModelError("a face needs a part of kind 'skin' with triangles; there are " + _kinds(parts))
+        kinds = (f"{part.name!r} ({part.kind}, {len(part.triangles)} triangles)" for part in parts)
+        raise ModelError(
+            f"a face needs a part of kind 'skin' with triangles; there are {', '.join(kinds) or 'none'}"
+        )
     total = sum(len(part.vertices) for part in parts)
     if total > MOST_VERTICES:
         raise ModelError(
@@ -122,130 +126,124 @@ def _check_size(parts: tuple[Part, ...]) -> None:
         )
 
 
-def _kinds(parts: tuple[Part, ...]) -> str:
-    return (
-        ", ".join(f"{part.name!r} ({part.kind}, {len(part.triangles)} triangles)" for part in parts) or "none"
-    )
+def _attach_parts(marks: Landmarks, parts: tuple[Part, ...]) -> dict[str, Anchors]:
+    """The attachment to the skin of each part that moves with it, by name."""
+    result = {}
+    es = marks.fapu.ES * 1024
+    for part in parts:
+        if part.kind not in CARRIED_KINDS or not len(part.triangles):
+            continue
+        if part.kind == "other" and np.ptp(part.vertices, axis=0).max() > LARGEST * es:
+            continue
+        anchors = attach(marks.surface, part)
+        if np.median(anchors.distance) < NEAR * es:
+            result[part.name] = anchors
+    return result
 
 
+def _explain_far_points(lost: dict[int, str], binding: Binding) -> None:
+    """Add to the reasons for lost FAPs, in place, which feature points are too far from the mesh."""
+    for fap, reason in lost.items():
+        point = next((name for name in faps()[fap - 1].feature_points if name in binding.far), None)
+        if point:
+            away = binding.far[point] * 1000
+            lost[fap] = f"feature point {point} is {away:.0f} mm away from the mesh ({reason})"
+
+
+@dataclass(eq=False)
 class _Authoring:
-    """State while the tables of one face are made."""
+    """The motions of one face, while they are made.
 
-    def __init__(self, parts: tuple[Part, ...], marks: Landmarks, binding: Binding) -> None:
-        self.parts = parts
-        self.marks = marks
-        self.binding = binding
-        self.limiter = Limiter(marks.surface.vertices, marks.surface.triangles)
-        self.moves: dict[int, dict[str, Motion]] = {}
-        self.turns: dict[int, list[FaceDefTransform]] = {}
-        self.lost: dict[int, str] = {}
-        self.eyes: dict[str, Eye] = find_eyes(marks, parts)
-        self.anchors = self._anchors()
+    anchors: of the parts that move with the skin, by name. moves: motions by FAP and part. turns: transforms
+    by FAP. lost: reasons by FAP.
+    """
 
-    def run(self) -> None:
-        self._jaw()
+    parts: tuple[Part, ...]
+    marks: Landmarks
+    limiter: Limiter
+    eyes: dict[str, Eye]
+    anchors: dict[str, Anchors]
+    moves: dict[int, dict[str, Motion]] = field(default_factory=dict)
+    turns: dict[int, list[FaceDefTransform]] = field(default_factory=dict)
+    lost: dict[int, str] = field(default_factory=dict)
+
+    def add_all(self) -> None:
+        """Make the motions of every FAP that this face can have."""
+        self._add_jaw()
         for make in (lip_motions, brow_cheek_nose_motions, ear_motions):
             motions, lost = make(self.marks, self.limiter)
             for fap, motion in motions.items():
-                self._surface(fap, motion)
+                self._add_to_surface(fap, motion)
             self.lost |= lost
-        self._lids()
-        self._eyeballs()
-        self._tongue()
-        self._head()
+        self._add_lids()
+        self._add_eyeballs()
+        self._add_tongue()
+        self._add_head()
         for fap in range(FIRST_LOW_LEVEL_FAP, len(faps()) + 1):
             if fap not in self.moves and fap not in self.turns and fap not in self.lost:
                 self.lost[fap] = "nothing of this mesh moves with it"
-        for fap, reason in self.lost.items():
-            point = next((p for p in faps()[fap - 1].feature_points if p in self.binding.far), None)
-            if point:
-                self.lost[fap] = (
-                    f"feature point {point} is {self.binding.far[point] * 1000:.0f} mm away from the mesh"
-                    f" ({reason})"
-                )
 
-    def _surface(self, fap: int, motion: Motion) -> None:
+    def _add_to_surface(self, fap: int, motion: Motion) -> None:
         """Add a motion of the surface, and of the parts attached to it, to a FAP."""
         moves = split_by_part(self.marks.surface, motion)
         for name, anchors in self.anchors.items():
             moves[name] = anchors.carry(motion)
         self.moves[fap] = {**self.moves.get(fap, {}), **moves}
 
-    def _anchors(self) -> dict[str, Anchors]:
-        found = {}
-        es = self.marks.fapu.ES * 1024
-        for part in self.parts:
-            if part.kind not in CARRIED_KINDS or not len(part.triangles):
-                continue
-            if part.kind == "other" and np.ptp(part.vertices, axis=0).max() > LARGEST * es:
-                continue
-            anchors = Anchors(self.marks.surface, part)
-            if np.median(anchors.distance) < NEAR * es:
-                found[part.name] = anchors
-        return found
-
-    def _jaw(self) -> None:
-        found = find_jaw(self.marks)
-        if isinstance(found, str):
-            self.lost |= dict.fromkeys(JAW_FAPS, found)
+    def _add_jaw(self) -> None:
+        jaw = find_jaw(self.marks)
+        if isinstance(jaw, str):
+            self.lost |= dict.fromkeys(JAW_FAPS, jaw)
             return
-        values, angles = opening_angles(found, self.marks.fapu.MNS)
+        values, angles = opening_angles(jaw, self.marks.fapu.MNS)
         shares = {
-            part.name: jaw_share_of_part(self.marks, part, found.hinge)
+            part.name: jaw_share_of_part(self.marks, part, jaw.hinge)
             for part in self.parts
             if part.kind in ("teeth", "tongue")
         }
         points = self.marks.surface.vertices
-        moving = np.flatnonzero(found.share)
-        shifts = opening_shifts(points[moving], found, angles) * found.share[moving][:, None]
-        unlimited = Motion(values, moving, shifts)
-        motion = unfold(self.marks.surface, self.limiter, unlimited, self._pinned(), True)
+        moving = np.flatnonzero(jaw.share)
+        shifts = opening_shifts(points[moving], jaw, angles) * jaw.share[moving][:, None]
+        pinned = self.marks.on_contours(*LIP_CONTOURS)
+        pinned[self.marks.vertices_of(CHIN)] = True
+        motion = unfold(self.marks.surface, self.limiter, Motion(values, moving, shifts), pinned, True)
         motion = stop_at_folds(self.limiter, motion, turning=True)
-        self._surface(OPEN_JAW, motion)
+        self._add_to_surface(OPEN_JAW, motion)
         # teeth and tongue stop where the skin stops
         reached = jaw_angles_at_values(motion, values, angles)
         for part in self.parts:
             if part.name in shares:
-                inner = opening_shifts(part.vertices.astype(np.float64), found, reached)
+                inner = opening_shifts(part.vertices.astype(np.float64), jaw, reached)
                 inner *= shares[part.name][:, None]
                 self.moves[OPEN_JAW][part.name] = Motion(motion.values, np.arange(len(part.vertices)), inner)
         for fap in (THRUST_JAW, SHIFT_JAW):
-            self._slide(fap, found, shares)
+            self._add_sliding(fap, jaw, shares)
 
-    def _pinned(self) -> Bool:
-        """(N,) mask of vertices that follow the jaw exactly."""
-        pinned = self.marks.on_contours(*LIP_CONTOURS)
-        pinned[[self.marks.vertex[name] for name in CHIN if self.marks.has(name)]] = True
-        return pinned
-
-    def _slide(self, fap: int, found: Jaw, shares: dict[str, Float64]) -> None:
-        entry = faps()[fap - 1]
-        step = np.array(DIRECTIONS[entry.positive]) * self.marks.fapu[entry.unit]
-        moving = np.flatnonzero(found.sliding)
-        pinned = np.zeros(len(self.marks.surface), dtype=bool)
-        pinned[[self.marks.vertex[name] for name in (*CHIN, *LIP_POINTS) if self.marks.has(name)]] = True
-        field = found.sliding[moving][:, None] * step
-        motion = eased_linear_motion(self.marks.surface, self.limiter, moving, field, fap, pinned)
-        self._surface(fap, motion)
+    def _add_sliding(self, fap: int, jaw: Jaw, shares: dict[str, Float64]) -> None:
+        """Add FAP 14 or 15, which slides the jaw. shares: of the parts in the mouth that move, by name."""
+        moving = np.flatnonzero(jaw.sliding)
+        pinned = self.marks.surface.mask(self.marks.vertices_of((*CHIN, *LIP_POINTS)))
+        sliding = jaw.sliding[moving][:, None] * self.marks.step(fap)
+        motion = eased_linear_motion(self.marks.surface, self.limiter, moving, sliding, fap, pinned)
+        self._add_to_surface(fap, motion)
         chin = int(np.flatnonzero(motion.vertices == self.marks.vertex["2.1"])[0])
-        ways = motion.shifts[:, chin]
         for part in self.parts:
             if part.name in shares:
-                inner = ways[:, None] * shares[part.name][:, None]
+                inner = motion.shifts[:, chin, None] * shares[part.name][:, None]
                 self.moves[fap][part.name] = Motion(motion.values, np.arange(len(part.vertices)), inner)
 
-    def _lids(self) -> None:
+    def _add_lids(self) -> None:
         for fap, (side, _) in LIDS.items():
             motion = lid_motion(self.marks, self.limiter, self.eyes[side], fap, self.parts)
             if isinstance(motion, str):
                 self.lost[fap] = motion
                 continue
-            self._surface(fap, motion)
+            self._add_to_surface(fap, motion)
             for part in self.parts:
                 if part.kind == "lash" and part.name in self.anchors:
                     self.moves[fap][part.name] = lash_motion(self.marks, self.eyes[side], fap, part, motion)
 
-    def _eyeballs(self) -> None:
+    def _add_eyeballs(self) -> None:
         for side, eye in self.eyes.items():
             if not eye.measured:
                 reason = f"there is no {side} eyeball"
@@ -259,7 +257,7 @@ class _Authoring:
             else:
                 self.lost[PUPIL_FAPS[side]] = f"the {side} eyeball has no vertices about its pupil"
 
-    def _tongue(self) -> None:
+    def _add_tongue(self) -> None:
         tongues = [part for part in self.parts if part.kind == "tongue" and len(part.vertices)]
         for fap in TONGUE_FAPS:
             if not tongues:
@@ -272,7 +270,7 @@ class _Authoring:
                 else:
                     self.moves.setdefault(fap, {})[part.name] = motion
 
-    def _head(self) -> None:
+    def _add_head(self) -> None:
         centre = tuple(self.marks.point_or_average("7.1").tolist())
         for fap, axis in HEAD_AXES.items():
             self.turns[fap] = [FaceDefTransform(HEAD, "rotation", axis, centre)]

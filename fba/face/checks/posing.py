@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from fba.arrays import Float64, Intp
 from fba.face.authoring.regions.eyes import Eye, find_eyes
-from fba.face.authoring.surface.landmarks import Landmarks, landmarks, surface_of
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.tables import HEAD
@@ -31,7 +30,7 @@ class Poser:
         self.model = model
         self.neutral: Float64 = model.vertices.astype(np.float64)
         if like is not None and _same_face(model, like.model):
-            self.__dict__.update(_surface=like._surface, marks=like.marks, eyes=like.eyes)
+            self.__dict__.update(marks=like.marks, eyes=like.eyes)
 
     def pose(self, values: Mapping[int, float]) -> Float64:
         """(V, 3) float64, metres: all vertices under FAP values by number, without the head's rotation."""
@@ -77,18 +76,15 @@ class Poser:
         return place
 
     @cached_property
-    def _surface(self) -> tuple[Surface, Intp]:
-        return surface_of(self.model.parts, self.model.points, self.model.bound)
+    def marks(self) -> Landmarks:
+        """Feature points and contours on the skin."""
+        surface = weld_skin(self.model.parts, self.model.bound)
+        return find_landmarks(surface, self.model.points, self.model.bound)
 
     @property
     def pool(self) -> Intp:
         """Vertices of skin and inner mouth, counted through all parts."""
-        return self._surface[1]
-
-    @cached_property
-    def marks(self) -> Landmarks:
-        """Feature points and contours on the skin."""
-        return landmarks(self._surface[0], self.model.points, self.model.bound, self.pool)
+        return self.marks.surface.pool
 
     @cached_property
     def eyes(self) -> dict[str, Eye]:

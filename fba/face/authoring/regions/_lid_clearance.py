@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from fba.easing import smoothstep
 from fba.face.authoring.regions.eye_opening import CLOSED
 from fba.face.authoring.regions.eyes import Eye
 from fba.face.authoring.surface.landmarks import Landmarks
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.surface import Surface, positions_in
 from fba.face.model import Part
 
 CLEARANCE = 0.012
@@ -21,6 +22,9 @@ FULL_CLEARANCE = 0.3
 BULGE = np.radians(12.0)
 """Angle by which the cornea may be elsewhere, because the eye turns."""
 STRICT = np.radians(4.0)
+"""Half the width of the directions over which the eyeball's own radius is measured."""
+ANGLES = np.linspace(0, np.pi, 73)
+"""Angles from the gaze at which an eyeball's radius is measured."""
 OUTSIDE = 0.97
 """Vertices this far out, in radii of the eyeball, count as outside."""
 DEEPEST = 0.02
@@ -29,73 +33,79 @@ BRIDGINGS = 3
 """Moving a vertex off the eyeball may pull another edge into it: number of passes."""
 
 
+@dataclass(frozen=True, eq=False)
 class Profile:
-    """Distance of an eyeball's surface from its centre in every direction, the cornea included."""
+    """Distance of an eyeball's surface from its centre in every direction, the cornea included.
 
-    def __init__(self, eye: Eye, parts: Sequence[Part], edge: float) -> None:
-        """edge: typical length of the lids' edges, whose middles dip below their ends."""
-        self._eye = eye
-        self._clearance = CLEARANCE * eye.radius
-        self._dip = edge**2 / (8 * eye.radius)
-        self._angles = np.linspace(0, np.pi, 73)
-        self._here = np.full(73, 0.0)
-        self._around = np.full(73, eye.radius)
-        for part in parts:
-            if part.name not in eye.parts:
-                continue
-            arms = part.vertices.astype(np.float64) - eye.centre
-            reach = np.linalg.norm(arms, axis=1)
-            angle = np.arccos(np.clip(arms @ eye.gaze / np.maximum(reach, 1e-12), -1, 1))
-            for k, at in enumerate(self._angles):
-                for radii, within in ((self._here, STRICT), (self._around, BULGE)):
-                    near = np.abs(angle - at) < within
-                    if near.any():
-                        radii[k] = max(radii[k], float(reach[near].max()))
-        self._here[self._here == 0.0] = eye.radius
+    centre, gaze: (3,). size: radius of the eyeball. clearance: of the lids from it. dip: depth by which the
+    middle of a lid's edge lies below its ends. straight: the eyeball's largest radius at each angle of
+    `ANGLES` from the gaze; nearby: the largest within `BULGE` of it. Lengths in metres.
+    """
+
+    centre: Float64
+    gaze: Float64
+    size: float
+    clearance: float
+    dip: float
+    straight: Float64
+    nearby: Float64
 
     def radius(self, points: Float64, *, around: bool) -> Float64:
         """(N,) metres: radius of the eyeball in the directions of points (N, 3), or its largest nearby."""
-        arms = points - self._eye.centre
-        reach = np.linalg.norm(arms, axis=1)
-        angle = np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1))
-        result: Float64 = np.interp(angle, self._angles, self._around if around else self._here)
+        angle, _ = _polar(points, self.centre, self.gaze)
+        result: Float64 = np.interp(angle, ANGLES, self.nearby if around else self.straight)
         return result
 
-    @property
-    def reach(self) -> float:
-        """Radius of the eyeball, metres."""
-        return self._eye.radius
-
-    def before(self, points: Float64) -> Bool:
-        """(N,) mask of points (N, 3) outside the eyeball."""
-        reach = np.linalg.norm(points - self._eye.centre, axis=1)
-        return np.asarray(reach >= self.radius(points, around=False))
+    def is_outside(self, points: Float64, share: float = 1.0) -> Bool:
+        """(N,) mask of points (N, 3) outside the eyeball. share: of its radius that counts as its surface."""
+        reach = np.linalg.norm(points - self.centre, axis=1)
+        return np.asarray(reach >= share * self.radius(points, around=False))
 
     def lift(self, points: Float64, shifts: Float64, *, edges: bool = True) -> Float64:
         """(N, 3) forward shifts to add so that points that were outside the eyeball stay outside.
 
         edges: leave room for the edges between vertices, whose middles dip.
         """
-        at = points + shifts
-        needed = self.radius(at, around=True) + self._clearance + (self._dip if edges else 0.0)
-        arms = at - self._eye.centre
+        shifted = points + shifts
+        needed = self.radius(shifted, around=True) + self.clearance + (self.dip if edges else 0.0)
+        arms = shifted - self.centre
         level = (arms[:, :2] ** 2).sum(axis=1)
-        outside = np.linalg.norm(points - self._eye.centre, axis=1) >= OUTSIDE * self.radius(
-            points, around=False
-        )
-        before = np.sqrt(np.maximum(needed**2 - level, 0.0))
+        front = np.sqrt(np.maximum(needed**2 - level, 0.0))
         moved = np.linalg.norm(shifts, axis=1) > 1e-9
-        push = np.where(outside & moved & (arms[:, 2] > 0), np.maximum(before - arms[:, 2], 0.0), 0.0)
-        result = np.zeros_like(at)
-        result[:, 2] = push
+        pushed = self.is_outside(points, OUTSIDE) & moved & (arms[:, 2] > 0)
+        result = np.zeros_like(shifted)
+        result[:, 2] = np.where(pushed, np.maximum(front - arms[:, 2], 0.0), 0.0)
         return result
+
+
+def measure_profile(eye: Eye, parts: Sequence[Part], edge: float) -> Profile:
+    """The profile of an eye's parts. edge: typical length of the lids' edges, metres."""
+    straight = np.full(len(ANGLES), 0.0)
+    nearby = np.full(len(ANGLES), eye.radius)
+    for part in parts:
+        if part.name not in eye.parts:
+            continue
+        angle, reach = _polar(part.vertices.astype(np.float64), eye.centre, eye.gaze)
+        for k, direction in enumerate(ANGLES):
+            for radii, within in ((straight, STRICT), (nearby, BULGE)):
+                near = np.abs(angle - direction) < within
+                radii[k] = max(radii[k], float(reach[near].max(initial=0.0)))
+    straight[straight == 0.0] = eye.radius
+    dip = edge**2 / (8 * eye.radius)
+    return Profile(eye.centre, eye.gaze, eye.radius, CLEARANCE * eye.radius, dip, straight, nearby)
+
+
+def _polar(points: Float64, centre: Float64, axis: Float64) -> tuple[Float64, Float64]:
+    """(angles (N,) from an axis, distances (N,) from a centre) of points (N, 3)."""
+    arms = points - centre
+    distance = np.linalg.norm(arms, axis=1)
+    return np.arccos(np.clip(arms @ axis / np.maximum(distance, 1e-12), -1, 1)), distance
 
 
 def edge_length(marks: Landmarks, own: Intp, other: Intp) -> float:
     """A typical length of the longer edges at the margins of an eye, metres."""
     surface = marks.surface
-    at_margin = np.zeros(len(surface), dtype=bool)
-    at_margin[own] = at_margin[other] = True
+    at_margin = surface.mask(np.concatenate([own, other]))
     edges = surface.vertices[surface.edges[at_margin[surface.edges].any(axis=1)]]
     return float(np.percentile(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1), 80)) if len(edges) else 0.0
 
@@ -112,22 +122,20 @@ def push_edges_outside(
     profile: Profile, surface: Surface, vertices: Intp, shifts: Float64, margins: Bool, values: Float64
 ) -> Float64:
     """Shifts (K, N, 3) with vertices moved forwards where their edges would cut the eyeball."""
-    place = np.full(len(surface), -1)
-    place[vertices] = np.arange(len(vertices))
     # a lid's inner side may run into the eyeball where nobody sees it
-    before = (place >= 0) & profile.before(surface.vertices)
-    edges = surface.edges[before[surface.edges].all(axis=1)]
+    in_front = surface.mask(vertices) & profile.is_outside(surface.vertices)
+    edges = surface.edges[in_front[surface.edges].all(axis=1)]
     # margins meet those of the other lid where they are
     free = ~margins[edges]
-    local, points = place[edges], surface.vertices[vertices]
+    local, points = positions_in(vertices, len(surface))[edges], surface.vertices[vertices]
     result = shifts.copy()
     for k, share in enumerate(smoothstep(np.abs(values) / CLOSED / FULL_CLEARANCE)):
         for _ in range(BRIDGINGS):
             middles = points[local].mean(axis=1)
             push = profile.lift(middles, result[k][local].mean(axis=1), edges=False)[:, 2]
             # only edges with both ends outside are corrected
-            push[~profile.before(points + result[k])[local].all(axis=1)] = 0.0
-            push = np.minimum(push, DEEPEST * profile.reach)
+            push[~profile.is_outside(points + result[k])[local].all(axis=1)] = 0.0
+            push = np.minimum(push, DEEPEST * profile.size)
             worst = np.zeros(len(vertices))
             np.maximum.at(worst, local[free], np.repeat(2 * share * push, 2)[free.ravel()])
             if not worst.any():

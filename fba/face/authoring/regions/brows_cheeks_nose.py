@@ -30,6 +30,7 @@ from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
 SMOOTHINGS = 5
+"""Rounds of averaging the motion of surfaces behind the skin."""
 HEM = 0.006
 """Shares of a motion below this are set to 0."""
 
@@ -38,7 +39,8 @@ HEM = 0.006
 class Region:
     """Points that pull at the same skin.
 
-    reach: of the motion, in ES0. share: of the way to fixed vertices that moves. slack: distance in ES0
+    points: that pull. still, contours: points and contours that stay. reach: of the motion, in ES0. share: of
+    the way to fixed vertices that moves. slack: distance in ES0
     beyond which the skin does not overshoot. through: depth in ES0 to which surfaces behind the skin move
     with it, or 0. behind: these surfaces, the inside of the "mouth" or "all".
     """
@@ -86,49 +88,39 @@ def regions() -> dict[str, Region]:
 @cache
 def handles() -> tuple[Handle, ...]:
     """The handles of all FAPs, right mates included."""
-    found = []
+    result = []
     mirror = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
     for row in _rows("handles.csv"):
         pairs = (pair.split("=") for pair in row["values"].split())
         left = {name: float(value) for name, value in pairs}
-        found.append(Handle(int(row["fap"]), row["region"], left, float(row["bulge"])))
+        result.append(Handle(int(row["fap"]), row["region"], left, float(row["bulge"])))
         mate = faps()[int(row["fap"]) - 1].left_right_mate
         if mate is not None:
             right = {mirror.get(name, name): value for name, value in left.items()}
-            found.append(Handle(mate, row["region"], right, float(row["bulge"])))
-    return tuple(found)
+            result.append(Handle(mate, row["region"], right, float(row["bulge"])))
+    return tuple(result)
 
 
 def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
     """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
-    found: dict[int, Motion] = {}
-    lost: dict[int, str] = {}
+    lost = {handle.fap: reason for handle in handles() if (reason := marks.missing_point(handle.fap))}
+    motions: dict[int, Motion] = {}
     for area in regions().values():
-        own = []
-        for handle in handles():
-            if handle.region != area.name:
-                continue
-            point = _point(handle.fap)
-            if marks.has(point):
-                own.append(handle)
-            else:
-                lost[handle.fap] = f"feature point {point} is not on the skin"
+        own = [handle for handle in handles() if handle.region == area.name and handle.fap not in lost]
         if own:
-            fields, fixed = _fields(marks, area, own)
+            fields, pinned = _fields(marks, area, own)
             for k, handle in enumerate(own):
-                found[handle.fap] = _motion(marks, limiter, handle, fields[:, k], fixed)
-    return found, lost
+                motions[handle.fap] = _motion(marks, limiter, handle, fields[:, k], pinned)
+    return motions, lost
 
 
 def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64, Bool]:
+    """((N, H) share of each handle's motion at each vertex, (N,) mask of vertices whose share is given)."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     points = [name for name in area.points if marks.has(name)]
-    contour_vertices = np.unique(
-        np.concatenate([np.zeros(0, np.intp), *(marks.contour(name) for name in area.contours)])
-    )
-    pulled = np.array([marks.vertex[name] for name in points])
-    still = [marks.vertex[name] for name in area.still if marks.has(name)]
-    stays = np.setdiff1d(np.union1d(contour_vertices, np.array(still, dtype=np.intp)), pulled)
+    pulled = marks.vertices_of(points)
+    still = np.concatenate([marks.vertices_of(area.still), *(marks.contour(name) for name in area.contours)])
+    stays = np.setdiff1d(still, pulled)
     reach = area.reach * es
     near = surface.distances(pulled, reach)
     far = surface.distances(stays, 4 * reach)
@@ -137,34 +129,29 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
     given = np.array([[handle.values.get(points[k], 0.0) for handle in own] for k in first])
     fixed = np.concatenate([pulled, stays])
     values = np.concatenate([given, np.zeros((len(stays), len(own)))])
-    pinned = np.zeros(len(surface), dtype=bool)
-    pinned[fixed] = True
     solved = solve_smooth_field(surface, free, fixed, values, slack=area.slack * es)
     if area.through:
         behind = surface.distances(pulled, 1.6 * reach) < np.inf
         behind &= marks.inside_mouth if area.behind == "mouth" else ~marks.lips & ~marks.on_inner_lips
         behind[stays] = False
         for k, handle in enumerate(own):
-            targets = np.setdiff1d(np.flatnonzero(behind), marks.vertex[_point(handle.fap)])
+            own_point = marks.vertices_of(faps()[handle.fap - 1].feature_points)
+            targets = np.setdiff1d(np.flatnonzero(behind), own_point)
             lifted = carry_through(surface, solved[:, k], targets, area.through * es)
             for _ in range(SMOOTHINGS):
                 lifted[targets] = average_with_neighbours(surface, lifted, 1)[targets]
             solved[:, k] = lifted
-    return trim_small(solved, HEM), pinned
+    return trim_small(solved, HEM), surface.mask(fixed)
 
 
 def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:
-    fap = faps()[handle.fap - 1]
+    entry = faps()[handle.fap - 1]
     vertices = np.flatnonzero(field)
     weight = field[vertices][:, None]
-    direction = np.array(DIRECTIONS[fap.positive])
+    direction = np.array(DIRECTIONS[entry.positive])
     swell = handle.bulge * np.clip(weight * (1 - weight), 0, None) * marks.surface.normals[vertices]
-    field = (weight * direction + swell) * marks.fapu[fap.unit]
+    field = (weight * direction + swell) * marks.fapu[entry.unit]
     return eased_linear_motion(marks.surface, limiter, vertices, field, handle.fap, pinned)
-
-
-def _point(fap: int) -> str:
-    return faps()[fap - 1].feature_points[0]
 
 
 def _rows(name: str) -> list[dict[str, str]]:

@@ -1,4 +1,4 @@
-"""The ears: FAPs 65-68. An ear moves as a whole about its soft root; pulled, its rim goes furthest."""
+"""The ears: FAPs 65-68. Raised, an ear moves as one about its soft root; pulled, its rim moves furthest."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion
 from fba.face.authoring.surface.motion_limits import eased_linear_motion
 from fba.face.authoring.surface.weights import average_with_neighbours, trim_small
-from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
 EARS = {
@@ -27,29 +26,27 @@ WHOLE, ROOT = 0.55, 1.15
 AROUND = (1.1, 1.7)
 """Multiples of the ear's size between which the motion of the head around it fades out."""
 WIDER = 1.2
+"""The ear is taken to be deeper, front to back, than its points say by this factor."""
 LEAST_PULL = 0.1
+"""Share of a pull that the root of the ear makes."""
 SMOOTHINGS = 6
 HEM = 0.006
 
 
 def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
     """(motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
-    found: dict[int, Motion] = {}
+    motions: dict[int, Motion] = {}
     lost: dict[int, str] = {}
     for fap, side in (RAISE | PULL).items():
-        point = faps()[fap - 1].feature_points[0]
-        if not marks.has(point):
-            lost[fap] = f"feature point {point} is not on the skin"
+        if reason := marks.missing_point(fap):
+            lost[fap] = reason
             continue
         share = _share(marks, side, pull=fap in PULL)
         vertices = np.flatnonzero(share)
-        entry = faps()[fap - 1]
-        step = np.array(DIRECTIONS[entry.positive]) * marks.fapu[entry.unit]
-        pinned = np.zeros(len(marks.surface), dtype=bool)
-        pinned[marks.vertex[point]] = True
-        field = share[vertices][:, None] * step
-        found[fap] = eased_linear_motion(marks.surface, limiter, vertices, field, fap, pinned)
-    return found, lost
+        pinned = marks.surface.mask(marks.vertices_of(faps()[fap - 1].feature_points))
+        field = share[vertices][:, None] * marks.step(fap)
+        motions[fap] = eased_linear_motion(marks.surface, limiter, vertices, field, fap, pinned)
+    return motions, lost
 
 
 def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
@@ -77,7 +74,5 @@ def _share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
 
 def _rim(marks: Landmarks, names: dict[str, str]) -> Intp:
     """Vertices around the ear, from its upper end at the face over the back to the lobe."""
-    known = [marks.vertex[names[key]] for key in ("top", "back", "lobe") if marks.has(names[key])]
-    walk = [np.array(known, dtype=np.intp)]
-    walk += [marks.surface.path(a, b) for a, b in pairwise(known)]
-    return np.unique(np.concatenate(walk))
+    known = marks.vertices_of(names[key] for key in ("top", "back", "lobe"))
+    return np.unique(np.concatenate([known, *(marks.surface.path(a, b) for a, b in pairwise(known))]))

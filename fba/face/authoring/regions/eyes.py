@@ -24,6 +24,11 @@ PUPIL_REACH = 1.5
 SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
 """Share of the pupil's, and of the iris's radius, at which the pupil stops."""
 
+YAW, PITCH = ("rotation", (0.0, 1.0, 0.0)), ("rotation", (1.0, 0.0, 0.0))
+THRUST = ("translation", (0.0, 0.0, 1.0))
+TRANSFORMS = {23: YAW, 24: YAW, 25: PITCH, 26: PITCH, 27: THRUST, 28: THRUST}
+"""Kind and amount per unit of the transforms of an eyeball, by FAP."""
+
 
 @dataclass(frozen=True, eq=False)
 class Eye:
@@ -53,7 +58,7 @@ def find_eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
     iris = marks.fapu.IRISD * 1024
     pupils = {side: marks.point_or_average(name) for side, name in (("left", "3.5"), ("right", "3.6"))}
     middle = float((pupils["left"][0] + pupils["right"][0]) / 2)
-    found = {}
+    eyes = {}
     for side, pupil in pupils.items():
         own = [
             part
@@ -66,8 +71,8 @@ def find_eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
             centre, radius = max(spheres, key=lambda fit: fit[1])[:2]
         else:
             centre = pupil - (0.0, 0.0, radius)
-        found[side] = Eye(side, tuple(part.name for part in own), centre, radius, pupil, bool(spheres))
-    return found
+        eyes[side] = Eye(side, tuple(part.name for part in own), centre, radius, pupil, bool(spheres))
+    return eyes
 
 
 def _middle(part: Part) -> Float64:
@@ -78,14 +83,7 @@ def _middle(part: Part) -> Float64:
 def eye_transforms(fap: int, eye: Eye) -> list[FaceDefTransform]:
     """The rotations (FAPs 23-26) or translations (27, 28) of an eye's parts for one FAP."""
     centre = tuple(eye.centre.tolist())
-    kind, amount = {
-        23: ("rotation", (0.0, 1.0, 0.0)),
-        24: ("rotation", (0.0, 1.0, 0.0)),
-        25: ("rotation", (1.0, 0.0, 0.0)),
-        26: ("rotation", (1.0, 0.0, 0.0)),
-        27: ("translation", (0.0, 0.0, 1.0)),
-        28: ("translation", (0.0, 0.0, 1.0)),
-    }[fap]
+    kind, amount = TRANSFORMS[fap]
     return [FaceDefTransform(name, kind, amount, centre) for name in eye.parts]
 
 
@@ -100,7 +98,7 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
     bends = np.array([(smallest - pupil) * 2 / unit, (largest - pupil) * 2 / unit])
     values = np.unique(np.round(np.clip([low, bends[0], 0, bends[1], high], low, high)))
     radii = np.clip(pupil + values * unit / 2, smallest, largest)
-    found = {}
+    motions = {}
     for part in parts:
         if part.name not in eye.parts:
             continue
@@ -112,28 +110,30 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
         if not (distance[moving] < PUPIL_REACH * pupil).any():
             continue
         outward = across[moving] / distance[moving, None]
-        now = np.array([np.interp(distance[moving], [0, pupil, iris], [0, radius, iris]) for radius in radii])
-        shifts = (now - distance[moving])[:, :, None] * outward
-        shifts += (_depth(distance, along, now) - _depth(distance, along, distance[moving][None]))[
-            :, :, None
-        ] * eye.gaze
+        before = distance[moving]
+        after = np.array([np.interp(before, [0, pupil, iris], [0, radius, iris]) for radius in radii])
+        sunk = _depth(distance, along, after) - _depth(distance, along, before[None])
+        shifts = (after - before)[:, :, None] * outward + sunk[:, :, None] * eye.gaze
         shifts[values == 0] = 0.0
-        motion = Motion(values, moving, shifts)
-        found[part.name] = stop_at_folds(Limiter(points, part.triangles.astype(np.intp)), motion)
-    return found
+        limiter = Limiter.from_mesh(points, part.triangles.astype(np.intp))
+        motions[part.name] = stop_at_folds(limiter, Motion(values, moving, shifts))
+    return motions
 
 
-def _depth(distance: Float64, along: Float64, at: Float64) -> Float64:
-    """Depth of an eye's surface along the gaze at some distances from its axis, from its own vertices."""
+def _depth(distance: Float64, along: Float64, wanted: Float64) -> Float64:
+    """Depth along the gaze of an eye's surface at the wanted distances from its axis.
+
+    distance, along: of its vertices, from the axis and along it, metres.
+    """
     front = along > 0
     order = np.argsort(distance[front], kind="stable")
     near, deep = distance[front][order], along[front][order]
-    bins = np.linspace(0, max(float(at.max(initial=0.0)) * 1.2, 1e-9), 13)
+    bins = np.linspace(0, max(float(wanted.max(initial=0.0)) * 1.2, 1e-9), 13)
     which = np.digitize(near, bins)
     used = [k for k in range(1, len(bins)) if (which == k).any()]
     if len(used) < 2:
-        return np.zeros_like(at)
-    where = [float(near[which == k].mean()) for k in used]
-    what = [float(deep[which == k].max()) for k in used]
-    result: Float64 = np.interp(at, where, what)
+        return np.zeros_like(wanted)
+    distances = [float(near[which == k].mean()) for k in used]
+    depths = [float(deep[which == k].max()) for k in used]
+    result: Float64 = np.interp(wanted, distances, depths)
     return result

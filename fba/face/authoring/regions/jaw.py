@@ -8,8 +8,9 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
-from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.face.authoring.surface.motion import fap_limits
+from fba.face.authoring.surface.surface import weld_parts
 from fba.face.authoring.surface.weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.model import Part
 from fba.face.points import OPEN_JAW
@@ -17,23 +18,8 @@ from fba.face.points import OPEN_JAW
 CHIN = ("2.1", "2.10", "2.11", "2.12")
 EARS = ("10.7", "10.8", "10.9", "10.10")
 """Where the ears meet the face; the hinge lies between them."""
-STILL = (
-    "5.3",
-    "5.4",
-    "9.1",
-    "9.2",
-    "9.3",
-    "9.15",
-    "3.9",
-    "3.10",
-    "10.5",
-    "10.6",
-    "10.7",
-    "10.8",
-    "10.9",
-    "10.10",
-    "8.1",
-)
+STILL = (*EARS, "3.9", "3.10", "5.3", "5.4", "8.1", "9.1", "9.2", "9.3", "9.15", "10.5", "10.6")
+"""Feature points that the jaw does not move."""
 REACH = 1.5
 """Reach of the jaw's motion into cheeks and neck, in ES0."""
 NECK = 0.1
@@ -50,7 +36,9 @@ LIP_RIDE = 0.5
 """Share of a sliding jaw's motion that the lower lip makes. It does not follow an opening jaw: it has its
 own FAPs for that."""
 SLACK = 0.2
+"""Distance in ES0 beyond which the skin does not overshoot."""
 HEM = 0.004
+"""Shares of a motion below this are set to 0."""
 TEETH_MARGIN = 0.12
 """In a piece of teeth the jaw's share goes from 0 to 1 within this height about their edge, in MNS0."""
 CHEEK_MARGIN = 0.4
@@ -79,8 +67,8 @@ class Jaw:
 
 def find_jaw(marks: Landmarks) -> Jaw | str:
     """The jaw of a face, or the reason why it has none."""
-    if not marks.has("2.1"):
-        return "feature point 2.1 is not on the skin"
+    if reason := marks.missing_point(OPEN_JAW):
+        return reason
     ears = np.array([marks.point_or_average(name) for name in EARS])
     hinge = ears.mean(axis=0)[1:]
     chin = marks.point("2.1")
@@ -122,10 +110,10 @@ def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
 
 def bite_height(marks: Landmarks) -> float:
     """Height (y, metres) at which upper and lower teeth meet."""
-    heights = [marks.point(name)[1] for name in ("9.10", "9.11")]
-    known = [h for h in heights if np.isfinite(h)]
-    lips = [marks.point(name)[1] for name in ("2.2", "2.3")]
-    return float(np.mean(known or [h for h in lips if np.isfinite(h)] or [marks.point_or_average("9.10")[1]]))
+    known: list[float] = []
+    for pair in (("9.10", "9.11"), ("2.2", "2.3")):
+        known = known or [height for name in pair if np.isfinite(height := marks.point(name)[1])]
+    return float(np.mean(known or [marks.point_or_average("9.10")[1]]))
 
 
 def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
@@ -143,11 +131,9 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
 
     A connected piece on one side of the teeth's edge moves as one: a tooth does not bend.
     """
-    from fba.face.authoring.surface.surface import Surface
-
     if part.kind == "tongue":
         return np.ones(len(part.vertices))
-    shape = Surface([part])
+    shape = weld_parts([part])
     margin = TEETH_MARGIN * marks.fapu.MNS * 1024
     each = smoothstep(below_bite(marks, shape.vertices, hinge) / (2 * margin) + 0.5)
     if part.kind == "teeth":
@@ -169,10 +155,10 @@ def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
     """1 for the lower teeth, 0 for the upper, where the feature points of only one row are on a part."""
     close = {}
     for row, names in ((0.0, ("9.8", "9.10")), (1.0, ("9.9", "9.11"))):
-        known = [place for name in names if np.isfinite(place := marks.point(name)).all()]
+        known = [point for name in names if np.isfinite(point := marks.point(name)).all()]
         if not known:
             return None
-        away = [float(np.linalg.norm(part.vertices - place, axis=1).min()) for place in known]
+        away = [float(np.linalg.norm(part.vertices - point, axis=1).min()) for point in known]
         close[row] = max(away) < 0.05 * marks.fapu.MNS * 1024
     if close[0.0] == close[1.0]:
         return None
@@ -180,29 +166,24 @@ def _by_teeth_points(marks: Landmarks, part: Part) -> float | None:
 
 
 def _share(marks: Landmarks, hinge: Float64) -> Float64:
+    """(N,) share of the opening at each vertex of the surface."""
     surface, es = marks.surface, marks.fapu.ES * 1024
-    one = {marks.vertex[name]: 1.0 for name in CHIN if marks.has(name)}
     line = marks.contour("jaw line")
     values: dict[int, float] = {}
     if len(line):
         values |= dict(zip(line.tolist(), _along_jaw(marks, line).tolist(), strict=True))
-    values |= {marks.vertex[name]: CORNER for name in ("2.13", "2.14") if marks.has(name)}
-    values |= one
+    values |= dict.fromkeys(marks.vertices_of(("2.13", "2.14")).tolist(), CORNER)
+    values |= dict.fromkeys(marks.vertices_of(CHIN).tolist(), 1.0)
     source = np.array(sorted(values))
-    lips = (
-        marks.on_contours("lower outer lip", "upper outer lip", "lower inner lip", "upper inner lip")
-        | marks.lips
-    )
+    lips = marks.on_contours(*LIP_CONTOURS) | marks.lips
     # the neck's lower end joins a body that does not move
     end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK * es)
-    still = np.unique(
-        [*np.flatnonzero(lips | end), *(marks.vertex[name] for name in STILL if marks.has(name))]
-    )
+    still = np.union1d(np.flatnonzero(lips | end), marks.vertices_of(STILL))
     inside = marks.inside_mouth
     near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
     free = reachable_region(near, far, REACH * es) & ~inside & ~lips
     fixed = np.concatenate([source, np.flatnonzero(lips)])
-    given = np.concatenate([[values[int(v)] for v in source], np.zeros(int(lips.sum()))])
+    given = np.concatenate([[values[int(vertex)] for vertex in source], np.zeros(int(lips.sum()))])
     if inside.any():
         depth = surface.distances(np.flatnonzero(lips | marks.on_inner_lips))
         below = below_bite(marks, surface.vertices, hinge)
@@ -218,7 +199,7 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
     """(M,) shares along the jaw line: 1 between the corners of the chin, less towards those of the jaw."""
-    chin = [k for k, v in enumerate(line) if v in {marks.vertex.get(name) for name in CHIN}]
+    chin = np.flatnonzero(np.isin(line, marks.vertices_of(CHIN)))
     steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     first, last = length[chin[0]], length[chin[-1]]
@@ -229,9 +210,8 @@ def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     """(N,) shares of a sliding jaw's motion: half on the lower lip, none on the upper one."""
-    lower = marks.on_contours("lower outer lip", "lower inner lip")
     upper = marks.on_contours("upper outer lip", "upper inner lip")
-    lower &= ~upper
+    lower = marks.on_contours("lower outer lip", "lower inner lip") & ~upper
     if not lower.any():
         return share
     # interpolated over lips and skin between chin, lower lip and upper lip
@@ -239,12 +219,10 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     surface = marks.surface
     close = surface.distances(np.flatnonzero(lower), 0.6 * es) < 0.5 * es
     along = _from_corners(marks, np.flatnonzero(lower))
-    fixed = np.flatnonzero(lower | upper | ~close)
+    fixed = np.flatnonzero(lower | upper | ~close | (share > 0.9))
     given = share.copy()
     given[upper] = 0.0
-    given[np.flatnonzero(lower)] = LIP_RIDE * along
-    near_jaw = close & (share > 0.9)
-    fixed = np.union1d(fixed, np.flatnonzero(near_jaw))
+    given[lower] = LIP_RIDE * along
     field = solve_smooth_field(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
     return trim_small(np.clip(field, 0.0, 1.0), HEM)
 

@@ -1,7 +1,8 @@
-"""Eyelids: FAPs 19-22. Every vertex of a lid stays in its own upright plane and turns about the eyeball.
+"""Eyelids and their lashes: FAPs 19-22.
 
-A lid closes column by column, each in proportion to its own opening, so that the margins meet along their
-whole length however the way is split between upper and lower lid.
+Every vertex of a lid stays in its own upright plane and turns about the eyeball. A lid closes column by
+column, each in proportion to its own opening, so that the margins meet along their whole length however the
+way is split between upper and lower lid.
 """
 
 from __future__ import annotations
@@ -13,17 +14,19 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
 from fba.face.authoring.regions._lid_clearance import (
-    Profile,
     edge_length,
+    measure_profile,
     push_edges_outside,
     push_vertices_outside,
 )
 from fba.face.authoring.regions.eye_opening import CLOSED, LIDS, Opening, measure_opening, slide_lid
 from fba.face.authoring.regions.eyes import Eye
+from fba.face.authoring.surface.attached_parts import hair_roots
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, fap_limits
 from fba.face.authoring.surface.motion_limits import stop_at_folds
+from fba.face.authoring.surface.surface import weld_parts
 from fba.face.authoring.surface.unfold import unfold
 from fba.face.authoring.surface.weights import average_with_neighbours, trim_small
 from fba.face.model import Part
@@ -77,17 +80,16 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     points = marks.surface.vertices[vertices]
     values = lid_values(fap)
     shifts = slide_lid(points, share[vertices], opening, eye, lid, values / CLOSED)
-    profile = Profile(eye, parts, edge_length(marks, own, other))
+    profile = measure_profile(eye, parts, edge_length(marks, own, other))
     shifts = push_vertices_outside(profile, points, shifts, values)
-    pinned = np.zeros(len(marks.surface), dtype=bool)
-    pinned[own] = pinned[other] = True
+    margins = np.concatenate([own, other])
+    pinned = marks.surface.mask(margins)
     motion = unfold(marks.surface, limiter, Motion(values, vertices, shifts), pinned, True)
     points = marks.surface.vertices[motion.vertices]
     shifts = push_vertices_outside(profile, points, motion.shifts, values)
     shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
     motion = Motion(values, motion.vertices, shifts)
     # in the corners skin closes on itself
-    margins = np.concatenate([own, other])
     ends = marks.surface.vertices[own[[0, -1]]]
     near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)
     corners = margins[near < CORNER * np.linalg.norm(ends[1] - ends[0])]
@@ -114,7 +116,7 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     """
     surface, es, side = marks.surface, marks.fapu.ES * 1024, eye.side
     stays = np.setdiff1d(other, own)
-    still = [marks.vertex[name] for name in STILL[side] if marks.has(name)]
+    still = marks.vertices_of(STILL[side])
     away = surface.distances(own, 2 * REACH * es)
     crease = CREASE * es
     if marks.has(FOLD[side, lid]):
@@ -125,15 +127,13 @@ def _share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, ot
     folds = away / (crease * (NARROW + (1 - NARROW) * high))
     power = np.log(AT_CREASE) / np.log(1 - (1 - EDGE) / (end - EDGE)) if end > 1 + EDGE else 2.0
     share = np.clip((end - np.maximum(folds, EDGE)) / (end - EDGE), 0.0, 1.0) ** power
-    share *= 1 + _overhang(surface.vertices, opening, eye, lid, gap.max()) * np.clip(
-        2 - folds / EDGE, 0.0, 1.0
-    )
+    overhang = _overhang(surface.vertices, opening, eye, lid, gap.max())
+    share *= 1 + overhang * np.clip(2 - folds / EDGE, 0.0, 1.0)
     opposite = surface.distances(stays, 4 * REACH * es)
     with np.errstate(invalid="ignore"):
         share *= smoothstep(np.nan_to_num(opposite / (away + opposite), nan=1.0) / OWN_SIDE)
     # distances along edges are uneven
-    pinned = np.zeros(len(surface), dtype=bool)
-    pinned[own] = pinned[stays] = True
+    pinned = surface.mask(np.concatenate([own, stays]))
     share[own] = 1.0
     share[stays] = 0.0
     share = np.where(pinned, share, average_with_neighbours(surface, share, SMOOTHINGS))
@@ -152,3 +152,43 @@ def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: flo
     back = np.maximum(sign * (points[:, 1] - eye.centre[1] - height), 0.0)
     further = np.clip(2 * back / np.maximum(gap, 0.2 * widest), 0.0, FURTHER)
     return np.where(before, further, 0.0)
+
+
+def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) -> Motion:
+    """The motion of a part's lashes for a lid's FAP: each vertex turns as its root on the margin does.
+
+    skin: the motion of the surface for that FAP.
+    """
+    from scipy.spatial import cKDTree
+
+    side, lid = LIDS[fap]
+    opening = measure_opening(marks, eye)
+    assert opening is not None  # the lid moves, so there is one
+    shape = weld_parts([part])
+    reach = [
+        cKDTree(marks.surface.vertices[marks.contour(f"{side} {which} lid")]).query(shape.vertices)[0]
+        for which in ("upper", "lower")
+    ]
+    pieces = shape.component
+    closest = [np.full(pieces.max() + 1, np.inf) for _ in reach]
+    for best, away in zip(closest, reach, strict=True):
+        np.minimum.at(best, pieces, away)
+    wide = opening.x[-1] - opening.x[0]
+    mean = np.bincount(pieces, shape.vertices[:, 1]) / np.bincount(pieces)
+    middle = float((opening.upper[:, 0] + opening.lower[:, 0]).mean()) / 2 + eye.centre[1]
+    upper = np.where(np.abs(closest[0] - closest[1]) < 0.1 * wide, mean > middle, closest[0] < closest[1])
+    grows = (upper == (lid == "upper")) & (np.minimum(*closest) < 0.25 * wide)
+    root = hair_roots(shape, reach[0 if lid == "upper" else 1])
+    moving = np.flatnonzero(grows[pieces][shape.number])
+    points = part.vertices[moving].astype(np.float64)
+    columns = shape.vertices[root[shape.number[moving]], 0]
+    ways = np.clip(skin.values, *_moving_range(skin)) / CLOSED
+    turns = slide_lid(points, np.ones(len(points)), opening, eye, lid, ways, columns=columns)
+    return Motion(skin.values, moving, turns)
+
+
+def _moving_range(skin: Motion) -> tuple[float, float]:
+    """(lowest, highest) value at which a motion still goes on."""
+    moved = np.abs(np.diff(skin.shifts, axis=0)).max(axis=(1, 2)) > 0
+    used = np.flatnonzero(moved)
+    return (float(skin.values[used[0]]), float(skin.values[used[-1] + 1])) if len(used) else (0.0, 0.0)

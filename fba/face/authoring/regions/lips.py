@@ -15,7 +15,7 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
 from fba.face.authoring.surface.fold_limits import Limiter
-from fba.face.authoring.surface.landmarks import Landmarks
+from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.face.authoring.surface.motion import Motion, fap_limits
 from fba.face.authoring.surface.motion_limits import (
     eased_linear_motion,
@@ -28,7 +28,6 @@ from fba.face.authoring.surface.motion_limits import (
 )
 from fba.face.authoring.surface.unfold import ease_field
 from fba.face.authoring.surface.weights import reachable_region, solve_smooth_field, trim_small
-from fba.face.points import DIRECTIONS
 from fba.parameters import faps
 
 HANDLES = {
@@ -54,7 +53,6 @@ ALONG = {
 PUSH = (16, 17)
 OUTER_PUSH = 0.9
 """Share of a push of the inner contour that the outer one makes, which has no such FAP."""
-LINES = ("upper inner lip", "lower inner lip", "upper outer lip", "lower outer lip")
 REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.3
@@ -83,39 +81,40 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
     if len(lost) == len(numbers):
         return {}, lost
     lips = _fields(marks)
-    found: dict[int, Motion] = {}
+    motions: dict[int, Motion] = {}
     for number in numbers:
         mate = faps()[number - 1].lip_mate
-        if number in lost or number in found:
+        if number in lost or number in motions:
             continue
-        full_field = _direction(marks, number)[None] * _fap_field(lips, number)[:, None]
+        full_field = marks.step(number)[None] * _fap_field(lips, number)[:, None]
         if number in PUSH:
             share = lips.inward + OUTER_PUSH * (1 - lips.inward)
-            found[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
+            motions[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
         elif mate is None or mate in lost:
             share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
-            found[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
+            motions[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
         elif number < mate:
             full_field = ease_field(
-                marks.surface, limiter, full_field, values_to_reach(number), marks.on_contours(*LINES)
+                marks.surface, limiter, full_field, values_to_reach(number), marks.on_contours(*LIP_CONTOURS)
             )
             inward = lips.inward[:, None]
             pair = _coupled_motions(limiter, full_field * inward, full_field * (1 - inward), number)
-            found[number], found[mate] = pair
-    return found, lost
+            motions[number], motions[mate] = pair
+    return motions, lost
 
 
 def _missing_reason(marks: Landmarks, number: int) -> str:
+    """Why the lips cannot follow a FAP; empty where they can."""
+    if reason := marks.missing_point(number):
+        return reason
     point = faps()[number - 1].feature_points[0]
-    if not marks.has(point):
-        return f"feature point {point} is not on the skin"
     inner = faps()[number - 1].group == 2
     side = "inner" if inner else "outer"
     if not marks.has(*(("2.4", "2.5") if inner else ("8.3", "8.4"))):
         return f"a corner of the {side} lip contour is not on the skin"
-    needed = [name for name in ("upper", "lower") if not len(marks.contour(f"{name} {side} lip"))]
-    if needed:
-        return f"there is no {needed[0]} {side} lip contour"
+    for half in ("upper", "lower"):
+        if not len(marks.contour(f"{half} {side} lip")):
+            return f"there is no {half} {side} lip contour"
     own = next(pair for pair in HANDLES.values() if point in pair)
     if not inner and marks.vertex.get(own[0]) == marks.vertex[point]:
         return f"feature point {point} stands on the same vertex as {own[0]}, which the inner lip's FAP moves"
@@ -124,12 +123,8 @@ def _missing_reason(marks: Landmarks, number: int) -> str:
     return ""
 
 
-def _direction(marks: Landmarks, number: int) -> Float64:
-    fap = faps()[number - 1]
-    return np.array(DIRECTIONS[fap.positive]) * marks.fapu[fap.unit]
-
-
 def _fap_field(lips: _Lips, number: int) -> Float64:
+    """(N,) share of a FAP's motion at each vertex, of both contours."""
     along = ALONG.get(number) or ALONG.get(faps()[number - 1].lip_mate or 0)
     point = faps()[number - 1].feature_points[0]
     own = next(name for name, pair in HANDLES.items() if point in pair)
@@ -160,8 +155,7 @@ def _fields(marks: Landmarks) -> _Lips:
     fixed = np.flatnonzero(~np.isnan(values[:, 0]))
     es = marks.fapu.ES * 1024
     near = marks.surface.distances(fixed, limit=2 * REACH * es)
-    still = [marks.vertex[name] for name in STILL if marks.has(name)]
-    far = marks.surface.distances(still, limit=4 * REACH * es)
+    far = marks.surface.distances(marks.vertices_of(STILL), limit=4 * REACH * es)
     free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
@@ -170,6 +164,7 @@ def _fields(marks: Landmarks) -> _Lips:
 
 
 def _inward(marks: Landmarks) -> Float64:
+    """(N,) 1 on the inner contour and behind it, 0 on the outer contour and beyond, smooth between."""
     inner = marks.on_inner_lips | marks.inside_mouth
     outer = marks.on_contours("upper outer lip", "lower outer lip") & ~marks.on_inner_lips
     for inner_point, outer_point in HANDLES.values():
@@ -190,7 +185,7 @@ def _inward(marks: Landmarks) -> Float64:
 def _motion_along(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:
     vertices = np.flatnonzero(np.abs(field).max(axis=1) > 0)
     return eased_linear_motion(
-        marks.surface, limiter, vertices, field[vertices], fap, marks.on_contours(*LINES)
+        marks.surface, limiter, vertices, field[vertices], fap, marks.on_contours(*LIP_CONTOURS)
     )
 
 
@@ -224,8 +219,8 @@ def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int)
         ahead = soft_limit(joint, apart)
         stops, goes = (inner, outer) if inner_stops else (outer, inner)
         alone, taking = ahead * stops, joint * goes + (joint - ahead) * stops
-        for place, shift in zip(moves, (alone, taking) if inner_stops else (taking, alone), strict=True):
-            place.append(shift[vertices])
+        for shifts, shift in zip(moves, (alone, taking) if inner_stops else (taking, alone), strict=True):
+            shifts.append(shift[vertices])
     motions = [stop_at_folds(limiter, Motion(values, vertices, np.array(shifts))) for shifts in moves]
     return motions[0], motions[1]
 
@@ -241,10 +236,12 @@ def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) 
 
     steps = np.linalg.norm(np.diff(vertices[walk], axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
-    place = {int(v): k for k, v in enumerate(walk)}
-    known = [(length[place[node]], float(k)) for k, node in enumerate(nodes) if node is not None]
-    along = np.array([k for _, k in known]) if len(known) == len(walk) else None
-    number = along if along is not None else PchipInterpolator(*zip(*known, strict=True))(length)
+    step = {int(vertex): k for k, vertex in enumerate(walk)}
+    known = [(length[step[node]], float(k)) for k, node in enumerate(nodes) if node is not None]
+    if len(known) == len(walk):
+        number = np.array([k for _, k in known])
+    else:
+        number = PchipInterpolator(*zip(*known, strict=True))(length)
     return _cardinal(np.clip(number, 0, len(nodes) - 1), len(nodes))
 
 

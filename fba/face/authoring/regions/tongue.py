@@ -11,8 +11,7 @@ from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.motion import Motion, fap_limits
 from fba.face.authoring.surface.motion_limits import human_range, linear_motion, stop_at_folds
 from fba.face.model import Part
-from fba.face.points import DIRECTIONS, TONGUE_ROLL
-from fba.parameters import faps
+from fba.face.points import TONGUE_ROLL
 
 FAPS = (43, 44, 45, 46, 47)
 POINTS = {43: ("6.1",), 44: ("6.1",), 45: ("6.1",), 46: ("6.2",), 47: ("6.2", "6.3", "6.4")}
@@ -27,7 +26,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
     if missing:
         return f"feature point {missing[0]} is unknown"
     points = part.vertices.astype(np.float64)
-    limiter = Limiter(points, part.triangles.astype(np.intp))
+    limiter = Limiter.from_mesh(points, part.triangles.astype(np.intp))
     if fap == TONGUE_ROLL:
         return stop_at_folds(limiter, _roll(marks, points))
     tip = marks.point("6.1")
@@ -46,11 +45,8 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
         share = length
     else:
         share = length**TIP_BEND
-    entry = faps()[fap - 1]
-    direction = np.array(DIRECTIONS[entry.positive]) * marks.fapu[entry.unit]
-    return linear_motion(
-        limiter, np.arange(len(points)), share[:, None] * direction, *fap_limits(fap), human_range(fap)
-    )
+    field = share[:, None] * marks.step(fap)
+    return linear_motion(limiter, np.arange(len(points)), field, *fap_limits(fap), human_range(fap))
 
 
 def _roll(marks: Landmarks, points: Float64) -> Motion:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
-from fba.arrays import Bool, Float64
+from fba.arrays import Bool, Float64, Intp
 from fba.easing import smoothstep
 from fba.face.authoring.shapes._shapes import Shapes
+from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.fold_limits import Limiter
 from fba.face.authoring.surface.motion import Motion, build_tables, fap_limits, split_by_part
 from fba.face.authoring.surface.motion_limits import EASE, MODERATE, linear_motion
@@ -41,38 +45,51 @@ REGIONS = (
     (*range(61, 65),),
 )
 """FAPs that move the same stretch of skin."""
-SKIN_KINDS = ("skin", "mouth")
 
 
+@dataclass(frozen=True, eq=False)
 class Mixer:
     """Mixes shapes for the FAPs of a face that `author` has made."""
 
-    def __init__(self, base: FaceModel, shapes: Shapes) -> None:
-        self.base, self.shapes = base, shapes
-        self.unit = {fap.number: base.fapu[fap.unit] for fap in faps() if fap.unit}
-        self.points = self._points()
-        vertices = np.array([base.bound[row_of()[name]] for name in self.points], dtype=np.intp)
-        self.vertices = vertices
-        self.at = shapes.displacements_at(vertices)
-        columns = [self.weight(fap) for fap in self.points.values()]
-        self.weights = np.stack(columns, axis=1) if columns else np.zeros((len(base.vertices), 0))
-        # motion of each point when another one is moved by its own table
-        self.coupling = self.weights[vertices]
+    base: FaceModel
+    shapes: Shapes
 
-    def _points(self) -> dict[str, int]:
-        """Feature points of the skin that a FAP moves linearly, with the FAP that gives their weights."""
-        found: dict[str, int] = {}
-        for region in REGIONS:
-            for fap in region:
-                names = faps()[fap - 1].feature_points
-                if len(names) == 1 and fap in self.base.table_of and self.base.bound[row_of()[names[0]]] >= 0:
-                    found.setdefault(names[0], fap)
-        return found
+    @cached_property
+    def points(self) -> dict[str, int]:
+        """The P feature points of the skin that FAPs move linearly, and the FAP that gives their weights."""
+        points: dict[str, int] = {}
+        for fap in (fap for region in REGIONS for fap in region):
+            names = faps()[fap - 1].feature_points
+            if len(names) == 1 and fap in self.base.table_of and self.base.bound[row_of()[names[0]]] >= 0:
+                points.setdefault(names[0], fap)
+        return points
+
+    @cached_property
+    def vertices(self) -> Intp:
+        """(P,) vertices that the points stand on."""
+        return np.array([self.base.bound[row_of()[name]] for name in self.points], dtype=np.intp)
+
+    @cached_property
+    def weights(self) -> Float64:
+        """(V, P) share of each point's way that each vertex makes when the point's own table moves it."""
+        columns = [self.weight(fap) for fap in self.points.values()]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.base.vertices), 0))
+
+    @cached_property
+    def moves(self) -> Float64:
+        """(H, P, 3) displacement of each point by each half of a shape, metres."""
+        return self.shapes.displacements_at(self.vertices)
+
+    def step(self, fap: int) -> Float64:
+        """(3,) displacement, metres, of the point of a FAP by one unit of its value."""
+        entry = faps()[fap - 1]
+        return np.asarray(np.array(DIRECTIONS[entry.positive]) * self.base.fapu[entry.unit])
 
     def weight(self, fap: int) -> Float64:
         """(V,) share of its point's way that each vertex makes for small values of a FAP."""
         field = first_steps(self.base, fap, 1.0)
-        return np.asarray(field @ np.array(DIRECTIONS[faps()[fap - 1].positive]) / self.unit[fap])
+        entry = faps()[fap - 1]
+        return np.asarray(field @ np.array(DIRECTIONS[entry.positive]) / self.base.fapu[entry.unit])
 
     def tables(self, group: tuple[int, ...]) -> tuple[dict[int, FaceDefTables], set[str]]:
         """(tables of a group of FAPs made from shapes, names of the shapes); empty without fitting shapes."""
@@ -103,21 +120,21 @@ class Mixer:
                 first_steps(self.base, fap, sign) + (share * details[sign] if sign in details else 0.0)
                 for sign in (-1.0, 1.0)
             )
-            table = fold_limited_tables(self.base, fap, down, up)
+            table = fold_limited_tables(self.shapes, fap, down, up)
             if table is not None:
                 made[fap] = table
         return made, used
 
     def _points_moved_together(self, group: tuple[int, ...]) -> dict[str, int]:
         """Points that shapes move together, with their FAPs: those of a group and of its inner lip mates."""
-        found = {faps()[fap - 1].feature_points[0]: fap for fap in group}
+        points = {faps()[fap - 1].feature_points[0]: fap for fap in group}
         for fap in group:
             mate = faps()[fap - 1].lip_mate
             if mate is not None and mate in self.base.table_of:
                 name = faps()[mate - 1].feature_points[0]
                 if name in self.points:
-                    found[name] = mate
-        return found
+                    points[name] = mate
+        return points
 
     def _value(self, fap: int) -> float:
         from fba.face.gltf.morphs import morph_values
@@ -129,7 +146,7 @@ class Mixer:
         wanted = np.zeros((len(self.points), 3))
         names = list(self.points)
         for name, fap in self._points_moved_together(group).items():
-            wanted[names.index(name)] = np.array(DIRECTIONS[faps()[fap - 1].positive]) * self.unit[fap]
+            wanted[names.index(name)] = self.step(fap)
         return wanted
 
     def _solve_weights(self, group: tuple[int, ...], sign: float) -> Float64 | None:
@@ -144,14 +161,14 @@ class Mixer:
         weight[own] = np.where(np.abs(target[own]) > 0, OWN, ACROSS)
         weight /= length.max()
         halves = len(self.shapes.halves)
-        system = (self.at * weight).reshape(halves, -1).T
+        system = (self.moves * weight).reshape(halves, -1).T
         solution = lsq_linear(
             np.concatenate([system, RIDGE * np.eye(halves)]),
             np.concatenate([(target * weight).reshape(-1), np.zeros(halves)]),
             bounds=(0.0, MOST_WEIGHT),
         ).x
         solution[solution < 1e-3] = 0.0
-        moved = np.einsum("h,hpk->pk", solution, self.at)
+        moved = np.einsum("h,hpk->pk", solution, self.moves)
         outer = [list(self.points).index(faps()[fap - 1].feature_points[0]) for fap in group]
         shares = (moved[outer] * target[outer]).sum(axis=1) / length[outer] ** 2
         if shares.mean() < LEAST_SHARE or shares.min() < LEAST_OF_ONE:
@@ -163,7 +180,9 @@ class Mixer:
         region = next(region for region in REGIONS if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
         step = step * smoothstep(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
-        rest, *_ = np.linalg.lstsq(self.coupling, self._steps(group) - step[self.vertices], rcond=1e-6)
+        rest, *_ = np.linalg.lstsq(
+            self.weights[self.vertices], self._steps(group) - step[self.vertices], rcond=1e-6
+        )
         return np.asarray(step + self.weights @ rest)
 
     def replacement_tables(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
@@ -178,8 +197,8 @@ class Mixer:
         along = float(field[vertex] @ way)
         if not along > 0:
             return None
-        step = field * self.unit[fap] / along
-        return fold_limited_tables(self.base, fap, step, step)
+        step = field * self.base.fapu[entry.unit] / along
+        return fold_limited_tables(self.shapes, fap, step, step)
 
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
@@ -193,24 +212,18 @@ def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
     return field
 
 
-def fold_limited_tables(model: FaceModel, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
-    """Tables of a FAP, limited where the skin would fold, or None where nothing moves.
+def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
+    """Tables of a FAP of the shapes' model, limited where the skin would fold, or None where nothing moves.
 
     down, up: (V, 3), metres a step below and above 0.
     """
-    skins = [part for part in model.parts if part.kind in SKIN_KINDS]
-    surface = Surface(skins)
-    pool = np.concatenate(
-        [np.arange(model.starts[part.name], model.starts[part.name] + len(part.vertices)) for part in skins]
-    )
-    pinned = np.zeros(len(surface), dtype=bool)
-    place = np.full(len(model.vertices), -1)
-    place[pool] = surface.number
-    bound_vertices = model.bound[model.bound >= 0]
-    pinned[place[bound_vertices][place[bound_vertices] >= 0]] = True
+    model, surface = shapes.model, shapes.surface
+    bound = surface.find(model.bound)
+    pinned = surface.mask(bound[bound >= 0])
     low, high = fap_limits(fap)
-    below = _side(surface, surface_field(surface, down[pool]), low, pinned)
-    above = _side(surface, surface_field(surface, up[pool]), high, pinned)
+    below, above = (
+        _one_way(surface, field[surface.pool], end, pinned) for field, end in ((down, low), (up, high))
+    )
     values = np.array([*below.values[below.values < 0], 0.0, *above.values[above.values > 0]])
     moving = np.union1d(below.vertices, above.vertices)
     shifts = np.zeros((len(values), len(surface), 3))
@@ -222,27 +235,22 @@ def fold_limited_tables(model: FaceModel, fap: int, down: Float64, up: Float64) 
         share[k] = _progress(side, value)
     motions = split_by_part(surface, Motion(values, moving, shifts[:, moving]))
     for part in model.parts:
-        if part.kind in SKIN_KINDS:
+        if part.kind in SURFACE_KINDS:
             continue
         own = slice(model.starts[part.name], model.starts[part.name] + len(part.vertices))
-        which = np.flatnonzero(np.abs(down[own]).max(axis=1) + np.abs(up[own]).max(axis=1) > 0)
-        if len(which):
-            steps = np.where((share < 0)[:, None, None], down[own][which], up[own][which])
-            motions[part.name] = Motion(values, which, steps * share[:, None, None])
+        moved = np.flatnonzero(np.abs(down[own]).max(axis=1) + np.abs(up[own]).max(axis=1) > 0)
+        if len(moved):
+            steps = np.where((share < 0)[:, None, None], down[own][moved], up[own][moved])
+            motions[part.name] = Motion(values, moved, steps * share[:, None, None])
     made = build_tables(fap, model.fapu[faps()[fap - 1].unit], motions)
     return made if made.meshes else None
 
 
-def surface_field(surface: Surface, moves: Float64) -> Float64:
-    """(N, 3) on the welded surface of displacements of the parts that it was made of."""
+def _one_way(surface: Surface, moves: Float64, end: float, pinned: Bool) -> Motion:
+    """The linear motion from 0 to one end, limited where triangles would fold. moves: (V, 3), of the skin."""
+    limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
     field = np.zeros((len(surface), 3))
     field[surface.number] = moves
-    return field
-
-
-def _side(surface: Surface, field: Float64, end: float, pinned: Bool) -> Motion:
-    """The linear motion from 0 to one end, limited where triangles would fold."""
-    limiter = Limiter(surface.vertices, surface.triangles)
     if not field.any() or not end:
         return Motion(np.array(sorted((0.0, end or 1.0))), np.zeros(0, dtype=np.intp), np.zeros((2, 0, 3)))
     goal = float(np.sign(end)) * min(MODERATE / EASE[0], abs(end))

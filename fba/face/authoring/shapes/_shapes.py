@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,8 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64, Floating
 from fba.easing import smoothstep
 from fba.errors import ModelError
+from fba.face.authoring.surface.binding import SURFACE_KINDS
+from fba.face.authoring.surface.surface import Surface, weld_parts
 from fba.face.model import FaceModel, Part
 
 BLEND = 0.12
@@ -29,28 +32,44 @@ class Half:
     side: int
 
 
+@dataclass(frozen=True, eq=False)
 class Shapes:
-    """Shapes of a face model.
+    """Shapes of a face model; `check_shapes` makes them from unchecked ones.
 
-    morphs: displacements (V, 3) at weight 1, in metres, by shape and part. Raises ModelError where a part
-    does not exist, has another number of vertices, or moves by numbers that are not finite.
+    morphs: displacements (V, 3) at weight 1, in metres, by shape and part.
     """
 
-    def __init__(self, model: FaceModel, morphs: Morphs) -> None:
-        self.model = model
-        self.morphs = {
-            shape: check_displacements(model.parts, shape, moved) for shape, moved in morphs.items()
-        }
-        middle = float(np.nanmean(model.points[:, 0]))
-        width = max(2 * BLEND * model.fapu.ES * 1024, 1e-9)
-        self._left = smoothstep((model.vertices[:, 0].astype(np.float64) - middle) / width + 0.5)
-        self.halves = [half for shape in self.morphs for half in self._halves(shape)]
+    model: FaceModel
+    morphs: Mapping[str, Mapping[str, Float32]]
+
+    @cached_property
+    def _left(self) -> Float64:
+        """(V,) share of the left half at each vertex of the model."""
+        middle = float(np.nanmean(self.model.points[:, 0]))
+        width = max(2 * BLEND * self.model.fapu.ES * 1024, 1e-9)
+        return smoothstep((self.model.vertices[:, 0].astype(np.float64) - middle) / width + 0.5)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Skin and inner mouth of the model as one surface."""
+        return weld_parts(self.model.parts, SURFACE_KINDS)
+
+    def _side(self, side: int) -> Float64:
+        return self._left if side > 0 else 1.0 - self._left
+
+    @cached_property
+    def halves(self) -> list[Half]:
+        """The halves that move at least `STILL` of what their shape moves."""
+        halves = []
+        for shape in self.morphs:
+            sizes = np.linalg.norm(self.displacements(shape), axis=1)
+            least = STILL * float(sizes.max(initial=0.0))
+            halves += [Half(shape, side) for side in (1, -1) if (sizes * self._side(side)).max() > least]
+        return halves
 
     def field(self, half: Half) -> Float64:
         """(V, 3) displacements of all vertices of the model by half a shape, metres."""
-        field = self.displacements(half.shape)
-        field *= (self._left if half.side > 0 else 1.0 - self._left)[:, None]
-        return field
+        return self.displacements(half.shape) * self._side(half.side)[:, None]
 
     def displacements(self, shape: str) -> Float64:
         """(V, 3) displacements of all vertices of the model by a shape, metres."""
@@ -70,27 +89,21 @@ class Shapes:
 
     def displacements_at(self, vertices: npt.ArrayLike) -> Float64:
         """(H, N, 3): displacements of the given vertices by each half."""
-        chosen = np.asarray(vertices, dtype=np.intp)
-        found = np.zeros((len(self.halves), len(chosen), 3))
-        for number, half in enumerate(self.halves):
-            found[number] = self.field(half)[chosen]
-        return found
-
-    def _halves(self, shape: str) -> list[Half]:
-        sizes = np.linalg.norm(self.displacements(shape), axis=1)
-        most = float(sizes.max(initial=0.0))
-        if not most > 0:
-            return []
-        return [
-            Half(shape, side)
-            for side, share in ((1, self._left), (-1, 1.0 - self._left))
-            if float((sizes * share).max()) > STILL * most
-        ]
+        rows = np.asarray(vertices, dtype=np.intp)
+        fields = [self.field(half)[rows] for half in self.halves]
+        return np.array(fields).reshape(len(fields), len(rows), 3)
 
 
-def check_displacements(
-    parts: Sequence[Part], shape: str, moved: Mapping[str, Floating]
-) -> dict[str, Float32]:
+def check_shapes(model: FaceModel, morphs: Morphs) -> Shapes:
+    """The shapes of a model: displacements (V, 3) at weight 1, metres, by shape and part.
+
+    Raises ModelError where a part does not exist, has another number of vertices, or moves by numbers that
+    are not finite.
+    """
+    return Shapes(model, {shape: _check_shape(model.parts, shape, moved) for shape, moved in morphs.items()})
+
+
+def _check_shape(parts: Sequence[Part], shape: str, moved: Mapping[str, Floating]) -> dict[str, Float32]:
     """The displacements of one shape, checked against the parts."""
     counts = {part.name: len(part.vertices) for part in parts}
     result = {}

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from fba.errors import FbaWarning
 from fba.face.authoring.author import author
 from fba.face.authoring.shapes._mixing import GROUPS, Mixer, fold_limited_tables
-from fba.face.authoring.shapes._shapes import Morphs, Shapes
+from fba.face.authoring.shapes._shapes import Morphs, Shapes, check_shapes
 from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.expressions import Definitions
 from fba.face.model import FaceModel, Part
@@ -66,9 +66,11 @@ def from_morphs(
     base = author(parts, points, bound=bound, name=name, definitions=definitions, fit=fit, notes=notes)
     by_fap = {number: shape for shape in morphs if (number := fap_of(shape)) is not None}
     if len(by_fap) >= FEWEST_FAPS:
-        return _from_faps(base, Shapes(base, {shape: morphs[shape] for shape in by_fap.values()}), by_fap)
+        return _from_faps(
+            base, check_shapes(base, {shape: morphs[shape] for shape in by_fap.values()}), by_fap
+        )
     known = canonical_names(morphs)
-    shapes = Shapes(base, {shape: morphs[written] for shape, written in known.items()})
+    shapes = check_shapes(base, {shape: morphs[written] for shape, written in known.items()})
     if not shapes.halves:
         if morphs:
             warnings.warn(
@@ -114,7 +116,7 @@ def _from_faps(base: FaceModel, shapes: Shapes, by_fap: Mapping[int, str]) -> Fa
         if fap in ARCS and fap in tables:
             continue
         step = shapes.displacements(shape) / morph_values()[fap]
-        made = fold_limited_tables(base, fap, step, step)
+        made = fold_limited_tables(shapes, fap, step, step)
         if made is not None:
             tables[fap] = made
             lost.pop(fap, None)

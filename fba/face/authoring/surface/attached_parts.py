@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.face.authoring.surface.motion import Motion
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.surface import Surface, weld_parts
 from fba.face.model import Part
 
 NEIGHBOURS = 8
@@ -19,48 +21,56 @@ NEAR = 0.1
 """Parts with most of their vertices this close to the skin, in ES0, are attached to it."""
 
 
+@dataclass(frozen=True, eq=False)
 class Anchors:
-    """The attachment of each vertex of a part to the skin: a triangle and barycentric coordinates in it."""
+    """The attachment of each vertex of a part to the skin; made by `attach`.
 
-    def __init__(self, surface: Surface, part: Part) -> None:
-        from scipy.spatial import cKDTree
+    surface: the skin. points: (V, 3), the part's vertices, metres. triangles: (V,), the skin's triangle that
+    each hangs on; shares: (V, 3), barycentric coordinates in it. distance: (V,) from the skin, metres.
+    """
 
-        self._triangles = surface.triangles
-        self._neutral = surface.vertices
-        self._points = part.vertices.astype(np.float64)
-        shape = Surface([part])
-        corners = surface.vertices[surface.triangles]
-        tree = cKDTree(corners.mean(axis=1))
-        _, near = tree.query(shape.vertices, k=min(NEIGHBOURS, len(corners)))
-        best, shares, away = _closest_triangles(
-            corners, near.reshape(len(shape.vertices), -1), shape.vertices
-        )
-        root = hair_roots(shape, away) if part.kind == "lash" else np.arange(len(shape.vertices))
-        self.distance: Float64 = away[shape.number]
-        self._best: Intp = best[root][shape.number]
-        self._shares: Float64 = shares[root][shape.number]
+    surface: Surface
+    points: Float64
+    triangles: Intp
+    shares: Float64
+    distance: Float64
 
     def carry(self, motion: Motion) -> Motion:
         """The motion of the part for a motion of the surface: vertices move and turn with their triangles."""
-        skin = np.zeros_like(self._neutral)
-        place = np.full(len(self._neutral), -1)
-        place[motion.vertices] = np.arange(len(motion.vertices))
-        moving = np.flatnonzero((place[self._triangles[self._best]] >= 0).any(axis=1))
-        triangles = self._triangles[self._best[moving]]
-        before = self._neutral[triangles]
-        shares = self._shares[moving]
+        neutral = self.surface.vertices
+        corners = self.surface.triangles[self.triangles]
+        moving = np.flatnonzero(self.surface.mask(motion.vertices)[corners].any(axis=1))
+        corners, shares, points = corners[moving], self.shares[moving], self.points[moving]
+        before = neutral[corners]
         foot = (before * shares[:, :, None]).sum(axis=1)
-        arm = self._points[moving] - foot
-        frame = _frames(before)
-        local = np.einsum("nij,ni->nj", frame, arm)
+        arm = np.einsum("nij,ni->nj", _frames(before), points - foot)
+        skin = np.zeros_like(neutral)
         shifts = np.zeros((len(motion.values), len(moving), 3))
         for k in range(len(motion.values)):
             skin[motion.vertices] = motion.shifts[k]
-            after = before + skin[triangles]
-            foot_after = (after * shares[:, :, None]).sum(axis=1)
-            shifts[k] = foot_after + np.einsum("nij,nj->ni", _frames(after), local) - self._points[moving]
+            after = before + skin[corners]
+            foot = (after * shares[:, :, None]).sum(axis=1)
+            shifts[k] = foot + np.einsum("nij,nj->ni", _frames(after), arm) - points
         shifts[motion.values == 0] = 0.0
         return Motion(motion.values, moving, shifts)
+
+
+def attach(surface: Surface, part: Part) -> Anchors:
+    """The attachment of a part to the nearest triangles of the skin; lashes hang on it by their roots."""
+    from scipy.spatial import cKDTree
+
+    shape = weld_parts([part])
+    corners = surface.vertices[surface.triangles]
+    _, near = cKDTree(corners.mean(axis=1)).query(shape.vertices, k=min(NEIGHBOURS, len(corners)))
+    best, shares, away = _closest_triangles(corners, near.reshape(len(shape.vertices), -1), shape.vertices)
+    root = hair_roots(shape, away) if part.kind == "lash" else np.arange(len(shape.vertices))
+    return Anchors(
+        surface,
+        part.vertices.astype(np.float64),
+        best[root][shape.number],
+        shares[root][shape.number],
+        away[shape.number],
+    )
 
 
 def hair_roots(shape: Surface, away: Float64) -> Intp:
@@ -74,8 +84,8 @@ def hair_roots(shape: Surface, away: Float64) -> Intp:
     np.minimum.at(nearest, shape.component, away)
     span = float(np.median(np.linalg.norm(np.diff(shape.vertices[shape.edges], axis=1), axis=2)))
     start = np.flatnonzero(away <= nearest[shape.component] + ROOT * span)
-    found = dijkstra(shape.graph, directed=False, indices=start, min_only=True, return_predecessors=True)[2]
-    result: Intp = np.where(found >= 0, found, np.arange(len(found))).astype(np.intp)
+    root = dijkstra(shape.graph, directed=False, indices=start, min_only=True, return_predecessors=True)[2]
+    result: Intp = np.where(root >= 0, root, np.arange(len(root))).astype(np.intp)
     return result
 
 
@@ -86,16 +96,16 @@ def _closest_triangles(corners: Float64, near: Intp, points: Float64) -> tuple[I
     distance = np.full(len(points), np.inf)
     for k in range(near.shape[1]):
         triangle = corners[near[:, k]]
-        found = _barycentric(triangle, points)
-        found = np.clip(found, 0, None)
-        found /= found.sum(axis=1, keepdims=True)
-        away = np.linalg.norm((triangle * found[:, :, None]).sum(axis=1) - points, axis=1)
+        inside = np.clip(_barycentric(triangle, points), 0, None)
+        inside /= inside.sum(axis=1, keepdims=True)
+        away = np.linalg.norm((triangle * inside[:, :, None]).sum(axis=1) - points, axis=1)
         better = away < distance
-        best[better], shares[better], distance[better] = near[better, k], found[better], away[better]
+        best[better], shares[better], distance[better] = near[better, k], inside[better], away[better]
     return best, shares, distance
 
 
 def _barycentric(triangles: Float64, points: Float64) -> Float64:
+    """(N, 3) barycentric coordinates of points (N, 3) in the planes of triangles (N, 3, 3)."""
     e1, e2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     arm = points - triangles[:, 0]
     a, b, c = (e1 * e1).sum(axis=1), (e1 * e2).sum(axis=1), (e2 * e2).sum(axis=1)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fba.arrays import Float64, Int32, Intp
 from fba.errors import ModelError
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.surface import Surface, vertices_of_kinds, weld_parts
 from fba.face.feature_points import names, row_of
 from fba.face.model import Part
 
@@ -70,12 +70,12 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
             f"feature point {names()[row]} is bound to vertex {given[row]}, but there are {total}"
         )
     vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
-    found = given.astype(np.int32)
+    vertex = given.astype(np.int32)
     far: dict[str, float] = {}
     pieces = cache(lambda: _connected_pieces(parts, KINDS_OF_POINT["9.8"]))
-    sought = [name for name in names() if found[row_of()[name]] < 0 and name not in FREE_POINTS]
-    for name in sought:
-        row = row_of()[name]
+    for name, row in row_of().items():
+        if vertex[row] >= 0 or name in FREE_POINTS:
+            continue
         pool = vertices_of_kinds(parts, kinds_for_point(name))
         if np.isnan(points[row]).any() or not len(pool):
             continue
@@ -86,7 +86,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
         if away[nearest] > TOLERANCE * size:
             far[name] = float(away[nearest])
         else:
-            found[row] = pool[nearest]
+            vertex[row] = pool[nearest]
     tried = [name for name in names() if np.isfinite(points[row_of()[name]]).all()]
     if len(far) > len(tried) / 2 and len(far) > 3:
         worst = max(far, key=lambda name: far[name])
@@ -94,10 +94,15 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
             f"{len(far)} of {len(tried)} feature points are far from the mesh, {worst} by {far[worst]:g} m: "
             "do points and mesh have the same unit and axes?"
         )
-    placed = points.copy()
-    is_bound = found >= 0
-    placed[is_bound] = vertices[found[is_bound]]
-    return Binding(placed, found, far)
+    return _bound_to(vertex, points, vertices, far)
+
+
+def _bound_to(vertex: Int32, points: Float64, vertices: Float64, far: dict[str, float]) -> Binding:
+    """The binding of points (84, 3) to vertices by number (84,); free ones (-1) stay where they are."""
+    points = points.copy()
+    is_bound = vertex >= 0
+    points[is_bound] = vertices[vertex[is_bound]]
+    return Binding(points, vertex, far)
 
 
 def separate_lips(
@@ -108,43 +113,37 @@ def separate_lips(
     Lips touch, so the nearest vertex may be on the wrong one; the distance along the surface to the outer
     lip points (8.1, 8.2) tells them apart.
     """
-    found, row = binding.bound.copy(), row_of()
-    outer = [int(found[row[name]]) for name in ("8.1", "8.2")]
+    bound, row = binding.bound.copy(), row_of()
+    vertex = surface.find(bound)
+    outer = [int(vertex[row[name]]) for name in ("8.1", "8.2")]
     if min(outer) < 0:
         return binding
-    pool = vertices_of_kinds(parts, SURFACE_KINDS)
-    number = np.full(len(found) if not len(pool) else int(pool.max()) + 1, -1, dtype=np.intp)
-    number[pool] = surface.number
-    walk = [surface.distances([number[vertex]], limit=2 * size) for vertex in outer]
-    places = surface.vertices[number[pool]]
-    for lip, other, group in ((walk[0], walk[1], UPPER_LIP), (walk[1], walk[0], LOWER_LIP)):
-        right = lip < other
+    walk = [surface.distances([start], limit=2 * size) for start in outer]
+    on_skin = surface.vertices[surface.number]
+    for own, other, group in ((walk[0], walk[1], UPPER_LIP), (walk[1], walk[0], LOWER_LIP)):
+        same_lip = own < other
         for name in group:
-            vertex, place = int(found[row[name]]), points[row[name]]
-            if vertex < 0 or right[number[vertex]] or np.isnan(place).any():
+            current, point = int(vertex[row[name]]), points[row[name]]
+            if current < 0 or same_lip[current] or np.isnan(point).any():
                 continue
-            away = np.linalg.norm(places - place, axis=1)
-            away[~right[number[pool]]] = np.inf
+            away = np.linalg.norm(on_skin - point, axis=1)
+            away[~same_lip[surface.number]] = np.inf
             nearest = int(away.argmin())
-            current = float(np.linalg.norm(surface.vertices[number[vertex]] - place))
-            if away[nearest] <= current + LIP_SLACK * size:
-                found[row[name]] = pool[nearest]
+            if away[nearest] <= float(np.linalg.norm(surface.vertices[current] - point)) + LIP_SLACK * size:
+                bound[row[name]] = surface.pool[nearest]
     vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
-    placed = binding.points.copy()
-    is_bound = found >= 0
-    placed[is_bound] = vertices[found[is_bound]]
-    return Binding(placed, found, binding.far)
+    return _bound_to(bound, binding.points, vertices, binding.far)
 
 
 def _connected_pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
     """(V,) number of the connected piece of each vertex of the parts of some kinds."""
-    found, count = [np.zeros(0, dtype=np.intp)], 0
+    labels, count = [np.zeros(0, dtype=np.intp)], 0
     for part in parts:
         if part.kind in kinds:
-            own = Surface([part])
-            found.append(own.component[own.number] + count)
+            own = weld_parts([part])
+            labels.append(own.component[own.number] + count)
             count += int(own.component.max(initial=-1)) + 1
-    return np.concatenate(found)
+    return np.concatenate(labels)
 
 
 def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, slack: float) -> int:
@@ -158,20 +157,15 @@ def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, sla
     return int(right[away[right].argmin()])
 
 
-def lip_sides(surface: Surface, parts: Sequence[Part], points: Float64, bound: Int32) -> Intp | None:
+def lip_sides(surface: Surface, parts: Sequence[Part], bound: Int32) -> Intp | None:
     """(V,) for the skin's vertices: 1 on the upper edge of the mouth, 2 on the lower, 0 elsewhere, or None.
 
     None unless the mouth is a slit whose two edges coincide, so that they were taken for a seam and
     joined.
     """
-    row = row_of()
-    pool = vertices_of_kinds(parts, SURFACE_KINDS)
-    number = np.full(int(pool.max(initial=-1)) + 1, -1, dtype=np.intp)
-    number[pool] = surface.number
-    line = [int(bound[row[name]]) for name in ("2.4", "2.2", "2.5")]
-    if min(line) < 0:
+    left, middle, right = surface.find(bound[[row_of()[name] for name in ("2.4", "2.2", "2.5")]]).tolist()
+    if min(left, middle, right) < 0:
         return None
-    left, middle, right = (int(number[vertex]) for vertex in line)
     walk = np.concatenate([surface.path(left, middle), surface.path(middle, right)])
     walk = np.setdiff1d(walk, [left, right])
     skins = [part for part in parts if part.kind in SURFACE_KINDS]
@@ -184,10 +178,10 @@ def lip_sides(surface: Surface, parts: Sequence[Part], points: Float64, bound: I
         counts += np.bincount(own.ravel(), minlength=len(counts))
     above = heights / np.maximum(counts, 1) > surface.vertices[surface.number, 1]
     on_line = np.isin(surface.number, walk) & (counts > 0)
-    both = np.intersect1d(surface.number[on_line & above], surface.number[on_line & ~above])
-    if len(both) < len(walk) / 2 or not len(both):
+    joined = np.intersect1d(surface.number[on_line & above], surface.number[on_line & ~above])
+    if len(joined) < len(walk) / 2 or not len(joined):
         return None
-    return np.where(np.isin(surface.number, both), np.where(above, 1, 2), 0).astype(np.intp)
+    return np.where(np.isin(surface.number, joined), np.where(above, 1, 2), 0).astype(np.intp)
 
 
 def kinds_for_point(name: str) -> tuple[str, ...]:
@@ -195,13 +189,3 @@ def kinds_for_point(name: str) -> tuple[str, ...]:
     if name in KINDS_OF_POINT:
         return KINDS_OF_POINT[name]
     return KINDS_OF_GROUP.get(int(name.split(".", maxsplit=1)[0]), SURFACE_KINDS)
-
-
-def vertices_of_kinds(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
-    """(N,) vertices of the parts of some kinds, counted through all parts."""
-    start, found = 0, [np.zeros(0, dtype=np.intp)]
-    for part in parts:
-        if part.kind in kinds:
-            found.append(np.arange(start, start + len(part.vertices)))
-        start += len(part.vertices)
-    return np.concatenate(found)

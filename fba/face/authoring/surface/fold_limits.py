@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -25,53 +26,58 @@ DEGENERATE = 1e-5
 """Triangles of less than this share of the typical area have no front to turn."""
 
 
+@dataclass(frozen=True, eq=False)
 class Limiter:
-    """Measures how far motions of a mesh can go.
+    """Measures how far motions of a mesh can go; made by `from_mesh`.
 
-    vertices: (N, 3), neutral, metres. triangles: (F, 3).
+    vertices: (N, 3), neutral, metres. triangles: (F, 3), those that can fold.
     """
 
-    def __init__(self, vertices: Float64, triangles: Intp) -> None:
-        self._vertices = vertices
+    vertices: Float64
+    triangles: Intp
+
+    @classmethod
+    def from_mesh(cls, vertices: Float64, triangles: Intp) -> Limiter:
+        """The limiter of a mesh; triangles without area are left out, as they have no front to turn."""
         first, second = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
         areas = np.linalg.norm(np.cross(first, second), axis=1)
         typical = float(np.median(areas)) if len(areas) else 0.0
-        self._triangles = triangles[areas > DEGENERATE * typical]
+        return cls(vertices, triangles[areas > DEGENERATE * typical])
 
     def without(self, vertices: Intp) -> Limiter:
         """A limiter that ignores the triangles around the given vertices."""
-        other = copy(self)
-        other.__dict__.pop("_fans", None)
-        other._triangles = self._triangles[~np.isin(self._triangles, vertices).any(axis=1)]
-        return other
+        return Limiter(self.vertices, self.triangles[~np.isin(self.triangles, vertices).any(axis=1)])
 
-    def __len__(self) -> int:
-        return len(self._vertices)
+    def spread(self, vertices: Intp, shifts: Float64) -> Float64:
+        """(N, 3) shifts of all vertices: the given ones (M, 3) at some vertices (M,), 0 elsewhere."""
+        result = np.zeros((len(self.vertices), 3))
+        result[vertices] = shifts
+        return result
 
     @cached_property
     def _fans(self) -> tuple[Intp, Intp]:
-        """(starts, triangles): for each vertex the triangles about it."""
-        order = np.argsort(self._triangles.ravel(), kind="stable")
-        count = np.bincount(self._triangles.ravel(), minlength=len(self._vertices))
+        """(starts, triangles): those of vertex v are triangles[starts[v] : starts[v + 1]]."""
+        order = np.argsort(self.triangles.ravel(), kind="stable")
+        count = np.bincount(self.triangles.ravel(), minlength=len(self.vertices))
         return np.concatenate([[0], np.cumsum(count)]), order // 3
 
     def triangles_touching(self, vertices: Intp) -> Intp:
         """(M, 3) triangles with a vertex among those given."""
-        starts, fans = self._fans
         touched: Intp
-        if len(vertices) > FEW_VERTICES * len(self._vertices):
-            moving = np.zeros(len(self._vertices), dtype=bool)
+        if len(vertices) > FEW_VERTICES * len(self.vertices):
+            moving = np.zeros(len(self.vertices), dtype=bool)
             moving[vertices] = True
-            touched = self._triangles[moving[self._triangles].any(axis=1)]
+            touched = self.triangles[moving[self.triangles].any(axis=1)]
             return touched
+        starts, fans = self._fans
         count = starts[vertices + 1] - starts[vertices]
         place = np.repeat(starts[vertices] - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-        touched = self._triangles[np.unique(fans[place])]
+        touched = self.triangles[np.unique(fans[place])]
         return touched
 
     def reach(self, field: Float64, triangles: Intp) -> Float64:
         """(M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it unfolded."""
-        p, d = self._vertices, field
+        p, d = self.vertices, field
         e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
         d1, d2 = (d[triangles[:, k]] - d[triangles[:, 0]] for k in (1, 2))
         normal = np.cross(e1, e2)
@@ -96,7 +102,7 @@ class Limiter:
         fine = self.soundness(shifts, triangles, turning=turning)
         if not turning or fine.all():
             return bool(fine.all())
-        corners = self._vertices[triangles]
+        corners = self.vertices[triangles]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         return float(areas[~fine].sum()) <= SPECK * float(areas.sum())
 
@@ -106,14 +112,14 @@ class Limiter:
         turning: the skin may rotate, as a lid does about the eyeball; then a triangle has folded where it
         faces away from its neighbours, not where it faces away from its neutral direction.
         """
-        p = self._vertices[triangles]
+        p = self.vertices[triangles]
         q = p + shifts[triangles]
         e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
         f1, f2 = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
         before, after = np.cross(e1, e2), np.cross(f1, f2)
         if turning:
-            around = _Around(triangles)
-            fine: Bool = (around.facing(after) >= FOLDED) | (around.facing(before) <= 0)
+            fans = _vertex_fans(triangles)
+            fine: Bool = (_facing_neighbours(fans, after) >= FOLDED) | (_facing_neighbours(fans, before) <= 0)
         else:
             fine = (before * after).sum(axis=1) >= 0.8 * LEAST_AREA * (before**2).sum(axis=1)
         lengths = np.linalg.norm(np.stack([e1, e2, e2 - e1]), axis=2)
@@ -123,24 +129,22 @@ class Limiter:
         return fine
 
 
-class _Around:
-    """Neighbours of triangles (M, 3): those that share a vertex."""
+def _vertex_fans(triangles: Intp) -> Any:
+    """Sparse matrix (K, M), 1 where a vertex is a corner of a triangle (M, 3); K: the vertices that are."""
+    from scipy.sparse import csr_array
 
-    def __init__(self, triangles: Intp) -> None:
-        from scipy.sparse import csr_array
+    vertices, local = np.unique(triangles, return_inverse=True)
+    entries = (np.ones(triangles.size), (local.ravel(), np.repeat(np.arange(len(triangles)), 3)))
+    return csr_array(entries, shape=(len(vertices), len(triangles)))
 
-        vertices, local = np.unique(triangles, return_inverse=True)
-        shape = (len(vertices), len(triangles))
-        fans = (np.ones(triangles.size), (local.ravel(), np.repeat(np.arange(len(triangles)), 3)))
-        self._fans = csr_array(fans, shape=shape)
 
-    def facing(self, normals: Float64) -> Float64:
-        """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours without it."""
-        around = self._fans.T @ (self._fans @ normals) - 3 * normals
-        product = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
-        result: Float64 = (around * normals).sum(axis=1) / np.maximum(product, 1e-30)
-        result[product < 1e-30] = 1.0
-        return result
+def _facing_neighbours(fans: Any, normals: Float64) -> Float64:
+    """(M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any vertex."""
+    around = fans.T @ (fans @ normals) - 3 * normals
+    product = np.linalg.norm(around, axis=1) * np.linalg.norm(normals, axis=1)
+    result: Float64 = (around * normals).sum(axis=1) / np.maximum(product, 1e-30)
+    result[product < 1e-30] = 1.0
+    return result
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:

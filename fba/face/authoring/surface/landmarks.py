@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -10,11 +10,13 @@ from itertools import pairwise
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Intp
-from fba.face.authoring.surface.binding import SURFACE_KINDS, lip_sides, vertices_of_kinds
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.binding import SURFACE_KINDS, lip_sides
+from fba.face.authoring.surface.surface import Surface, weld_parts
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, neutral_points, row_of
 from fba.face.model import Part
+from fba.face.points import DIRECTIONS
+from fba.parameters import faps
 
 CONTOURS = {
     "upper inner lip": ("2.4", "2.6", "2.2", "2.7", "2.5"),
@@ -28,6 +30,7 @@ CONTOURS = {
     "jaw line": ("2.13", "2.11", "2.1", "2.12", "2.14"),
 }
 """Lines on the face by the feature points that they run through."""
+LIP_CONTOURS = tuple(name for name in CONTOURS if name.endswith("lip"))
 OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
 """Contours about an opening, which in many meshes is a hole."""
 
@@ -48,12 +51,27 @@ class Landmarks:
 
     def point(self, name: str) -> Float64:
         """(3,) position of a feature point, metres; NaN where unknown."""
-        place: Float64 = self.points[row_of()[name]]
-        return place
+        position: Float64 = self.points[row_of()[name]]
+        return position
 
     def has(self, *wanted: str) -> bool:
         """Whether all these feature points stand on the surface."""
         return all(name in self.vertex for name in wanted)
+
+    def vertices_of(self, wanted: Iterable[str]) -> Intp:
+        """(M,) vertices of those of the feature points that stand on the surface."""
+        return np.array([self.vertex[name] for name in wanted if name in self.vertex], dtype=np.intp)
+
+    def step(self, fap: int) -> Float64:
+        """(3,) displacement, metres, of the point of a FAP by one unit of its value."""
+        entry = faps()[fap - 1]
+        step: Float64 = np.array(DIRECTIONS[entry.positive]) * self.fapu[entry.unit]
+        return step
+
+    def missing_point(self, fap: int) -> str:
+        """Why the surface cannot follow a FAP: its feature point is not on it; empty where it is."""
+        point = faps()[fap - 1].feature_points[0]
+        return "" if self.has(point) else f"feature point {point} is not on the skin"
 
     def contour(self, name: str) -> Intp:
         """Vertices along a contour, corner to corner; empty unless both ends and one point between exist."""
@@ -93,23 +111,15 @@ class Landmarks:
 
     def on_contours(self, *contours: str) -> Bool:
         """(N,) mask of the vertices of the given contours."""
-        mask = np.zeros(len(self.surface), dtype=bool)
-        for name in contours:
-            mask[self.contour(name)] = True
-        return mask
+        return self.surface.mask(np.concatenate([self.contour(name) for name in contours]))
 
     def _cut_off(self, contours: tuple[str, ...]) -> Bool:
         """(N,) mask of vertices that contours separate from the outer face; none if one is missing."""
-        nothing = np.zeros(len(self.surface), dtype=bool)
         loop = np.unique(np.concatenate([self.contour(name) for name in contours]))
-        if any(not len(self.contour(name)) for name in contours):
-            return nothing
+        outside = self.vertices_of(("9.3", "9.15", "2.1", "2.10", "11.1", "4.1"))
+        if not len(outside) or any(not len(self.contour(name)) for name in contours):
+            return self.surface.mask([])
         pieces = self.surface.pieces_without(loop)
-        outside = [
-            self.vertex[name] for name in ("9.3", "9.15", "2.1", "2.10", "11.1", "4.1") if self.has(name)
-        ]
-        if not outside:
-            return nothing
         main = self.surface.component == self.surface.component[loop[0]]
         return np.asarray(main & (pieces >= 0) & ~np.isin(pieces, pieces[outside]))
 
@@ -132,33 +142,25 @@ class Landmarks:
 
     def point_or_average(self, name: str) -> Float64:
         """(3,) position of a feature point; if unknown, as on an average adult head."""
-        place: Float64 = self.points_or_average[row_of()[name]]
-        return place
+        position: Float64 = self.points_or_average[row_of()[name]]
+        return position
 
 
-def landmarks(surface: Surface, points: Float64, bound: Int32, pool: Intp) -> Landmarks:
+def find_landmarks(surface: Surface, points: Float64, bound: Int32) -> Landmarks:
     """Landmarks of a surface.
 
-    points: (84, 3), metres. bound: (84,), vertices counted through all parts, -1 where free. pool: for each
-    vertex that the surface was made of, its number counted through all parts.
+    points: (84, 3), metres. bound: (84,), vertices counted through all parts, -1 where free.
     """
-    number = np.full(int(max(pool.max(initial=-1), bound.max(initial=-1))) + 1, -1, dtype=np.intp)
-    number[pool] = surface.number
-    vertex = {
-        name: int(number[held])
-        for name, held in zip(names(), bound.tolist(), strict=True)
-        if held >= 0 and number[held] >= 0
-    }
+    on_surface = zip(names(), surface.find(bound).tolist(), strict=True)
+    vertex = {name: number for name, number in on_surface if number >= 0}
     return Landmarks(surface, points, vertex, Fapu.measure(points))
 
 
-def surface_of(parts: Sequence[Part], points: Float64, bound: Int32) -> tuple[Surface, Intp]:
-    """(surface, pool): skin and inner mouth as one surface, and its vertices counted through all parts.
+def weld_skin(parts: Sequence[Part], bound: Int32) -> Surface:
+    """Skin and inner mouth as one surface; a mouth that is a slit, its edges on each other, stays open.
 
-    A mouth that is a slit, its edges on each other, stays open.
+    bound: (84,), vertices of the feature points counted through all parts, -1 where free.
     """
-    skins = [part for part in parts if part.kind in SURFACE_KINDS]
-    pool = vertices_of_kinds(parts, SURFACE_KINDS)
-    surface = Surface(skins)
-    sides = lip_sides(surface, parts, points, bound)
-    return (surface if sides is None else Surface(skins, sides)), pool
+    surface = weld_parts(parts, SURFACE_KINDS)
+    sides = lip_sides(surface, parts, bound)
+    return surface if sides is None else weld_parts(parts, SURFACE_KINDS, sides=sides)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.surface import Surface, positions_in
 from fba.face.tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
 
@@ -47,13 +47,12 @@ def fap_limits(fap: int) -> tuple[float, float]:
 
 def split_by_part(surface: Surface, motion: Motion) -> dict[str, Motion]:
     """A motion of the surface as motions of its parts, by name of the part."""
-    place = np.full(len(surface), -1)
-    place[motion.vertices] = np.arange(len(motion.vertices))
+    row = positions_in(motion.vertices, len(surface))
     result = {}
-    for name, number in surface.members:
-        own = np.flatnonzero(place[number] >= 0)
+    for name, number in surface.members.items():
+        own = np.flatnonzero(row[number] >= 0)
         if len(own):
-            result[name] = Motion(motion.values, own, motion.shifts[:, place[number[own]]])
+            result[name] = Motion(motion.values, own, motion.shifts[:, row[number[own]]])
     return result
 
 

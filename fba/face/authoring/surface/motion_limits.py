@@ -66,11 +66,9 @@ def eased_linear_motion(
     vertices: (N,), of the surface. pinned: mask of the surface's vertices that move exactly so; around
     others the field is eased where it folds too early.
     """
-    full_field = np.zeros((len(limiter), 3))
-    full_field[vertices] = field
-    full_field = ease_field(surface, limiter, full_field, values_to_reach(fap), pinned)
-    vertices = np.flatnonzero(full_field.any(axis=1))
-    return linear_motion(limiter, vertices, full_field[vertices], *fap_limits(fap), human_range(fap))
+    eased = ease_field(surface, limiter, limiter.spread(vertices, field), values_to_reach(fap), pinned)
+    vertices = np.flatnonzero(eased.any(axis=1))
+    return linear_motion(limiter, vertices, eased[vertices], *fap_limits(fap), human_range(fap))
 
 
 def values_to_reach(fap: int) -> list[float]:
@@ -93,8 +91,7 @@ def linear_motion(
     low, high: the range of values. most: sizes of the values, below 0 and above, that it never exceeds.
     The field is not eased.
     """
-    full_field = np.zeros((len(limiter), 3))
-    full_field[vertices] = field
+    full_field = limiter.spread(vertices, field)
     triangles = limiter.triangles_touching(vertices)
     stops = [
         min(cap, _largest_value(limiter, full_field * sign, triangles, abs(end)))
@@ -107,6 +104,7 @@ def linear_motion(
 
 
 def _largest_value(limiter: Limiter, field: Float64, triangles: Intp, limit: float) -> float:
+    """Value that a linear motion (N, 3) reaches without folds, at least 1; inf from `LEAST_REACH` on."""
     reach = float(limiter.reach(field, triangles).min(initial=np.inf))
     return np.inf if LEAST_REACH * reach >= limit else max(reach, 1.0)
 
@@ -146,14 +144,13 @@ def _stop_one_side(
 
 
 def _is_sound(limiter: Limiter, motion: Motion, shifts: Float64, triangles: Intp, turning: bool) -> bool:
-    full_field = np.zeros((len(limiter), 3))
-    full_field[motion.vertices] = shifts
-    return limiter.is_sound(full_field, triangles, turning=turning)
+    return limiter.is_sound(limiter.spread(motion.vertices, shifts), triangles, turning=turning)
 
 
 def _last_sound_share(
     limiter: Limiter, motion: Motion, start: Float64, end: Float64, triangles: Intp, turning: bool
 ) -> float:
+    """Share of the way between two shifts at which no triangle has folded yet, by bisection."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2

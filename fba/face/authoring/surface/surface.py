@@ -1,16 +1,17 @@
-"""The skin as one welded surface: neighbours, walking distances, paths, differential operators."""
+"""The skin as one welded surface: neighbours, distances and paths along edges, its Laplacian."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Bool, Float64, Intp
-from fba.face.model import Part
+from fba.arrays import Bool, Float64, Integer, Intp
+from fba.face.model import PART_KINDS, Part
 from fba.mesh.meshes import vertex_normals
 
 WELD = 1e-6
@@ -21,38 +22,39 @@ SMALLEST_COTANGENT = 0.02
 """Obtuse triangles would give negative weights, and with them folds."""
 
 
+@dataclass(frozen=True, eq=False)
 class Surface:
-    """Several parts (skin, inner mouth) as one surface, vertices at seams joined.
+    """Parts of a face (skin, inner mouth) as one surface, vertices at seams joined; made by `weld_parts`.
 
-    vertices: (N, 3), metres. triangles: (F, 3). number: (V,), for each vertex counted through the parts,
-    the vertex of the surface. members: for each part its name and its slice of number.
+    vertices: (N, 3), metres. triangles: (F, 3). pool: (V,), the vertices that it was made of, counted through
+    all parts of the face. number: (V,), the vertex of the surface that each of these became. members: the
+    slice of `number` that belongs to each part, by name.
     """
 
-    def __init__(self, parts: Sequence[Part], sides: Intp | None = None) -> None:
-        """sides: (V,) of the vertices counted through the parts: those of different sides stay unjoined."""
-        vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
-        starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        triangles = np.concatenate(
-            [part.triangles.astype(np.intp) + start for part, start in zip(parts, starts, strict=False)]
-        )
-        joined = _weld(vertices, triangles, sides)
-        first, number = np.unique(joined, return_inverse=True)
-        self.vertices: Float64 = vertices[first]
-        joined_triangles = number[triangles]
-        a, b, c = joined_triangles.T
-        self.triangles: Intp = joined_triangles[(a != b) & (b != c) & (c != a)]
-        self.members = [
-            (part.name, number[start : start + len(part.vertices)])
-            for part, start in zip(parts, starts, strict=False)
-        ]
-        self.number: Intp = number
+    vertices: Float64
+    triangles: Intp
+    pool: Intp
+    number: Intp
+    members: Mapping[str, Intp]
 
     def __len__(self) -> int:
         return len(self.vertices)
 
+    def find(self, vertices: Integer) -> Intp:
+        """(M,) vertices of the surface that vertices counted through all parts became; -1 for others."""
+        table = np.full(int(max(self.pool.max(initial=-1), vertices.max(initial=-1))) + 2, -1, dtype=np.intp)
+        table[self.pool] = self.number
+        return table[vertices]
+
+    def mask(self, vertices: npt.ArrayLike) -> Bool:
+        """(N,) mask of the given vertices."""
+        mask = np.zeros(len(self), dtype=bool)
+        mask[np.asarray(vertices, dtype=np.intp)] = True
+        return mask
+
     @cached_property
     def _edge_counts(self) -> tuple[Intp, Intp]:
-        return _edges(self.triangles)
+        return _count_edges(self.triangles)
 
     @property
     def edges(self) -> Intp:
@@ -62,22 +64,20 @@ class Surface:
     @cached_property
     def graph(self) -> Any:
         """(N, N) sparse matrix of edge lengths."""
-        from scipy.sparse import csr_array
-
-        a, b = self.edges.T
-        length = np.maximum(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1), 1e-12)
-        shape = (len(self), len(self))
-        return csr_array((np.tile(length, 2), (np.r_[a, b], np.r_[b, a])), shape=shape)
+        return self._edge_matrix(open_edges=1.0)
 
     @cached_property
     def rim_graph(self) -> Any:
         """(N, N) sparse matrix of edge lengths, open edges shortened so that paths keep to the rim."""
+        return self._edge_matrix(open_edges=RIM)
+
+    def _edge_matrix(self, open_edges: float) -> Any:
         from scipy.sparse import csr_array
 
         edges, count = self._edge_counts
         a, b = edges.T
         length = np.maximum(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1), 1e-12)
-        length[count == 1] *= RIM
+        length[count == 1] *= open_edges
         return csr_array((np.tile(length, 2), (np.r_[a, b], np.r_[b, a])), shape=(len(self), len(self)))
 
     @cached_property
@@ -97,9 +97,7 @@ class Surface:
     def open_edge(self) -> Bool:
         """(N,) mask of the vertices on open edges, the rim of the surface."""
         edges, count = self._edge_counts
-        rim = np.zeros(len(self), dtype=bool)
-        rim[edges[count == 1]] = True
-        return rim
+        return self.mask(edges[count == 1])
 
     def distances(self, sources: npt.ArrayLike, limit: float = np.inf) -> Float64:
         """(N,) distance along edges from the nearest source, metres; inf beyond the limit."""
@@ -108,8 +106,8 @@ class Surface:
         start = np.unique(np.asarray(sources, dtype=np.intp))
         if not len(start):
             return np.full(len(self), np.inf)
-        found: Float64 = dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True)
-        return found
+        away: Float64 = dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True)
+        return away
 
     def path(self, start: int, end: int, *, rim: bool = False) -> Intp:
         """The vertices of the shortest path along edges, both ends included; empty where there is none.
@@ -172,7 +170,47 @@ class Surface:
         return diags_array(between.sum(axis=1)) - between, np.maximum(areas, 1e-3 * typical)
 
 
-def _edges(triangles: Intp) -> tuple[Intp, Intp]:
+def vertices_of_kinds(parts: Sequence[Part], kinds: Sequence[str]) -> Intp:
+    """(V,) vertices of the parts of some kinds, counted through all parts."""
+    mine = np.repeat([part.kind in kinds for part in parts], [len(part.vertices) for part in parts])
+    return np.flatnonzero(mine)
+
+
+def weld_parts(
+    parts: Sequence[Part], kinds: Sequence[str] = PART_KINDS, *, sides: Intp | None = None
+) -> Surface:
+    """The parts of some kinds as one surface, open edges that coincide joined.
+
+    sides: (V,), vertices of different sides stay apart.
+    """
+    pool = vertices_of_kinds(parts, kinds)
+    welded = [part for part in parts if part.kind in kinds]
+    vertices = np.concatenate([part.vertices for part in welded]).astype(np.float64)
+    starts = np.cumsum([0, *(len(part.vertices) for part in welded)])
+    triangles = np.concatenate(
+        [part.triangles.astype(np.intp) + start for part, start in zip(welded, starts, strict=False)]
+    )
+    first, number = np.unique(_join_seams(vertices, triangles, sides), return_inverse=True)
+    joined = number[triangles]
+    a, b, c = joined.T
+    members = zip(welded, np.split(number, starts[1:-1]), strict=True)
+    return Surface(
+        vertices[first],
+        joined[(a != b) & (b != c) & (c != a)],
+        pool,
+        number,
+        {part.name: own for part, own in members},
+    )
+
+
+def positions_in(vertices: Intp, count: int) -> Intp:
+    """(count,) position of each vertex in a list of vertices; -1 for those not in it."""
+    result = np.full(count, -1)
+    result[vertices] = np.arange(len(vertices))
+    return result
+
+
+def _count_edges(triangles: Intp) -> tuple[Intp, Intp]:
     """((E, 2) each edge once, lower vertex first, in rising order; (E,) how many triangles share it)."""
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     size = int(sides.max(initial=0)) + 1
@@ -181,13 +219,13 @@ def _edges(triangles: Intp) -> tuple[Intp, Intp]:
     return np.stack(np.divmod(keys, size), axis=1).astype(np.intp), count
 
 
-def _weld(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
+def _join_seams(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
     """(N,) for each vertex the lowest number of those that it is joined with."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    edges, count = _edges(triangles)
+    edges, count = _count_edges(triangles)
     rim = np.unique(edges[count == 1])
     first = np.arange(len(vertices))
     if not len(rim):

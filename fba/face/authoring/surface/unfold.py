@@ -27,29 +27,24 @@ def unfold(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, tur
     pinned: (N,) mask of vertices whose shifts must not change. turning: as in `Limiter.soundness`. Folds
     remain where this does not help.
     """
-    shifts_of_all = np.zeros((len(motion.values), len(surface), 3))
-    shifts_of_all[:, motion.vertices] = motion.shifts
-    moved = np.zeros(len(surface), dtype=bool)
-    moved[motion.vertices] = True
+    shifts = np.stack([limiter.spread(motion.vertices, step) for step in motion.shifts])
+    moved = surface.mask(motion.vertices)
     zero = int(np.flatnonzero(motion.values == 0)[0])
-    for side in (range(zero + 1, len(shifts_of_all)), range(zero - 1, -1, -1)):
+    for side in (range(zero + 1, len(shifts)), range(zero - 1, -1, -1)):
         for k in side:
             for _ in range(ROUNDS):
                 triangles = limiter.triangles_touching(np.flatnonzero(moved))
-                bad = triangles[~limiter.soundness(shifts_of_all[k], triangles, turning=turning)]
-                for cluster in _connected_groups(bad):
-                    shifts_of_all[k] = _ease_around(
-                        surface, limiter, shifts_of_all[k], cluster, pinned, turning
-                    )
-                if not len(bad):
+                folded = triangles[~limiter.soundness(shifts[k], triangles, turning=turning)]
+                for group in _connected_groups(folded):
+                    shifts[k] = _ease_around(surface, limiter, shifts[k], group, pinned, turning)
+                if not len(folded):
                     break
-                moved |= shifts_of_all[k].any(axis=1)
-            if not limiter.is_sound(
-                shifts_of_all[k], limiter.triangles_touching(np.flatnonzero(moved)), turning=turning
-            ):
+                moved |= shifts[k].any(axis=1)
+            triangles = limiter.triangles_touching(np.flatnonzero(moved))
+            if not limiter.is_sound(shifts[k], triangles, turning=turning):
                 break  # further out it only gets worse, and there the motion will stop
     vertices = np.flatnonzero(moved)
-    return Motion(motion.values, vertices, shifts_of_all[:, vertices])
+    return Motion(motion.values, vertices, shifts[:, vertices])
 
 
 def ease_field(
@@ -66,8 +61,7 @@ def ease_field(
             moves = result[moving] * goal * share
             motion = Motion(np.array([0.0, 1.0]), moving, np.stack([0 * moves, moves]))
             unfolded = unfold(surface, limiter, motion, pinned, False)
-            trial = np.zeros_like(field)
-            trial[unfolded.vertices] = unfolded.shifts[1] / (goal * share)
+            trial = limiter.spread(unfolded.vertices, unfolded.shifts[1] / (goal * share))
             now = [_reachable_share(limiter, trial, each) for each in goals]
             if now[k] > reached[k] and all(
                 new >= LEAST_RETAINED * old for new, old in zip(now, reached, strict=True)
@@ -82,33 +76,33 @@ def _reachable_share(limiter: Limiter, field: Float64, goal: float) -> float:
     return min(float(limiter.reach(field * goal, triangles).min(initial=np.inf)), 1.0)
 
 
-def _connected_groups(bad: Intp) -> list[Intp]:
-    """Triangles (M, 3) in connected groups."""
+def _connected_groups(triangles: Intp) -> list[Intp]:
+    """Triangles (M, 3) in groups that share vertices."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
-    if not len(bad):
+    if not len(triangles):
         return []
-    vertices, local = np.unique(bad, return_inverse=True)
+    vertices, local = np.unique(triangles, return_inverse=True)
     local = local.reshape(-1, 3)
     ends = np.concatenate([local[:, :2], local[:, 1:]])
     graph = csr_array((np.ones(len(ends)), tuple(ends.T)), shape=(len(vertices),) * 2)
     labels = connected_components(graph, directed=False)[1][local[:, 0]]
-    return [bad[labels == k] for k in range(int(labels.max()) + 1)]
+    return [triangles[labels == k] for k in range(int(labels.max()) + 1)]
 
 
 def _ease_around(
-    surface: Surface, limiter: Limiter, shifts: Float64, bad: Intp, pinned: Bool, turning: bool
+    surface: Surface, limiter: Limiter, shifts: Float64, folded: Intp, pinned: Bool, turning: bool
 ) -> Float64:
-    """Shifts (N, 3) eased around some triangles in the smallest region that unfolds most of them."""
-    best, fewest = shifts, len(bad)
-    core = np.unique(bad)
+    """Shifts (N, 3) eased about folded triangles (M, 3), in the smallest region that unfolds most of them."""
+    best, fewest = shifts, len(folded)
+    core = np.unique(folded)
     # second start: the triangles move as one, with their pinned vertices if there are any
-    held = core[pinned[core]]
+    fixed = core[pinned[core]]
     core = core[~pinned[core]]
     as_one = shifts.copy()
     if len(core):
-        as_one[core] = shifts[held if len(held) else core].mean(axis=0)
+        as_one[core] = shifts[fixed if len(fixed) else core].mean(axis=0)
     region = core
     for _ in range(RINGS):
         region = np.unique(surface.graph[region].indices) if len(region) else region

@@ -23,8 +23,7 @@ def solve_smooth_field(
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 
-    given = np.zeros(len(surface), dtype=bool)
-    given[fixed] = True
+    given = surface.mask(fixed)
     laplacian, areas = surface.laplacian
     field = np.zeros((len(surface), values.shape[1]))
     field[fixed] = values
@@ -32,15 +31,14 @@ def solve_smooth_field(
     if not len(sought):
         return field
     near = np.flatnonzero((abs(laplacian) @ (free | given).astype(np.float64)) > 0)
-    local = laplacian[near][:, near]
-    system = local
+    rows = laplacian[near]
+    system = local = rows[:, near]
     if not harmonic:
-        # on the rim of the crop the rows of L are cut short, but only two rings further in do they matter
-        rows = laplacian[near]
+        # rows of L at the rim of this region are incomplete, but only those two rings further in are used
         system = rows @ diags_array(1 / areas) @ rows.T + local / slack**2
     inside = np.searchsorted(near, sought)
-    held = np.setdiff1d(np.arange(len(near)), inside)
-    right = -(system[inside][:, held] @ field[near[held]])
+    known = np.setdiff1d(np.arange(len(near)), inside)
+    right = -(system[inside][:, known] @ field[near[known]])
     try:
         solved = splu(system[inside][:, inside].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right)
     except (RuntimeError, MemoryError) as error:
