@@ -100,8 +100,7 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
     spine = [joint for joint in spine_joints(skeleton) if joint in mapped]
     for joint, above in pairwise(spine):
         corrections[joint] = align_bone(joint, above, facing)
-    if spine:
-        corrections[spine[-1]] = facing
+    corrections[spine[-1]] = facing
     corrections["sacroiliac"] = facing
 
     for bone in bones():

@@ -105,8 +105,6 @@ def _metres_per_unit(targets: Targets) -> float:
 
 def _swing(targets: Targets, joint: str) -> None:
     """Turn a joint so that its bone points in its target direction; the twist comes second."""
-    if joint not in targets.aims:
-        return
     axes, *_ = targets.axes(joint)
     above = targets.parent_rotation(joint)
     wanted = rotations.inside(above, targets.direction(joint))

@@ -69,6 +69,17 @@ def motion(
     )
 
 
+def swinging_limbs(frames: int = 12) -> SkeletonMotion:
+    """Someone whose elbow and knee bend from a right angle to a little beyond straight, leaning sideways."""
+    bend = np.radians(np.linspace(90, -8, frames))
+    lean = np.radians(5) * np.sin(np.linspace(0, 2 * np.pi, frames))
+    turns = {
+        "LeftForeArm": Rotation.from_rotvec(np.stack([-bend, 0 * bend, lean], axis=1)),
+        "RightLeg": Rotation.from_rotvec(np.stack([bend, 0 * bend, -lean], axis=1)),
+    }
+    return motion("standing", frames, turns=turns)
+
+
 def source_places(captured: SkeletonMotion) -> np.ndarray:
     """(T, J, 3): forward kinematics by scipy, independent of the package's own."""
     places = np.zeros((len(captured), len(captured.names), 3))
