@@ -362,7 +362,7 @@ def dev(checkout: Path, *arguments: str, **environment: str) -> subprocess.Compl
 def test_dev_lists_its_commands(checkout: Path) -> None:
     done = dev(checkout)
     assert done.returncode == 0
-    for command in ("demo", "test", "lint", "types", "bench", "fuzz", "docs", "setup", "clean"):
+    for command in ("demo", "test", "lint", "types", "coverage", "bench", "fuzz", "docs", "setup", "clean"):
         assert f"  {command} " in done.stdout
 
 
