@@ -14,24 +14,24 @@ from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_RO
 from fba.parameters import faps
 
 TURNING = {OPEN_JAW, 19, 20, 21, 22, TONGUE_ROLL}
-"""FAPs that rotate the skin: there a triangle has turned over when it faces away from its neighbours."""
+"""FAPs that rotate the skin: under these a triangle has turned over if it faces away from its neighbours."""
 HAIR = ("lash", "hair")
 """Kinds of parts that are two-sided: their triangles cannot turn over."""
 LIDS = {19, 20, 21, 22}
 EYE_CORNERS = ("3.7", "3.11", "3.8", "3.12")
 CORNER = 0.12
-"""Share of the eye's width about its corners that is not checked."""
+"""Radius about the eye's corners that is not checked, as a share of the eye's width."""
 RIGID = {HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
 LONGEST = 8.0
 """Edges may grow to this many times their length..."""
 SHORT = 0.3
 """... or, if shorter than this share of the typical edge, to this many times that share."""
 SPECK = 0.003
-"""Share of the moving surface that may turn over where skin closes on itself: in the corners of eyes."""
+"""Share of the moving surface that may turn over in the folds of skin at the corners of eyes."""
 DEGENERATE = 1e-5
 """Triangles smaller than this share of the median area are ignored."""
 FACING = -0.3
-"""Cosine between a triangle's normal and its neighbours' below which it has turned over."""
+"""A triangle has turned over if the cosine between its normal and its neighbours' is below this."""
 
 
 def check_extremes(poser: Poser, fap: int) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""Checks that each FAP moves its own feature point by the right way, and leaves its mate alone."""
+"""Checks that each FAP moves its own feature point correctly and leaves that of its mate in place."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ SMALL = 10.0
 SMALL_ANGLE = 5000.0
 """The same for FAPs that count in 1e-5 rad."""
 ACCURACY = 0.05
-"""Largest error of a feature point, as a share of its way."""
+"""Largest error of a feature point, as a share of its motion."""
 MATE = 0.01
-"""Share of the moved point's way that its mate may make."""
+"""Distance that its mate may move, as a share of the point's."""
 ARC = {OPEN_JAW, 19, 20, 21, 22}
-"""FAPs whose points follow an arc: only the way along the direction is prescribed."""
+"""FAPs whose points follow an arc: only the component along the direction is prescribed."""
 THRUST_EYE = {27: "3.5", 28: "3.6"}
 EYE_POINT = {23: "3.5", 24: "3.6", 25: "3.5", 26: "3.6", **THRUST_EYE, 29: "3.5", 30: "3.6"}
 HEAD_AXIS = {HEAD_PITCH: (1.0, 0.0, 0.0), HEAD_YAW: (0.0, 1.0, 0.0), HEAD_ROLL: (0.0, 0.0, 1.0)}
@@ -53,9 +53,9 @@ def check_point(poser: Poser, fap: int) -> Iterator[Finding]:
 
 
 def point_error(poser: Poser, fap: int, value: float) -> float:
-    """Error of a shifted feature point, as a share of the way it should make; nan where it is free.
+    """Error of a shifted feature point, as a share of its correct motion; NaN where it has no vertex.
 
-    Of points on arcs, only the way along the standard's direction counts.
+    For points on arcs, only the component along the standard's direction counts.
     """
     entry = faps()[fap - 1]
     point = EYE_POINT.get(fap) or entry.feature_points[0]
@@ -132,12 +132,12 @@ def _check_gaze(poser: Poser, fap: int) -> Iterator[Finding]:
     side = "left" if EYE_POINT[fap] == "3.5" else "right"
     eye = poser.eyes[side]
     own = _eye_vertices(poser, side)
-    axis, sign = (1, 1.0) if fap in YAW_EYE else (0, 1.0)
+    axis = 1 if fap in YAW_EYE else 0
     for value in (SMALL_ANGLE, -SMALL_ANGLE):
         moved = poser.pose({fap: value})[own]
         turn = _rotation(poser.neutral[own] - eye.centre, moved - eye.centre)
         wanted = np.zeros(3)
-        wanted[axis] = sign * value * poser.model.fapu.AU
+        wanted[axis] = value * poser.model.fapu.AU
         if np.linalg.norm(turn - wanted) > ACCURACY * np.linalg.norm(wanted):
             yield Finding(
                 entry.label,
@@ -168,7 +168,7 @@ def _check_pupil(poser: Poser, fap: int) -> Iterator[Finding]:
         rim = own[front & (distance < 1.5 * radius) & (distance > 1e-6)]
     before = off_axis(poser.neutral[rim])
     for value in (6 * SMALL, -6 * SMALL):
-        # vertices inside the pupil grow in proportion, those outside it less and less
+        # Vertices inside the pupil move in proportion to their radius, those outside it less and less.
         grown = off_axis(poser.pose({fap: value})[rim]) - before
         wanted = (
             value
@@ -177,11 +177,11 @@ def _check_pupil(poser: Poser, fap: int) -> Iterator[Finding]:
             * np.where(before <= radius, before / radius, np.clip((3 * radius - before) / (2 * radius), 0, 1))
         )
         if not len(rim) or np.abs(grown - wanted).max() > 0.15 * abs(value * unit / 2):
-            found = f"{float(np.mean(grown)) * 2000:.2f} mm" if len(rim) else "no vertices there"
+            measured = f"{float(np.mean(grown)) * 2000:.2f} mm" if len(rim) else "no vertices there"
             yield Finding(
                 entry.label,
                 "the pupil's diameter grows by value x IRISD",
-                f"{found} at {value:g}",
+                f"{measured} at {value:g}",
                 f"{float(np.mean(wanted)) * 2000 if len(rim) else value * unit * 1000:.2f} mm",
             )
 
@@ -208,21 +208,21 @@ def _check_roll(poser: Poser, fap: int) -> Iterator[Finding]:
 
 
 def _eye_vertices(poser: Poser, side: str) -> Intp:
-    found = [np.zeros(0, dtype=np.intp)]
+    ranges = [np.zeros(0, dtype=np.intp)]
     for name in poser.eyes[side].parts:
         start = poser.model.starts[name]
-        found.append(np.arange(start, start + len(poser.model.part(name).vertices)))
-    return np.concatenate(found)
+        ranges.append(np.arange(start, start + len(poser.model.part(name).vertices)))
+    return np.concatenate(ranges)
 
 
 def _rotation(before: Float64, after: Float64) -> Float64:
-    """(3,) rotation vector, radians, that best takes points (N, 3) about the origin to others."""
+    """(3,) rotation vector, radians, that takes points (N, 3) about the origin closest to others."""
     from scipy.spatial.transform import Rotation
 
     if len(before) < 3:
         return np.full(3, np.nan)
-    found: Float64 = Rotation.align_vectors(after, before)[0].as_rotvec()
-    return found
+    vector: Float64 = Rotation.align_vectors(after, before)[0].as_rotvec()
+    return vector
 
 
 def _vector(numbers: Float64) -> str:

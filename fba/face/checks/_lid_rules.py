@@ -1,12 +1,14 @@
-"""Checks that closed lids meet and do not cut the eyeball."""
+"""Checks that closed lids meet and do not cut into the eyeball."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from fba.arrays import Float64
+from fba.face.authoring.regions.eyes import Eye
 from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
 
@@ -14,38 +16,37 @@ SIDES = {"left": (19, 21), "right": (20, 22)}
 """FAPs of the upper and the lower lid."""
 CLOSED = 1024
 SPLITS = (1024, 896, 768, 640, 512, 424)
-"""Values of the upper lid's FAP that are tried; the lower lid makes the rest of the way to 1024."""
+"""Values of the upper lid's FAP that are tried, each with the rest to 1024 for the lower lid."""
 GAP = 0.02
-"""The widest gap left, as a share of IRISD0."""
+"""Widest gap allowed, as a share of IRISD0."""
 CORNER = 0.04
-"""Share of the opening's width at each end that is left out as corner."""
+"""Share of the opening's width at each end that is not checked."""
 CUT = 0.01
-"""Depth that a closed lid may be in the eyeball beyond the open one, as a share of its radius."""
+"""Depth to which a closed lid may cut into the eyeball beyond the open one, as a share of its radius."""
 OUTSIDE = 0.97
-"""Vertices of the open lid this far out, in radii of the eyeball, must stay outside."""
+"""Only vertices that are at least this many radii from the eyeball's centre on the open lid are checked."""
 
 
 def check_lids(poser: Poser, side: str) -> Iterator[Finding]:
     """Yields findings about the lids of one side, "left" or "right"."""
     upper, lower = SIDES[side]
-    gaps = {split: lid_gap(poser, side, split) for split in SPLITS}
-    worst = max(gaps, key=lambda split: gaps[split])
-    if not gaps[worst] <= GAP:
+    subject = f"FAP {upper} and {lower}, {side} lids"
+    gap, split = max((lid_gap(poser, side, split), split) for split in SPLITS)
+    if not gap <= GAP:
         yield Finding(
-            f"FAP {upper} and {lower}, {side} lids",
+            subject,
             "lids meet where their values add up to 1024",
-            f"a gap of {gaps[worst]:.1%} of IRISD0 at {worst} + {CLOSED - worst}",
+            f"a gap of {gap:.1%} of IRISD0 at {split} + {CLOSED - split}",
             f"under {GAP:.0%}",
         )
     if not poser.eyes[side].measured:
         return
-    cuts = {split: lid_cut(poser, side, split) for split in SPLITS}
-    worst = max(cuts, key=lambda split: cuts[split])
-    if not cuts[worst] <= CUT:
+    cut, split = max((lid_cut(poser, side, split), split) for split in SPLITS)
+    if not cut <= CUT:
         yield Finding(
-            f"FAP {upper} and {lower}, {side} lids",
+            subject,
             "lids do not cut the eyeball",
-            f"{cuts[worst]:.1%} of its radius deep at {worst} + {CLOSED - worst}",
+            f"{cut:.1%} of its radius deep at {split} + {CLOSED - split}",
             f"at most {CUT:.0%}",
         )
 
@@ -57,63 +58,72 @@ def lid_gap(poser: Poser, side: str, split: float) -> float:
     lines = [poser.contour(f"{side} {lid} lid", moved) for lid in ("upper", "lower")]
     if any(len(line) < 3 for line in lines):
         return float("nan")
-    # in the very corners the lids are one skin
+    # At the corners the lids are one skin.
     ends = sorted((lines[0][0, 0], lines[0][-1, 0]))
-    hem = CORNER * (ends[1] - ends[0])
+    margin = CORNER * (ends[1] - ends[0])
     widest = 0.0
     for line, other in (lines, lines[::-1]):
-        between = (line[:, 0] > ends[0] + hem) & (line[:, 0] < ends[1] - hem)
+        between = (line[:, 0] > ends[0] + margin) & (line[:, 0] < ends[1] - margin)
         widest = max(widest, float(_distances_to_line(line[between], other).max(initial=0.0)))
     return widest / (poser.model.fapu.IRISD * 1024)
 
 
 def lid_cut(poser: Poser, side: str, split: float) -> float:
-    """Greatest depth of closed lids in the eyeball beyond the open ones, as a share of its radius."""
+    """Greatest depth of closed lids inside the eyeball beyond that of open ones, as a share of its radius."""
     upper, lower = SIDES[side]
     eye = poser.eyes[side]
     surface = poser.marks.surface
     before = surface.vertices
     after = poser.surface(poser.pose({upper: split, lower: CLOSED - split}))
     moving = np.abs(after - before).max(axis=1) > 1e-6
-    profile = _EyeballProfile(poser, side)
-    # a lid's inner side may run into the eyeball where nobody sees it
+    profile = _measure_profile(poser, side)
+    # The inner side of a lid may run into the eyeball where it cannot be seen.
     outside = profile.depth(before) < (1 - OUTSIDE) * eye.radius
     triangles = surface.triangles[
         moving[surface.triangles].any(axis=1) & outside[surface.triangles].all(axis=1)
     ]
     deepest = 0.0
-    # the middles of edges and triangles dip deeper than their corners
+    # Midpoints of edges and triangles are deeper inside than their corners.
     for shares in ((1, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3)):
-        was, now = (np.einsum("fkd,k->fd", place[triangles], shares) for place in (before, after))
+        was, now = (np.einsum("fkd,k->fd", vertices[triangles], shares) for vertices in (before, after))
         deeper = profile.depth(now) - np.maximum(profile.depth(was), 0.0)
         deepest = max(deepest, float(deeper[now[:, 2] > eye.centre[2]].max(initial=0.0)))
     return deepest / eye.radius
 
 
+@dataclass(frozen=True, eq=False)
 class _EyeballProfile:
-    """Distance of the eyeball's surface from its centre at each angle from its gaze."""
+    """Distance of the eyeball's surface from its centre, `reach`, at each of the `angles` from its gaze."""
 
-    def __init__(self, poser: Poser, side: str) -> None:
-        self._eye = poser.eyes[side]
-        self._edges = np.radians(np.arange(0, 186, 6.0))
-        self._reach = np.full(len(self._edges), self._eye.radius)
-        for name in self._eye.parts:
-            arms = poser.model.part(name).vertices.astype(np.float64) - self._eye.centre
-            angle, reach = self._polar(arms)
-            for k, at in enumerate(self._edges):
-                near = np.abs(angle - at) <= np.radians(3.0)
-                if near.any():
-                    self._reach[k] = max(float(np.median(reach[near])), self._eye.radius)
+    eye: Eye
+    angles: Float64
+    reach: Float64
 
     def depth(self, points: Float64) -> Float64:
         """(N,) metres below the eyeball's surface, negative outside."""
-        angle, reach = self._polar(points - self._eye.centre)
-        result: Float64 = np.interp(angle, self._edges, self._reach) - reach
+        angle, distance = _polar(self.eye, points)
+        result: Float64 = np.interp(angle, self.angles, self.reach) - distance
         return result
 
-    def _polar(self, arms: Float64) -> tuple[Float64, Float64]:
-        reach = np.linalg.norm(arms, axis=1)
-        return np.arccos(np.clip(arms @ self._eye.gaze / np.maximum(reach, 1e-12), -1, 1)), reach
+
+def _measure_profile(poser: Poser, side: str) -> _EyeballProfile:
+    eye = poser.eyes[side]
+    angles = np.radians(np.arange(0, 186, 6.0))
+    reach = np.full(len(angles), eye.radius)
+    for name in eye.parts:
+        angle, distance = _polar(eye, poser.model.part(name).vertices.astype(np.float64))
+        for k in range(len(angles)):
+            near = np.abs(angle - angles[k]) <= np.radians(3.0)
+            if near.any():
+                reach[k] = max(float(np.median(distance[near])), eye.radius)
+    return _EyeballProfile(eye, angles, reach)
+
+
+def _polar(eye: Eye, points: Float64) -> tuple[Float64, Float64]:
+    """(N,) angle of points (N, 3) from the gaze, radians, and distance from the eyeball's centre."""
+    arms = points - eye.centre
+    distance = np.linalg.norm(arms, axis=1)
+    return np.arccos(np.clip(arms @ eye.gaze / np.maximum(distance, 1e-12), -1, 1)), distance
 
 
 def _distances_to_line(points: Float64, line: Float64) -> Float64:

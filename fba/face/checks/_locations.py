@@ -1,7 +1,9 @@
-"""Checks the positions of feature points on a neutral face, by the standard's rules and by anatomy.
+"""Checks the positions of feature points on a neutral face, and the distances between them.
 
-`locations.csv` lists them for the left half and the midline; the right half mirrors them. share is the
-slack, as a share of the distance between the pupils.
+`locations.csv` lists rules of the standard and of anatomy for the left half and the midline; the right half
+mirrors them. share is the slack, as a share of the distance between the pupils. `human.csv` lists limits of
+sizes in millimetres, from children of three to the biggest adults: published norms of both, four standard
+deviations beyond the outermost mean, rounded outwards.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ _DIRECTIONS = {"x": ("left of", "right of"), "y": ("above", "below"), "z": ("bef
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One line of the table. sign: -1 where it was mirrored in x."""
+    """One line of `locations.csv`. sign: -1 where it was mirrored in x."""
 
     point: str
     axis: str
@@ -37,7 +39,7 @@ class Rule:
     sign: float = 1.0
 
     def violation(self, points: Float64, unit: float) -> tuple[str, str] | None:
-        """(found, expected) where points (84, 3) break the rule; None where they keep it or are unknown."""
+        """Texts (found, expected) where points (84, 3) break the rule, else None, as for unknown points."""
         others = [name for name in (self.first, self.second) if name]
         column = AXES[self.axis]
         value, *limits = (float(points[row_of()[name], column]) for name in (self.point, *others))
@@ -64,8 +66,8 @@ class Rule:
 
 @cache
 def rules() -> tuple[Rule, ...]:
-    """Every rule of the table, and the mirror image of those for one side."""
-    found = []
+    """Every rule of `locations.csv`, and the mirror image of those for one side."""
+    result = []
     with (files(__package__) / "locations.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             severity: Literal["error", "warning"] = "error" if row["severity"] == "error" else "warning"
@@ -75,10 +77,10 @@ def rules() -> tuple[Rule, ...]:
                 if sign > 0 or mirrored != names:
                     side = sign if row["axis"] == "x" else 1.0
                     rule = row["rule"]
-                    found.append(
+                    result.append(
                         Rule(point, row["axis"], rule, first, second, float(row["share"]), severity, side)
                     )
-    return tuple(found)
+    return tuple(result)
 
 
 def check_locations(points: Float64) -> Iterator[Finding]:
@@ -98,6 +100,42 @@ def check_locations(points: Float64) -> Iterator[Finding]:
         broken = rule.violation(points, unit)
         if broken is not None:
             yield Finding(f"feature point {rule.point}", f"location: {rule.rule}", *broken, rule.severity)
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """A distance along one axis between two feature points, and its limits in mm."""
+
+    measure: str
+    first: str
+    second: str
+    axis: str
+    low: float
+    high: float
+    what: str
+
+
+@cache
+def human_sizes() -> tuple[Size, ...]:
+    """Every size of `human.csv`."""
+    with (files(__package__) / "human.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return tuple(Size(low=float(row.pop("low")), high=float(row.pop("high")), **row) for row in rows)
+
+
+def check_sizes(points: Float64) -> Iterator[Finding]:
+    """Yields a finding per size outside its limits. points: (84, 3), metres, NaN where unknown."""
+    for size in human_sizes():
+        ends = points[[row_of()[size.first], row_of()[size.second]], AXES[size.axis]]
+        millimetres = abs(float(ends[0] - ends[1])) * 1000
+        if np.isfinite(millimetres) and not size.low <= millimetres <= size.high:
+            yield Finding(
+                size.measure,
+                "size of a human face",
+                f"{millimetres:.1f} mm ({size.first} to {size.second}: {size.what})",
+                f"{size.low:g} to {size.high:g} mm",
+                "warning",
+            )
 
 
 def _mm(metres: float) -> str:

@@ -12,16 +12,16 @@ from fba.face.checks.posing import Poser
 from fba.face.points import OPEN_JAW
 
 PAIRS = ((4, 5), (8, 10), (9, 11))
-"""Inner lip FAPs one above the other."""
+"""Inner lip FAPs, each upper one with the lower one below it."""
 OUTER_PAIRS = ((51, 52), (55, 57), (56, 58))
 TOGETHER = 150.0
-"""Value by which all lips are moved together, up and down."""
+"""Value by which both lips are moved together, up and down."""
 APART = 0.06
-"""How much further apart lips that move together may get, as a share of MNS0."""
+"""How much the gap between lips that move together may widen, as a share of MNS0."""
 OPEN = 400.0
-"""Value of open_jaw that is checked."""
+"""Value of open_jaw at which the mouth is checked."""
 STILL = 0.03
-"""Share of the chin's way that points may move which should stay."""
+"""Distance that points which should stay may move, as a share of the chin's."""
 
 
 def check_mouth(poser: Poser) -> Iterator[Finding]:
@@ -35,11 +35,9 @@ def check_mouth(poser: Poser) -> Iterator[Finding]:
 
 def lip_gap(poser: Poser, value: float) -> float:
     """Widening of the gap between lips that all move down by the same value, as a share of MNS0."""
-    chosen = [*PAIRS, *(pair for pair in OUTER_PAIRS if set(pair) <= set(poser.model.table_of))]
-    moved = poser.pose(
-        {fap: sign * value for pair in chosen for fap, sign in zip(pair, (1, -1), strict=True)}
-    )
-    now, before = (_lip_distances(poser, place) for place in (moved, poser.neutral))
+    pairs = [*PAIRS, *(pair for pair in OUTER_PAIRS if set(pair) <= set(poser.model.table_of))]
+    values = {fap: sign * value for pair in pairs for fap, sign in zip(pair, (1, -1), strict=True)}
+    now, before = (_lip_distances(poser, vertices) for vertices in (poser.pose(values), poser.neutral))
     if not len(now):
         return float("nan")
     return float(np.abs(now - before).max() / (poser.model.fapu.MNS * 1024))
@@ -58,7 +56,7 @@ def _check_touching_lips(poser: Poser) -> Iterator[Finding]:
 
 
 def _lip_distances(poser: Poser, moved: Float64) -> Float64:
-    """(C,) how far the lower lip is below the upper one, along the middle three quarters of the mouth."""
+    """(C,) gap between the lips along the middle three quarters of the mouth, metres."""
     upper, lower = (poser.contour(f"{name} inner lip", moved) for name in ("upper", "lower"))
     if len(upper) < 3 or len(lower) < 3:
         return np.zeros(0)

@@ -10,14 +10,13 @@ the distance between the pupils or 0.02 of the mouth's width.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fba.arrays import Float64
 from fba.face.checks._findings import Finding
-from fba.face.checks._locations import check_locations
-from fba.face.checks._sizes import check_sizes
+from fba.face.checks._locations import check_locations, check_sizes
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, Eyeball, eyeballs, gaze, pupil_diameter
 from fba.face.fapu import PER_DISTANCE
 from fba.face.feature_points import MIRRORED, row_of
@@ -31,20 +30,20 @@ Limits = tuple[float, float]
 GAZE: Limits = (3.0, 8.0)
 """Degrees between gaze and +z."""
 TANGENT: Limits = (0.08, 0.25)
-"""Of the iris's diameter: how far the edge of the iris may be from a lid margin."""
+"""Distance of the edge of the iris from a lid margin, as a share of the iris's diameter."""
 PUPIL: Limits = (0.15, 0.5)
 """Relative deviation of the pupil's diameter from a third of the iris's."""
 IRIS_OF_EYEBALL = (0.38, 0.62)
-"""Diameter of the iris by that of the eyeball: 11.7 by 24 mm, with room."""
+"""Range of the iris's diameter as a share of the eyeball's; a typical one is 11.7 mm of 24 mm."""
 ROUND = 0.02
-"""Of the radius: root mean square deviation of an eyeball from a sphere."""
+"""Root mean square deviation of an eyeball from a sphere, as a share of its radius."""
 LIPS: Limits = (0.01, 0.03)
 LIP_LINE: Limits = (0.05, 0.15)
 TEETH: Limits = (0.02, 0.06)
 TONGUE: Limits = (0.08, 0.25)
 """Shares of the width of the mouth."""
 SYMMETRY = 0.04
-"""Of the distance between the pupils: mean deviation from the mirror image above which there is a warning."""
+"""Mean deviation from the mirror image, as a share of the distance between the pupils, that is a warning."""
 
 
 def check_neutral(model: FaceModel) -> list[Finding]:
@@ -77,12 +76,12 @@ def _check_missing(model: FaceModel) -> Iterator[Finding]:
 
 
 def _check_eyes(model: FaceModel) -> Iterator[Finding]:
-    found = eyeballs(model)
+    eyes = eyeballs(model)
     for side in PUPIL_POINT:
-        if side not in found:
+        if side not in eyes:
             yield Finding(f"{side} eye", "eyeball", "no part of kind eye", "one on each side", "warning")
             continue
-        yield from _check_eye(model, found[side])
+        yield from _check_eye(model, eyes[side])
     for side, (upper, lower) in LID_POINTS.items():
         yield from _check_lids(model, side, upper, lower)
 
@@ -100,11 +99,8 @@ def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
     direction = gaze(model, eye)
     if direction is not None:
         angle = float(np.degrees(np.arccos(np.clip(direction[2], -1.0, 1.0))))
-        severity = _severity(angle, GAZE)
-        if severity:
-            yield Finding(
-                subject, "gaze along +z", f"{angle:.1f} degrees off", f"at most {GAZE[0]:g} degrees", severity
-            )
+        off, limit = f"{angle:.1f} degrees off", f"at most {GAZE[0]:g} degrees"
+        yield from _judge(angle, GAZE, subject, "gaze along +z", off, limit)
     iris = model.fapu.IRISD * PER_DISTANCE
     share = iris / (2 * eye.radius)
     if not IRIS_OF_EYEBALL[0] <= share <= IRIS_OF_EYEBALL[1]:
@@ -117,15 +113,14 @@ def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
         )
     pupil = pupil_diameter(model, eye)
     if pupil is not None:
-        severity = _severity(abs(pupil / (iris / 3) - 1), PUPIL)
-        if severity:
-            yield Finding(
-                subject,
-                "pupil a third of the iris",
-                f"{_mm(pupil)}, {pupil / iris:.2f} of it",
-                f"{_mm(iris / 3)} +- {100 * PUPIL[0]:.0f} %",
-                severity,
-            )
+        yield from _judge(
+            abs(pupil / (iris / 3) - 1),
+            PUPIL,
+            subject,
+            "pupil a third of the iris",
+            f"{_mm(pupil)}, {pupil / iris:.2f} of it",
+            f"{_mm(iris / 3)} +- {100 * PUPIL[0]:.0f} %",
+        )
 
 
 def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
@@ -134,70 +129,63 @@ def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator
     pupil = _point(model, PUPIL_POINT[side])
     for name, edge in ((upper, 0.5 * iris), (lower, -0.5 * iris)):
         height = float(_point(model, name)[1] - pupil[1])
-        severity = _severity(abs(height - edge) / iris, TANGENT)
-        if severity:
-            yield Finding(
-                f"feature point {name}",
-                "lid tangent to the iris",
-                f"{_mm(height)} above the pupil" if edge > 0 else f"{_mm(-height)} below the pupil",
-                f"{_mm(abs(edge))} +- {_mm(TANGENT[0] * iris)}, half of the iris",
-                severity,
-            )
+        yield from _judge(
+            abs(height - edge) / iris,
+            TANGENT,
+            f"feature point {name}",
+            "lid tangent to the iris",
+            f"{_mm(height)} above the pupil" if edge > 0 else f"{_mm(-height)} below the pupil",
+            f"{_mm(abs(edge))} +- {_mm(TANGENT[0] * iris)}, half of the iris",
+        )
 
 
 def _check_lips(model: FaceModel) -> Iterator[Finding]:
     width = model.fapu.MW * PER_DISTANCE
     for upper, lower in (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9")):
-        gap = float(_point(model, upper)[1] - _point(model, lower)[1])
-        severity = _severity(abs(gap) / width, LIPS)
-        if severity:
-            yield Finding(
-                f"feature points {upper} and {lower}",
-                "lips touch",
-                f"{_mm(abs(gap))} {'apart' if gap > 0 else 'into each other'}",
-                f"at most {_mm(LIPS[0] * width)}",
-                severity,
-            )
-    heights = np.array([_point(model, name)[1] for name in ("2.2", "2.3", "2.4", "2.5")])
-    middle = float(heights[:2].mean())
-    for name, height in (("2.4", heights[2]), ("2.5", heights[3])):
-        severity = _severity(abs(height - middle) / width, LIP_LINE)
-        if severity:
-            yield Finding(
-                f"feature point {name}",
-                "lips meet on a level line through the corners",
-                f"{_mm(height - middle, sign=True)} against their middle",
-                f"at most {_mm(LIP_LINE[0] * width)}",
-                severity,
-            )
+        yield from _check_touching(model, upper, lower, "lips touch", LIPS)
+    middle = float(np.mean([_point(model, name)[1] for name in ("2.2", "2.3")]))
+    for name in ("2.4", "2.5"):
+        off = float(_point(model, name)[1]) - middle
+        yield from _judge(
+            abs(off) / width,
+            LIP_LINE,
+            f"feature point {name}",
+            "lips meet on a level line through the corners",
+            f"{_mm(off, sign=True)} against their middle",
+            f"at most {_mm(LIP_LINE[0] * width)}",
+        )
 
 
 def _check_teeth(model: FaceModel) -> Iterator[Finding]:
+    yield from _check_touching(model, "9.10", "9.11", "teeth touch", TEETH)
     width = model.fapu.MW * PER_DISTANCE
-    gap = float(_point(model, "9.10")[1] - _point(model, "9.11")[1])
-    severity = _severity(abs(gap) / width, TEETH)
-    if severity:
-        yield Finding(
-            "feature points 9.10 and 9.11",
-            "teeth touch",
-            f"{_mm(abs(gap))} {'apart' if gap > 0 else 'into each other'}",
-            f"at most {_mm(TEETH[0] * width)}",
-            severity,
-        )
     jaws = _jaws(model.of_kind("teeth"))
     if jaws is not None:
         from scipy.spatial import cKDTree
 
         apart = float(cKDTree(_surface(jaws[0])).query(_surface(jaws[1]))[0].min())
-        severity = _severity(apart / width, TEETH)
-        if severity:
-            yield Finding(
-                f"parts {jaws[0].name} and {jaws[1].name}",
-                "teeth touch",
-                f"{_mm(apart)} apart where they are nearest",
-                f"at most {_mm(TEETH[0] * width)}",
-                severity,
-            )
+        yield from _judge(
+            apart / width,
+            TEETH,
+            f"parts {jaws[0].name} and {jaws[1].name}",
+            "teeth touch",
+            f"{_mm(apart)} apart where they are nearest",
+            f"at most {_mm(TEETH[0] * width)}",
+        )
+
+
+def _check_touching(model: FaceModel, upper: str, lower: str, rule: str, limits: Limits) -> Iterator[Finding]:
+    """Two feature points are at one height; limits: shares of the width of the mouth."""
+    width = model.fapu.MW * PER_DISTANCE
+    gap = float(_point(model, upper)[1] - _point(model, lower)[1])
+    yield from _judge(
+        abs(gap) / width,
+        limits,
+        f"feature points {upper} and {lower}",
+        rule,
+        f"{_mm(abs(gap))} {'apart' if gap > 0 else 'into each other'}",
+        f"at most {_mm(limits[0] * width)}",
+    )
 
 
 def _surface(part: Part) -> Float64:
@@ -220,26 +208,24 @@ def _check_tongue(model: FaceModel) -> Iterator[Finding]:
     tip = _point(model, "6.1")
     for name in ("6.2", "6.3", "6.4"):
         rise = float(_point(model, name)[1] - tip[1])
-        severity = _severity(abs(rise) / width, TONGUE)
-        if severity:
-            yield Finding(
-                f"feature point {name}",
-                "tongue flat",
-                f"{_mm(rise, sign=True)} against the tip (6.1)",
-                f"at most {_mm(TONGUE[0] * width)}",
-                "warning",
-            )
+        yield from _judge(
+            abs(rise) / width,
+            (TONGUE[0], np.inf),
+            f"feature point {name}",
+            "tongue flat",
+            f"{_mm(rise, sign=True)} against the tip (6.1)",
+            f"at most {_mm(TONGUE[0] * width)}",
+        )
     boundary = (_point(model, "9.10") + _point(model, "9.11")) / 2
     off = float(tip[1] - boundary[1])
-    severity = _severity(abs(off) / width, TONGUE)
-    if severity:
-        yield Finding(
-            "feature point 6.1",
-            "tip of the tongue where the teeth meet",
-            f"{_mm(off, sign=True)} against 9.10 and 9.11",
-            f"at most {_mm(TONGUE[0] * width)}",
-            severity,
-        )
+    yield from _judge(
+        abs(off) / width,
+        TONGUE,
+        "feature point 6.1",
+        "tip of the tongue where the teeth meet",
+        f"{_mm(off, sign=True)} against 9.10 and 9.11",
+        f"at most {_mm(TONGUE[0] * width)}",
+    )
     behind = float(_point(model, "9.11")[2] - tip[2])
     if np.isfinite(behind) and not -0.01 * width <= behind <= 0.2 * width:
         yield Finding(
@@ -273,15 +259,16 @@ def _check_symmetry(points: Float64) -> Iterator[Finding]:
 
 
 def _point(model: FaceModel, name: str) -> Float64:
-    place: Float64 = model.points[row_of()[name]]
-    return place
+    point: Float64 = model.points[row_of()[name]]
+    return point
 
 
-def _severity(deviation: float, limits: Limits) -> Literal["error", "warning"] | None:
-    """None for a small deviation, or one that is not known (NaN)."""
-    if deviation > limits[1]:
-        return "error"
-    return "warning" if deviation > limits[0] else None
+def _judge(
+    deviation: float, limits: Limits, subject: str, rule: str, found: str, expected: str
+) -> Iterator[Finding]:
+    """Yields a finding where a deviation exceeds the limits; none where it is unknown (NaN)."""
+    if deviation > limits[0]:
+        yield Finding(subject, rule, found, expected, "error" if deviation > limits[1] else "warning")
 
 
 def _mm(metres: float, *, sign: bool = False) -> str:

@@ -1,4 +1,4 @@
-"""Each FAP of a model, measured against the standard."""
+"""Checks each FAP of a model against the standard."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MODERATE = 300.0
 """Value at which regions are checked; for FAPs in units of angle, 100 times it."""
 SHARE = 0.03
-"""Vertices that move less than this share of the longest way count as still."""
+"""Vertices that move less than this share of the largest motion count as still."""
 
 
 def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Finding]:
@@ -33,11 +33,11 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
     faps: numbers of the FAPs to check (3..68), all by default; those in `model.lost` are left out. For
     each: its feature point moves by value x FAPU in the standard's direction (within 5 % at small values;
     on arcs, along the direction), its mate stays, nothing outside its region moves, and no triangle turns
-    over or tears at the limits of its range. For all together: lids meet where their values add up to
-    1024 and do not cut the eyeball; lips stay in touch where theirs add up to 0; the jaw takes lower teeth
-    and tongue along and leaves lips and upper teeth.
+    over or tears at the limits of its range. For combinations: lids meet where their values add up to 1024
+    and do not cut the eyeball; lips stay in touch where theirs add up to 0; the jaw moves lower teeth and
+    tongue but not lips and upper teeth.
 
-    Raises OptionError for another number.
+    Raises OptionError for a number outside 3..68.
     """
     from fba.face.checks.posing import Poser
 
@@ -49,13 +49,10 @@ def check_faps(model: FaceModel, faps: Iterable[int] | None = None) -> list[Find
 
 
 def check_posed(poser: Poser, wanted: Iterable[int]) -> list[Finding]:
-    """`check_faps` for a model that already has a `Poser`, to check it several times at less cost."""
+    """`check_faps` for a model that already has a `Poser`, which makes repeated checks faster."""
     wanted = list(wanted)
-    found: list[Finding] = []
-    for fap in wanted:
-        found += _check_one(poser, fap)
-    found += _check_combinations(poser, set(wanted))
-    return found
+    findings = [finding for fap in wanted for finding in _check_one(poser, fap)]
+    return [*findings, *_check_combinations(poser, set(wanted))]
 
 
 def _check_one(poser: Poser, fap: int) -> Iterator[Finding]:
@@ -88,13 +85,13 @@ def _check_combinations(poser: Poser, wanted: set[int]) -> Iterator[Finding]:
 
 @cache
 def _region_table() -> dict[int, tuple[tuple[str, ...], float]]:
-    """By FAP: the points of its region, and how far from them in ES0 it may reach."""
-    found = {}
+    """By FAP: the points of its region, and how far from them its motion may reach, in ES0."""
+    regions = {}
     with (files(__package__) / "fap_regions.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             for fap in row["faps"].split():
-                found[int(fap)] = (tuple(row["points"].split()), float(row["reach"]))
-    return found
+                regions[int(fap)] = (tuple(row["points"].split()), float(row["reach"]))
+    return regions
 
 
 def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:

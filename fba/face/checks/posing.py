@@ -1,4 +1,7 @@
-"""Poses a face model by its tables in plain NumPy, for measuring, independently of the deformer."""
+"""Poses a face model by its tables in double precision, to measure it.
+
+Kept apart from the compiled deformer, which rounds to 32 bits and takes long to build for a few poses.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float64, Intp
+from fba.arrays import Float64
 from fba.face.authoring.regions.eyes import Eye, find_eyes
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.feature_points import row_of
@@ -23,14 +26,17 @@ KIND_ORDER = ("scale", "rotation", "translation")
 class Poser:
     """Poses a model and measures it.
 
-    like: another Poser; if its model has the same neutral face, its surface, landmarks and eyes are reused.
+    like: a Poser whose neutral face is the same apart from its tables: its landmarks and eyes are reused.
     """
 
     def __init__(self, model: FaceModel, like: Poser | None = None) -> None:
         self.model = model
         self.neutral: Float64 = model.vertices.astype(np.float64)
-        if like is not None and _same_face(model, like.model):
-            self.__dict__.update(marks=like.marks, eyes=like.eyes)
+        self._landmarks: _NeutralLandmarks = (
+            like._landmarks
+            if like is not None and _same_face(model, like.model)
+            else _NeutralLandmarks(model)
+        )
 
     def pose(self, values: Mapping[int, float]) -> Float64:
         """(V, 3) float64, metres: all vertices under FAP values by number, without the head's rotation."""
@@ -72,29 +78,23 @@ class Poser:
 
     def point(self, point: str) -> Float64:
         """(3,) a neutral feature point."""
-        place: Float64 = self.model.points[row_of()[point]]
-        return place
-
-    @cached_property
-    def marks(self) -> Landmarks:
-        """Feature points and contours on the skin."""
-        surface = weld_skin(self.model.parts, self.model.bound)
-        return find_landmarks(surface, self.model.points, self.model.bound)
+        position: Float64 = self.model.points[row_of()[point]]
+        return position
 
     @property
-    def pool(self) -> Intp:
-        """Vertices of skin and inner mouth, counted through all parts."""
-        return self.marks.surface.pool
+    def marks(self) -> Landmarks:
+        """Feature points and contours on the skin."""
+        return self._landmarks.marks
 
-    @cached_property
+    @property
     def eyes(self) -> dict[str, Eye]:
         """The eyes by side, "left" and "right"."""
-        return find_eyes(self.marks, self.model.parts)
+        return self._landmarks.eyes
 
     def surface(self, moved: Float64) -> Float64:
         """(N, 3): posed vertices (V, 3) of the model as vertices of `marks.surface`."""
         result = self.marks.surface.vertices.copy()
-        result[self.marks.surface.number] = moved[self.pool]
+        result[self.marks.surface.number] = moved[self.marks.surface.pool]
         return result
 
     def contour(self, name: str, moved: Float64) -> Float64:
@@ -102,8 +102,24 @@ class Poser:
         return self.surface(moved)[self.marks.contour(name)]
 
 
+class _NeutralLandmarks:
+    """Landmarks and eyes of a model's neutral face, found when they are first needed."""
+
+    def __init__(self, model: FaceModel) -> None:
+        self._model = model
+
+    @cached_property
+    def marks(self) -> Landmarks:
+        surface = weld_skin(self._model.parts, self._model.bound)
+        return find_landmarks(surface, self._model.points, self._model.bound)
+
+    @cached_property
+    def eyes(self) -> dict[str, Eye]:
+        return find_eyes(self.marks, self._model.parts)
+
+
 def _same_face(one: FaceModel, other: FaceModel) -> bool:
-    """Whether two models differ in their tables and names alone."""
+    """Whether two models differ only in their tables and names."""
     return (
         len(one.parts) == len(other.parts)
         and all(a is b for a, b in zip(one.parts, other.parts, strict=True))
