@@ -14,7 +14,7 @@ import click
 
 from fba import __version__
 from fba.cli._sigint import Interruptions
-from fba.cli.options import Group, described, examples
+from fba.cli.command import Group, describe, examples
 from fba.cli.program import NAME, program_words, with_program
 from fba.cli.startup import INTERRUPTED, TEXT, collect_less
 from fba.compiled import compilation_listener
@@ -188,7 +188,7 @@ def _one_line(error: BaseException) -> str:
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
     if issubclass(category, FbaWarning):
-        text = described(message) if isinstance(message, FbaWarning) else str(message)
+        text = describe(message) if isinstance(message, FbaWarning) else str(message)
         click.echo(f"fba: warning: {text}", err=True)
 
 

@@ -12,21 +12,19 @@ import os
 import stat
 import sys
 import tempfile
-import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import click
 
-from fba.errors import FbaError, FormatError
+from fba.cli.inputs import renamed
+from fba.errors import FormatError
 
 if TYPE_CHECKING:
     from fba.formats.registry import Format
-
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 STANDARD = Path("-")
 """Standard output, or standard input."""
@@ -61,10 +59,6 @@ class OutputType(click.ParamType[Path]):
             self.fail(f"there is no folder {text}; make it first, or leave the slash out", param, ctx)
         # Path("./-") would be "-"
         return Path(text) if Path(text) != STANDARD else Path(os.path.abspath(text))
-
-
-def no_clobber_option(command: Command) -> Command:
-    return click.option("--no-clobber", is_flag=True, help="Fail if an output file already exists.")(command)
 
 
 @dataclass(frozen=True)
@@ -143,21 +137,15 @@ class Outputs:
             return
         with tempfile.TemporaryDirectory(prefix="fba-") as folder:
             temporary = Path(folder) / f"animation{suffix}"
-            with _messages_about(path, temporary):
+            with renamed(temporary, display_name(path)):
                 yield temporary
             with temporary.open("rb") as file, _opened(path) as target:
                 while chunk := file.read(CHUNK):
                     target.write(chunk)
 
 
-def to_option(command: Command) -> Command:
-    return click.option(
-        "--to", metavar="FORMAT", help="Output format, if OUT is - or its suffix does not show it."
-    )(command)
-
-
-def writer_of(path: Path, to: str | None) -> Format:
-    """The format to write; to: that of `--to`.
+def find_writer(path: Path, to: str | None) -> Format:
+    """Return the format to write. to: value of `--to`.
 
     Raises click.UsageError for standard output without `to`, and what `fba.formats.writer_for` raises.
     """
@@ -168,8 +156,8 @@ def writer_of(path: Path, to: str | None) -> Format:
     return writer_for(path, to)
 
 
-def shown(path: Path) -> str:
-    """What a report calls an output."""
+def display_name(path: Path) -> str:
+    """Return the name of an output in a report."""
     return "standard output" if path == STANDARD else str(path)
 
 
@@ -338,18 +326,3 @@ def _named_pipe(path: Path) -> BinaryIO | None:
         return path.open("wb")
     os.set_blocking(handle, True)
     return os.fdopen(handle, "wb")
-
-
-@contextmanager
-def _messages_about(path: Path, temporary: Path) -> Iterator[None]:
-    """Errors and warnings about a temporary file name what the user knows."""
-    with warnings.catch_warnings(record=True) as caught:
-        try:
-            yield
-        except FbaError as error:
-            error.args = (str(error).replace(str(temporary), shown(path)),)
-            raise
-        finally:
-            found = [(str(one.message).replace(str(temporary), shown(path)), one.category) for one in caught]
-    for text, category in found:
-        warnings.warn(text, category, stacklevel=3)

@@ -6,15 +6,15 @@ import contextlib
 import os
 import stat
 import sys
-import tempfile
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import click
 
 from fba.animation import Animation
-from fba.cli import options
+from fba.cli import inputs
 from fba.cli.scene_options import SceneOptions, SoundOptions
 from fba.errors import FbaWarning, FormatError
 
@@ -35,16 +35,16 @@ Shown = tuple["Animation | LiveAnimation", bool]
 def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Shown:
     """A file's animation; of an FBA stream on standard input or in a FIFO, one that grows. And whether it is.
 
-    What arrives in another format is read to its end first. said: see `options.read_input`.
+    What arrives in another format is read to its end first. said: see `inputs.read_input`.
     Raises click.UsageError where standard input is a
-    terminal, what `options.read_input` raises, and what `LiveAnimation.wait` raises.
+    terminal, what `inputs.read_input` raises, and what `LiveAnimation.wait` raises.
     """
     bap_steps, fps, salvage = how.bap_steps, how.fps, how.salvage
     name = "standard input" if str(file) == "-" else file.name
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
-        animation = options.read_input(
+        animation = inputs.read_input(
             file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, said=said, format=how.format
         )
         return animation, False
@@ -56,7 +56,7 @@ def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Show
         if not head:
             raise FormatError("is empty", path=name)
         if not head.startswith(STREAMS):
-            return _spooled(head, source, name, how), False
+            return _read_other(head, source, name, how), False
         from fba_player.playback.live import LiveAnimation, wait_for
 
         close = stack.pop_all().close
@@ -76,7 +76,7 @@ def is_pipe(file: Path) -> bool:
 
 def scene(shown: list[Shown], names: list[str], how: SceneOptions, *, over: bool = False) -> Any:
     """One scene of what `opened` gave, or several in one. over: over each other, but for `--arrange`."""
-    face, figure = options.read_model(how.model), _body(how.body)
+    face, figure = inputs.read_model(how.model), inputs.read_body(how.body)
     scenes = [_scene_of(animation, growing, face, figure, how) for animation, growing in shown]
     found: Any = scenes[0]
     if len(scenes) > 1:
@@ -150,32 +150,16 @@ def _scene_of(
     return Scene(animation, face, timeline=timeline, **given)  # type: ignore[arg-type]
 
 
-def _body(path: Path | None) -> BodyModel | None:
-    """The body of `--body`, or None for the built-in one."""
-    if path is None:
-        return None
-    from fba.body.model import BodyModel
-
-    return BodyModel.load(path)
-
-
 def _fifo(file: Path) -> BinaryIO:
     click.echo(f"fba: waiting for a sender to open {file}", err=True)
     return open(file, "rb")
 
 
-def _spooled(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> Animation:
-    with tempfile.TemporaryDirectory(prefix="fba-") as folder:
-        path = Path(folder) / "stdin"
-        with path.open("wb") as file:
-            file.write(head)
-            while chunk := source.read(1 << 20):
-                file.write(chunk)
-        with options.renamed(path, name):
-            animation = options.read_input(
-                path, bap_steps=how.bap_steps, header_fps=how.fps, name=name, salvage=how.salvage,
-                format=how.format,
-            )  # fmt: skip
-    if animation.name != path.name:
-        return animation
-    return Animation(animation.rate, animation.index, animation.face, animation.body, name)
+def _read_other(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> Animation:
+    """Return what a pipe holds that carries no FBA stream. head: what was read from it before."""
+    with inputs.spooled(source, name, head) as path:
+        animation = inputs.read_input(
+            path, bap_steps=how.bap_steps, header_fps=how.fps, name=name, salvage=how.salvage,
+            format=how.format,
+        )  # fmt: skip
+    return replace(animation, name=name) if animation.name == path.name else animation

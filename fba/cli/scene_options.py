@@ -1,4 +1,4 @@
-"""The options that `fba play` and `fba render` share: which files are shown, how, and with what sound."""
+"""Options that `fba play` and `fba render` share: which files are shown, how, and with which sound."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any
 import click
 
 from fba.cli import options
-
-Command = Callable[..., Any]
+from fba.cli.command import Decorated
+from fba.cli.inputs import EXISTING
 
 MOST = 8
 """Files shown at once."""
@@ -21,7 +21,7 @@ MOST = 8
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """How files are shown; the fields are named as the options are."""
+    """How files are shown: the options' values."""
 
     model: Path | None
     body: Path | None
@@ -38,40 +38,88 @@ class SceneOptions:
 
 @dataclass(frozen=True)
 class SoundOptions:
-    """With what sound."""
+    """Which sound is played, and when."""
 
     audio: Path | None
     no_audio: bool
     audio_offset: float
 
 
-def files_argument(command: Command) -> Command:
-    return click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")(command)
+class ShowType(click.ParamType[tuple[str, Any]]):
+    """A switch of the player: wireframe, influence=open_jaw, shadows=off."""
+
+    name = "switch"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, Any]:
+        from fba_player.view.switches import parse_switch
+
+        try:
+            return parse_switch(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
-def scene_options(*, fps: str, arrange: str) -> Callable[[Command], Command]:
-    """The command gets them as `how`, a `SceneOptions`. fps, arrange: what the help says of those."""
-    arrangement = click.option("--arrange", type=click.Choice(["side", "over"]), help=arrange)
+files_argument = click.argument("files", type=EXISTING, nargs=-1, metavar="[FILE...]")
+
+
+def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]:
+    """Return a decorator that gives a command `how`, a `SceneOptions`. fps, arrange: the help of these."""
     return _gathered(
         "how",
         SceneOptions,
-        options.model_option,
-        options.body_option,
-        arrangement,
+        click.option(
+            "--model",
+            type=click.Path(exists=True, path_type=Path),
+            metavar="FILE",
+            help="The face: a .glb of this project, or another that can be imported. "
+            "Default: the built-in head.",
+        ),
+        click.option(
+            "--body",
+            type=click.Path(exists=True, dir_okay=False, path_type=Path),
+            metavar="FILE.glb",
+            help="The body. Default: the built-in person.",
+        ),
+        click.option("--arrange", type=click.Choice(["side", "over"]), help=arrange),
         options.fps_option(fps),
         options.from_option,
-        options.camera_option,
-        options.view_option,
-        options.show_option,
-        options.axes_option,
+        click.option(
+            "--camera",
+            type=click.Choice(["front", "three-quarter", "profile", "body"]),
+            help="Default: one that suits the content.",
+        ),
+        click.option(
+            "--view",
+            type=click.Choice(["figure", "points"]),
+            default="figure",
+            show_default=True,
+            help="A person, or the face as its feature points and the body as its bones.",
+        ),
+        click.option(
+            "--show",
+            "shows",
+            type=ShowType(),
+            multiple=True,
+            metavar="SWITCH[=VALUE]",
+            help="Repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, normals; shadows=off, "
+            "eyes=off, teeth=off, hair=off; background=grey or transparent.",
+        ),
+        click.option(
+            "--axes",
+            type=click.Choice(["iso", "vreng"]),
+            default="iso",
+            show_default=True,
+            help="Which way BAPs turn: as the standard says, or as in some old files.",
+        ),
         options.bap_steps_option,
         options.salvage_option,
     )
 
 
-def sound_options(kind: str = "Sound") -> Callable[[Command], Command]:
-    """The command gets them as `sound`, a `SoundOptions`. kind: what the help calls it."""
-
+def sound_options(kind: str = "Sound") -> Callable[[Decorated], Decorated]:
+    """Return a decorator that gives a command `sound`, a `SoundOptions`. kind: what the help calls it."""
     return _gathered(
         "sound",
         SoundOptions,
@@ -93,7 +141,10 @@ def sound_options(kind: str = "Sound") -> Callable[[Command], Command]:
 
 
 def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions, what: str) -> None:
-    """Raises click.UsageError for options that contradict each other or the files. what: holds them."""
+    """Raise click.UsageError for options that contradict each other or the files.
+
+    what: shows the files, for messages.
+    """
     if sound.audio is not None and sound.no_audio:
         raise click.UsageError("--audio and --no-audio contradict each other")
     if sound.audio_offset and sound.no_audio:
@@ -105,18 +156,20 @@ def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions,
         raise click.UsageError(f"--arrange needs two files or more{one}")
 
 
-def _gathered(name: str, kind: type, *given: Callable[[Command], Command]) -> Callable[[Command], Command]:
-    """Options whose values reach the command as one object."""
+def _gathered(
+    name: str, kind: type, *given: Callable[[Decorated], Decorated]
+) -> Callable[[Decorated], Decorated]:
+    """Return a decorator that adds options whose values reach the command as one object of a kind."""
 
-    def decorate(command: Command) -> Command:
+    def decorate(command: Decorated) -> Decorated:
         @functools.wraps(command)
         def gathering(**values: Any) -> Any:
             own = {field.name: values.pop(field.name) for field in fields(kind)}
             return command(**{name: kind(**own)}, **values)
 
-        wrapped: Command = gathering
+        decorated: Any = gathering
         for option in reversed(given):
-            wrapped = option(wrapped)
-        return wrapped
+            decorated = option(decorated)
+        return decorated  # type: ignore[no-any-return]
 
     return decorate

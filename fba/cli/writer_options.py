@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.cli import options
+from fba.cli.command import Decorated
+from fba.cli.inputs import read_body, read_model
 
 if TYPE_CHECKING:
     from fba.formats.registry import Format
@@ -27,7 +28,7 @@ FLAGS = {
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
-def writer_options(command: options.Decorated) -> options.Decorated:
+def writer_options(command: Decorated) -> Decorated:
     """Adds the options; the command takes them as keywords and hands them to `settings`."""
     for option in reversed(
         (
@@ -75,7 +76,7 @@ def settings(target: Path, writing: Format, given: Mapping[str, Any]) -> dict[st
     for name in said:
         if name not in writing.write_options:
             raise click.UsageError(_misplaced(name, target, writing))
-    return {name: _MADE.get(name, _as_it_is)(value) for name, value in said.items()}
+    return {name: _MADE[name](value) if name in _MADE else value for name, value in said.items()}
 
 
 def _misplaced(name: str, target: Path, writing: Format) -> str:
@@ -89,18 +90,8 @@ def _misplaced(name: str, target: Path, writing: Format) -> str:
     )
 
 
-def _body(path: Path) -> object:
-    from fba.body.model import BodyModel
-
-    return BodyModel.load(path)
-
-
-def _as_it_is(value: Any) -> Any:
-    return value
-
-
 _MADE: dict[str, Callable[[Any], Any]] = {
     "unit": UNITS.__getitem__,
-    "model": options.read_model,
-    "body": _body,
+    "model": read_model,
+    "body": read_body,
 }

@@ -167,7 +167,7 @@ def test_messages_of_the_library_name_no_options() -> None:
 
 
 def test_options_for_arguments_exist() -> None:
-    from fba.cli.options import OPTIONS
+    from fba.cli.command import OPTIONS
 
     context = click.Context(group, info_name="fba")
     taken = {param.name for name in _COMMANDS for param in _params(group.get_command(context, name))}

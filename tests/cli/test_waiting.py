@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from fba.cli import options
 from fba.cli.main import COMPILED_FUNCTIONS, CompileNotice
+from fba.cli.printing import Progress
 from fba.compiled import is_compiled
 
 Run = Callable[..., Any]
@@ -58,7 +58,7 @@ def test_the_first_use_says_that_it_compiles_the_second_does_not(tmp_path: Path,
 
 def test_a_bar_without_a_total_only_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = on_terminal(monkeypatch)
-    with options.progress("fitting", None):
+    with Progress("fitting", None):
         time.sleep(0.15)
     assert "fitting" in terminal.getvalue()
     assert "/?" not in terminal.getvalue()
@@ -67,8 +67,8 @@ def test_a_bar_without_a_total_only_moves(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_bar_counts_as_soon_as_the_total_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = on_terminal(monkeypatch)
-    with options.progress("rendering", None) as step:
-        step.of(3, 8)
+    with Progress("rendering", None) as step:
+        step.show(3, 8)
         time.sleep(0.15)
     assert "3/8" in terminal.getvalue()
 

@@ -10,13 +10,16 @@ from typing import Any
 import click
 
 from fba.cli import options
+from fba.cli.command import Command, EachFile, examples
+from fba.cli.inputs import EXISTING, input_file
+from fba.cli.printing import print_json
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"),
+    cls=Command,
+    epilog=examples("fba bench talk.fba", "fba bench talk.fba --rounds 20 --json"),
 )
-@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
 @click.option("--rounds", type=click.IntRange(1, 1000), default=9, show_default=True)
 @options.bap_steps_option
 @options.json_option
@@ -25,7 +28,7 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool)
 
     A symbol is one coded value of one plane. The source's bench/ folder compares the codec with a textbook's.
     """
-    each = options.EachFile(files)
+    each = EachFile(files)
     results = []
     for path in files:
         with each.file(path):
@@ -33,7 +36,7 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool)
             if not as_json:
                 _print(results[-1])
     if as_json:
-        options.print_json(results if len(files) > 1 else results[0])
+        print_json(results if len(files) > 1 else results[0])
     each.finish()
 
 
@@ -42,7 +45,7 @@ def _measured(file: Path, rounds: int, bap_steps: str) -> dict[str, Any]:
     from fba.codec import Decoder, EncoderOptions, decode, encode
     from fba.compiled import is_compiled
 
-    with options.input_file(file) as path:
+    with input_file(file) as path:
         data = path.read_bytes()
     animation = decode(data, bap_steps=bap_steps)
     tracks = [track for track in (animation.face, animation.body) if track is not None]

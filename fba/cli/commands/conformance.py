@@ -7,11 +7,13 @@ from pathlib import Path
 import click
 
 from fba.cli import options
+from fba.cli.command import Command, examples
+from fba.cli.printing import Progress, print_json
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba conformance                 # the vectors that come with fba",
         "fba conformance ../vectors      # a folder with an index.json",
     ),
@@ -28,13 +30,13 @@ def command(folder: Path | None, verbose: bool, as_json: bool) -> None:
 
     chosen = vectors(folder)
     results = []
-    with options.progress("checking", len(chosen)) as step:
+    with Progress("checking", len(chosen)) as step:
         for vector in chosen:
             results.append(check(vector))
-            step(1)
+            step.advance()
     failed = [result for result in results if not result.passed]
     if as_json:
-        options.print_json([result.to_dict() for result in results])
+        print_json([result.to_dict() for result in results])
     else:
         for result in results if verbose else failed:
             click.echo(result.line())

@@ -9,21 +9,21 @@ from typing import Any
 import click
 
 from fba.cli import options, step_tables, writer_options
+from fba.cli.command import Command, examples
+from fba.cli.inputs import EXISTING, read_input
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
     Outputs,
     OutputType,
-    no_clobber_option,
-    shown,
-    to_option,
-    writer_of,
+    display_name,
+    find_writer,
 )
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba convert old.fap new.fap          # the canonical form",
         "fba convert walk.bvh walk.bap --fps 30",
         "fba convert talk.fba decoded.fap",
@@ -32,12 +32,12 @@ from fba.cli.outputs import (
         "fba convert walk.bvh - --to bap | less",
     ),
 )
-@click.argument("source", metavar="IN", type=options.EXISTING)
+@click.argument("source", metavar="IN", type=EXISTING)
 @click.argument("target", metavar="OUT", type=OutputType())
 @options.fps_option("Resample to this frame rate; default: the input's own.")
 @options.from_option
-@to_option
-@no_clobber_option
+@options.to_option
+@options.no_clobber_option
 @writer_options.writer_options
 @options.bap_steps_option
 @options.salvage_option
@@ -59,7 +59,7 @@ def command(
     """
     from fba.formats import write
 
-    writing = writer_of(target, to)  # refuses what cannot be written before anything is read
+    writing = find_writer(target, to)  # refuses what cannot be written before anything is read
     outputs = Outputs(
         [Output("OUT", target, writing.name in TEXT_FORMATS)],
         [source, given["model"], given["body"]],
@@ -68,11 +68,11 @@ def command(
     extra = writer_options.settings(target, writing, given)
     if writing.name == "fba":
         extra["bap_steps"] = bap_steps
-    animation = options.read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage, format=format)
+    animation = read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage, format=format)
     if writing.name == "fba":
         step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(target) as file:
         write(file, animation, format=writing.name, **extra)
-    outputs.say(f"{shown(target)}: {len(animation)} frames, {writing.written or writing.description}")
+    outputs.say(f"{display_name(target)}: {len(animation)} frames, {writing.written or writing.description}")
     if writing.name == "fba":
         step_tables.remind(target, animation, bap_steps)

@@ -10,17 +10,18 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options, step_tables, writer_options
+from fba.cli.command import Command, EachFile, examples
+from fba.cli.inputs import EXISTING, input_file
 from fba.cli.outputs import (
     STANDARD,
     TEXT_FORMATS,
     Output,
     Outputs,
     OutputType,
-    no_clobber_option,
-    shown,
-    to_option,
-    writer_of,
+    display_name,
+    find_writer,
 )
+from fba.cli.printing import Progress
 from fba.cli.program import as_typed
 from fba.errors import BitstreamError
 
@@ -32,8 +33,8 @@ _FOLDER_OR_FILE = OutputType(folders=True)
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba decode talk.fba --fap decoded.fap",
         "fba decode both.fba --fap face.fap --bap body.bap --bap-steps visage",
         "fba decode talk.fba --fap decoded.fap --epf talk.epf    # encode --epf makes the same bytes again",
@@ -44,7 +45,7 @@ _FOLDER_OR_FILE = OutputType(folders=True)
         "fba decode archive/*.fba -o decoded/ --to glb",
     ),
 )
-@click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=options.EXISTING)
+@click.argument("inputs", metavar="IN.fba...", nargs=-1, required=True, type=EXISTING)
 @click.option(
     "--fap",
     type=_FOLDER_OR_FILE,
@@ -62,8 +63,8 @@ _FOLDER_OR_FILE = OutputType(folders=True)
     metavar="OUT.bvh|OUT.glb",
     help="File for other programs, format by suffix; likewise.",
 )
-@to_option
-@no_clobber_option
+@options.to_option
+@options.no_clobber_option
 @writer_options.writer_options
 @options.bap_steps_option
 @options.salvage_option
@@ -103,19 +104,19 @@ def command(
     if output is not None and written_as is not None:
         settings = writer_options.settings(output, written_as, given)
     reports = []
-    each = options.EachFile(inputs)
-    with options.progress("decoding", len(inputs)) as step:
+    each = EachFile(inputs)
+    with Progress("decoding", len(inputs)) as step:
         for path in inputs:
             with each.file(path):
                 reports.append(
                     _decode(path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage)
                 )
-            step(1)
+            step.advance()
     if as_json:
         outputs.print_json(reports if several else reports[0])
     else:
         for report in reports:
-            written = ", ".join(shown(Path(name)) for name in report["written"])
+            written = ", ".join(display_name(Path(name)) for name in report["written"])
             outputs.say(f"{report['input']}: {report['frames']} frames to {written}")
     each.finish()
 
@@ -152,12 +153,12 @@ def _targets(
     for flag, place in by_flag.items():
         if place is not None:
             name = flag.removeprefix("--")
-            writing = None if name == "epf" else writer_of(place, name)
+            writing = None if name == "epf" else find_writer(place, name)
             targets.append(_Target(flag, place, f".{name}", writing))
     if output is not None:
         if output != STANDARD and output.is_dir() and to is None:
             raise click.UsageError(f"{output} is a folder; name the format with --to, as in --to bvh")
-        writing = writer_of(output, to)
+        writing = find_writer(output, to)
         if writing.name == "fba":
             others = as_typed("fba convert and fba encode")
             raise click.UsageError(f"{output}: streams are decoded here; {others} write them")
@@ -189,7 +190,7 @@ def _decode(
     from fba.formats import write
     from fba.formats.epf.epf import write_epf
 
-    with options.input_file(path) as file:
+    with input_file(path) as file:
         data = file.read_bytes()
     animation, planes = _read(data, _name(path), any(t.writing is None for t in targets), bap_steps, salvage)
     step_tables.warn_of_doubt(path, animation, bap_steps)

@@ -15,7 +15,9 @@ import click
 
 from fba.animation import Animation
 from fba.cli import options
-from fba.cli.outputs import Output, Outputs, no_clobber_option
+from fba.cli.command import Command, examples
+from fba.cli.outputs import Output, Outputs
+from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.cli.program import as_typed
 from fba.errors import DisplayError
 
@@ -28,13 +30,13 @@ PATIENCE = 4.0
 COMPILING = "compiling for this machine, on the first run only: about a minute in all"
 
 
-@click.command(cls=options.Command, epilog=options.examples("fba demo", "fba demo --no-play --out demo/"))
+@click.command(cls=Command, epilog=examples("fba demo", "fba demo --no-play --out demo/"))
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the samples and what is made of them; default: a new temporary one.",
 )
-@no_clobber_option
+@options.no_clobber_option
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
 def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     """Encode the sample animation, print its size, and play it.
@@ -64,8 +66,8 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     compiling.cancel()
     click.echo(f"samples: {' and '.join(map(str, sources))}")
     click.echo(
-        f"animation: {options.seconds(animation.duration)}, body at {options.rate_text(body.rate)} and "
-        f"face at {options.rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
+        f"animation: {seconds_text(animation.duration)}, body at {rate_text(body.rate)} and "
+        f"face at {rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
     )
     data = encode(animation, EncoderOptions(bap_steps=BAP_STEPS))
     outputs.write(stream, data)
@@ -75,7 +77,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
         f"{source_bytes / len(data):.0f} times smaller"
     )
     decoded = read(stream, bap_steps=BAP_STEPS)
-    click.echo(f"decoded: {len(decoded)} frames at {options.rate_text(decoded.rate)} frames/s")
+    click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
     again = as_typed(f"fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
     click.echo(f"to see it again: {again}")
     if play is not False and _played(player, decoded, asked=play is True):
@@ -97,7 +99,7 @@ def _played(player: object, animation: Animation, *, asked: bool) -> bool:
 
 
 def _render(player: object, animation: Animation, video: Path, picture: Path) -> None:
-    with options.progress("rendering", None) as step:
-        player.render(animation, video, size=(640, 360), progress=step.of)  # type: ignore[attr-defined]
+    with Progress("rendering", None) as step:
+        player.render(animation, video, size=(640, 360), progress=step.show)  # type: ignore[attr-defined]
     player.render(animation, picture, time=float(animation.times[0]) + 2.0)  # type: ignore[attr-defined]
     click.echo(f"rendered: {video} and {picture}")

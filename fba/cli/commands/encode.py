@@ -11,7 +11,10 @@ import click
 
 from fba.animation import Animation
 from fba.cli import capture_report, options, step_tables
-from fba.cli.outputs import Output, Outputs, OutputType, no_clobber_option, shown
+from fba.cli.command import Command, examples
+from fba.cli.inputs import EXISTING, input_file, read_input
+from fba.cli.outputs import Output, Outputs, OutputType, display_name
+from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.errors import FormatError
 
 CAPTURE = ("spine", "ground", "plant", "origin")
@@ -19,8 +22,8 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba encode walk.bvh -o walk.fba --bap-steps visage",
         "fba encode talk.fap gesture.bap -o both.fba --fps 25 --quant 4 --bap-steps visage",
         "fba encode talk.fap -o talk.fba --start-codes --intra-period 2",
@@ -28,11 +31,11 @@ CAPTURE = ("spine", "ground", "plant", "origin")
         "fba encode walk.bvh -o walk.fba --bap-steps visage --report --limits report",
     ),
 )
-@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=options.EXISTING)
+@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=EXISTING)
 @click.option(
     "-o", "--output", metavar="OUT.fba", required=True, type=OutputType(), help="- for standard output."
 )
-@no_clobber_option
+@options.no_clobber_option
 @options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
 @options.from_option
 @click.option("--name", help="Name of the sequence, for input without a header.")
@@ -80,9 +83,7 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     default=None,
     help="Limit values to the codable range instead of failing; default: for motion capture only.",
 )
-@click.option(
-    "--epf", type=options.EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says."
-)
+@click.option("--epf", type=EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says.")
 @click.option(
     "--spine",
     type=click.Choice(["spread", "full", "simple", "joints"]),
@@ -143,7 +144,7 @@ def command(
         _refuse_beside_epf()
     outputs = Outputs([Output("--output", output)], [*inputs, epf], no_clobber=no_clobber)
     capture = {option: settings.pop(option) for option in CAPTURE}
-    with options.progress("reading", len(inputs)) as step:
+    with Progress("reading", len(inputs)) as step:
         animation = _joined(
             inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
             capture=capture, format=format,
@@ -157,7 +158,7 @@ def command(
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
     table = settings["bap_steps"]
-    with options.progress("encoding", None):
+    with Progress("encoding", None):
         coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, table)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
@@ -193,7 +194,7 @@ def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
     from fba.codec import encode_planes
     from fba.formats.epf.epf import read_epf
 
-    with options.input_file(epf) as file:
+    with input_file(epf) as file:
         planes = read_epf(file)
     data = encode_planes(animation, planes, bap_steps=bap_steps)
     quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
@@ -230,8 +231,8 @@ def _figures(coded: _Coded, animation: Animation) -> dict[str, Any]:
 
 def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
     text = (
-        f"{shown(output)}: {coded.planes} frames, {options.seconds(animation.duration)} at "
-        f"{options.rate_text(animation.rate)} frames/s, {len(coded.data)} bytes, "
+        f"{display_name(output)}: {coded.planes} frames, {seconds_text(animation.duration)} at "
+        f"{rate_text(animation.rate)} frames/s, {len(coded.data)} bytes, "
         f"{_bits_per_second(coded, animation) / 1000:.2f} kbit/s, "
         f"{coded.intra_planes} I plane{'s' if coded.intra_planes != 1 else ''}"
     )
@@ -251,7 +252,7 @@ def _joined(
     name: str | None,
     bap_steps: str,
     salvage: bool,
-    step: options.Progress,
+    step: Progress,
     capture: Mapping[str, object],
     format: str | None,
 ) -> Animation:
@@ -260,10 +261,10 @@ def _joined(
 
     result: Animation | None = None
     for path in inputs:
-        animation = options.read_input(
+        animation = read_input(
             path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format
         )
-        step(1)
+        step.advance()
         if not len(animation):
             raise FormatError("the file holds no frames; there is nothing to encode", path=path)
         if result is None:
@@ -278,8 +279,8 @@ def _joined(
             )
         if animation.rate != result.rate:
             raise click.UsageError(
-                f"{path} has {options.rate_text(animation.rate)} frames/s, the file before it "
-                f"{options.rate_text(result.rate)}; bring them to one rate with --fps"
+                f"{path} has {rate_text(animation.rate)} frames/s, the file before it "
+                f"{rate_text(result.rate)}; bring them to one rate with --fps"
             )
         result = merge(result, animation) if result.face is not None else merge(animation, result)
     assert result is not None

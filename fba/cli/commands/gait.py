@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options, step_tables
+from fba.cli.command import Command, examples, usage_errors
+from fba.cli.inputs import EXISTING, read_input
 from fba.cli.outputs import (
     TEXT_FORMATS,
     Output,
     Outputs,
     OutputType,
-    no_clobber_option,
-    shown,
-    to_option,
-    writer_of,
+    display_name,
+    find_writer,
 )
+from fba.cli.printing import print_json, seconds_text
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -28,8 +29,8 @@ DEFAULT_RATE = Fraction(30)
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba gait --stride 0.7 --character bored --bap-steps visage -o walk.fba",
         "fba gait --character hurried --seconds 10 --fps 25 -o walk.bap",
         "fba gait --list",
@@ -55,13 +56,13 @@ DEFAULT_RATE = Fraction(30)
     type=OutputType(),
     help="File to write; its suffix says in which format. - for standard output.",
 )
-@to_option
-@no_clobber_option
+@options.to_option
+@options.no_clobber_option
 @options.bap_steps_option
 @click.option("--list", "listed", is_flag=True, help="List the characters.")
 @click.option(
     "--find",
-    type=options.EXISTING,
+    type=EXISTING,
     metavar="FILE",
     help="Print the cycles and poses in a walk.",
 )
@@ -101,10 +102,10 @@ def command(
         from fba.body import gait
 
         made: dict[str, Any] = {"stride": stride, "cycles": cycles, "seconds": seconds, "in_place": in_place}
-        writing = writer_of(output, to)  # refuses what cannot be written before anything is made
+        writing = find_writer(output, to)  # refuses what cannot be written before anything is made
         out = Output("--output", output, writing.name in TEXT_FORMATS)
         outputs = Outputs([out], no_clobber=no_clobber)
-        with options.usage_errors("walk: "):
+        with usage_errors("walk: "):
             animation = gait.walk(character=character, rate=fps or DEFAULT_RATE, **made)
         _write(animation, writing, output, outputs, bap_steps)
         outputs.say(_summary(animation, output, character, in_place=in_place))
@@ -127,7 +128,7 @@ def _summary(animation: Animation, output: Path, character: str, *, in_place: bo
     from fba.body import gait
 
     way = gait.advance(animation) / 1000.0
-    line = f"{shown(output)}: {character}, {len(animation)} frames, {options.seconds(animation.duration)}"
+    line = f"{display_name(output)}: {character}, {len(animation)} frames, {seconds_text(animation.duration)}"
     if not in_place and len(animation) > 1:
         speed = way / float((len(animation) - 1) / animation.rate)
         line += f", {way:.2f} m at {speed:.2f} m/s"
@@ -140,7 +141,7 @@ def _list(as_json: bool) -> None:
     known = [gait.Character.named(name) for name in gait.characters()]
     if as_json:
         rows = [{"name": c.name, "about": c.about, "stride": c.stride, "seconds": c.seconds} for c in known]
-        options.print_json(rows)
+        print_json(rows)
         return
     width = max(len(c.name) for c in known)
     for c in known:
@@ -152,12 +153,12 @@ def _find(file: Path, bap_steps: str, fps: Fraction | None, format: str | None, 
     from fba.body import gait
     from fba.errors import FormatError
 
-    animation = options.read_input(file, bap_steps=bap_steps, header_fps=fps, format=format)
+    animation = read_input(file, bap_steps=bap_steps, header_fps=fps, format=format)
     if animation.body is None:
         raise FormatError("has no body to walk with", path=file)
     found = gait.detect(animation)
     if as_json:
-        options.print_json(found.as_dict())
+        print_json(found.as_dict())
         return
     for line in found.lines():
         click.echo(line)

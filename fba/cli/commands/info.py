@@ -8,18 +8,21 @@ from pathlib import Path
 import click
 
 from fba.cli import options, step_tables
+from fba.cli.command import Command, EachFile, examples
+from fba.cli.inputs import EXISTING, input_file, probe_input
+from fba.cli.printing import print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba info talk.fba",
         "fba info --json *.fba | jq .[].bits_per_second",
         "fba info --trace talk.fba | less",
     ),
 )
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.EXISTING)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=EXISTING)
 @options.bap_steps_option
 @options.json_option
 @click.option(
@@ -43,7 +46,7 @@ def command(
 
     --trace reads the stream a second time, bit by bit, with an independent decoder. It is slow.
     """
-    each = options.EachFile(files)
+    each = EachFile(files)
     if trace:
         for path in files:
             with each.file(path):
@@ -52,15 +55,15 @@ def command(
         return
     found = []
     for path in files:
-        with each.file(path), options.input_file(path) as file:
-            info = options.probed(file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage)
+        with each.file(path), input_file(path) as file:
+            info = probe_input(file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage)
             if info.format == "fba" and info.body is not None:
                 step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
             found.append({"file": str(path), **info.to_dict()})
             if not as_json:
                 _print(path, info)
     if as_json:
-        options.print_json(found if len(files) > 1 else found[0])
+        print_json(found if len(files) > 1 else found[0])
     each.finish()
 
 
@@ -70,7 +73,7 @@ def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
     from fba_conformance.listing import element_dict, format_trace
     from fba_conformance.trace import trace
 
-    with options.input_file(path) as file:
+    with input_file(path) as file:
         elements = trace(file.read_bytes(), bap_steps=bap_steps)
     if as_json:
         for element in elements:
@@ -83,10 +86,10 @@ def _trace(path: Path, *, bap_steps: str, as_json: bool, values: bool) -> None:
 def _print(path: Path, info: StreamInfo) -> None:
     click.echo(f"{path}: {info.format.upper()}, {info.size} bytes")
     skipped = f", {info.skipped} skipped" if info.skipped else ""
-    start = f", starts at {options.seconds(info.start)}" if info.start else ""
+    start = f", starts at {seconds_text(info.start)}" if info.start else ""
     click.echo(
-        f"  time     {info.frames} frames, {options.seconds(info.duration)} at "
-        f"{options.rate_text(info.rate)} frames/s{skipped}{start}"
+        f"  time     {info.frames} frames, {seconds_text(info.duration)} at "
+        f"{rate_text(info.rate)} frames/s{skipped}{start}"
     )
     if info.intra_planes is not None:
         codes = f", {info.start_codes} with start codes" if info.start_codes else ""

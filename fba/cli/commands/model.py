@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_option, shown
+from fba.cli.command import Group, examples
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.printing import Progress, print_json
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
@@ -26,8 +28,8 @@ POINT_FILES = "FDP, CSV or JSON file"
 
 @click.group(
     "model",
-    cls=options.Group,
-    epilog=options.examples(
+    cls=Group,
+    epilog=examples(
         "fba model info --default",
         "fba model validate head.glb",
         "fba model import scan.obj --points scan.points.csv -o head.glb",
@@ -56,7 +58,7 @@ def _read(file: Path | None) -> FaceModel:
 
 @command.command(
     short_help="What a face model holds.",
-    epilog=options.examples("fba model info --default", "fba model info --json head.glb"),
+    epilog=examples("fba model info --default", "fba model info --json head.glb"),
 )
 @click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
 @click.option("--default", is_flag=True, help="The built-in head.")
@@ -70,14 +72,14 @@ def info(file: Path | None, default: bool, as_json: bool) -> None:
 
     model = _one_of(file, default)
     if as_json:
-        options.print_json(model_text.described(model))
+        print_json(model_text.described(model))
     else:
         model_text.print_model(model)
 
 
 @command.command(
     short_help="Check a face model against the standard.",
-    epilog=options.examples("fba model validate head.glb", "fba model validate --json --default"),
+    epilog=examples("fba model validate head.glb", "fba model validate --json --default"),
 )
 @click.argument("file", metavar="[FILE]", required=False, type=SOURCE)
 @click.option("--default", is_flag=True, help="The built-in head.")
@@ -102,7 +104,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
         findings += checks.check_faps(model)
     errors = sum(finding.severity == "error" for finding in findings)
     if as_json:
-        options.print_json(model_text.findings_as_json(findings))
+        print_json(model_text.findings_as_json(findings))
     else:
         model_text.print_findings(str(file or "built-in head"), findings)
     if errors:
@@ -112,7 +114,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
 @command.command(
     "import",
     short_help="Make a face model of a mesh.",
-    epilog=options.examples(
+    epilog=examples(
         "fba model import makehuman/base.obj -o head.glb",
         "fba model import scan.ply --points scan.points.csv --unit 0.001 -o scan.glb",
         "fba model import face.obj --points face.fdp --part eyeL=eye --part cap=none -o face.glb",
@@ -120,7 +122,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
 )
 @click.argument("source", metavar="IN", type=SOURCE)
 @click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
-@no_clobber_option
+@options.no_clobber_option
 @click.option(
     "--points",
     metavar="FILE",
@@ -164,21 +166,21 @@ def import_(
 
     outputs = _outputs(output, [source, points], no_clobber=no_clobber)
     chosen = _kinds(kinds) or None
-    with options.progress("importing", None):
+    with Progress("importing", None):
         model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=chosen, name=name)
     _write(model, output, outputs)
 
 
 @command.command(
     short_help="Fit a face to a person.",
-    epilog=options.examples(
+    epilog=examples(
         "fba model fit person.fdp -o person.glb",
         "fba model fit points.csv --unit cm --model head.glb --name Ada -o ada.glb",
     ),
 )
 @click.argument("points", metavar="POINTS", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
-@no_clobber_option
+@options.no_clobber_option
 @click.option(
     "--model", "base", metavar="FILE", type=SOURCE, help="The face to fit. Default: the built-in head."
 )
@@ -214,7 +216,7 @@ def fit(
 
     outputs = _outputs(output, [points, base], no_clobber=no_clobber)
     scale = _unit(unit)
-    with options.progress("fitting", None):
+    with Progress("fitting", None):
         model = _read(base)
         wanted = _points(points, model)
         face = fitted(model, wanted, unit=scale, tables=tables, name=name or points.stem)
@@ -289,6 +291,6 @@ def _write(model: FaceModel, output: Path, outputs: Outputs) -> None:
 
     with outputs.file(output) as file:
         model.save(file)
-    outputs.say(f"{shown(output)}: {model_text.summary(model)}")
+    outputs.say(f"{display_name(output)}: {model_text.summary(model)}")
     for line in model_text.lost(model):
         outputs.say(f"  {line}")

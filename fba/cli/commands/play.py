@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options, scene_options
+from fba.cli.command import Command, examples
 from fba.cli.scene_options import MOST, SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba play talk.fba",
         "fba play talk.fba --audio voice.mp3",
         "fba play walk.fba --bap-steps visage",

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fba.cli import options, scene_options
-from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, no_clobber_option, shown
+from fba.cli.command import Command, examples, usage_errors
+from fba.cli.inputs import read_input, read_model
+from fba.cli.outputs import STANDARD, Output, Outputs, OutputType, display_name
+from fba.cli.printing import Progress
 from fba.cli.scene_options import SceneOptions, SoundOptions, check_files
 
 if TYPE_CHECKING:
@@ -37,8 +40,8 @@ class SheetType(click.ParamType[str | int]):
 
 
 @click.command(
-    cls=options.Command,
-    epilog=options.examples(
+    cls=Command,
+    epilog=examples(
         "fba render talk.fba -o talk.mp4",
         "fba render talk.fba -o talk.mp4 --audio voice.wav",
         "fba render walk.fba -o walk.png --bap-steps visage --frame 40 --size 800x600",
@@ -63,7 +66,7 @@ class SheetType(click.ParamType[str | int]):
 @click.option(
     "--to", type=click.Choice(KINDS), help="Output format, if OUT is - or its suffix does not show it."
 )
-@no_clobber_option
+@options.no_clobber_option
 @click.option(
     "--fap",
     "faps",
@@ -160,7 +163,7 @@ def command(
         outputs = target.outputs([how.model], no_clobber=no_clobber, replace=replace)
         with target.file(outputs) as name:
             made = _kinds_sheet(sheet, Path(name), how.model, size)
-        outputs.say(f"{shown(target.path)}: {made}")
+        outputs.say(f"{display_name(target.path)}: {made}")
         return
     if sheet is not None and (film or transparent or frame is not None or time is not None):
         raise click.UsageError(
@@ -174,9 +177,9 @@ def command(
 
     audio = scene_loading.voice(files, sound, "the film has no sound") if mp4 else None
     outputs = target.outputs([*files, how.model, how.body, audio], no_clobber=no_clobber, replace=replace)
-    with options.progress("preparing", None):
+    with Progress("preparing", None):
         animations = [
-            options.read_input(
+            read_input(
                 file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage, format=how.format
             )
             for file in files
@@ -189,7 +192,7 @@ def command(
             made = _frames_sheet(scene, sheet, Path(name), tile=size, camera=how.camera, start=start, end=end)
         else:
             made = _size(size, name)
-            with options.progress("rendering", None) as step, options.usage_errors():
+            with Progress("rendering", None) as step, usage_errors():
                 render(
                     scene,
                     name,
@@ -204,9 +207,9 @@ def command(
                     audio_offset=sound.audio_offset,
                     transparent=transparent,
                     replace=replace,
-                    progress=step.of,
+                    progress=step.show,
                 )
-    outputs.say(f"{shown(target.path)}: {made}{heard}")
+    outputs.say(f"{display_name(target.path)}: {made}{heard}")
 
 
 @dataclass(frozen=True)
@@ -274,8 +277,8 @@ def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, i
     from fba_player.export.image_files import check_picture, write_picture
 
     check_picture(output, transparent=False)
-    with options.progress("rendering", None), options.usage_errors():
-        pixels = contact_sheet(what, options.read_model(model), tile=size)
+    with Progress("rendering", None), usage_errors():
+        pixels = contact_sheet(what, read_model(model), tile=size)
     write_picture(output, pixels)
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
@@ -286,7 +289,7 @@ def _frames_sheet(scene: Showable, count: int, output: Path, **how: Any) -> str:
     from fba_player.export.image_files import check_picture, write_picture
 
     check_picture(output, transparent=False)
-    with options.progress("rendering", None) as step, options.usage_errors():
-        pixels = film_sheet(scene, count, progress=step.of, **how)
+    with Progress("rendering", None) as step, usage_errors():
+        pixels = film_sheet(scene, count, progress=step.show, **how)
     write_picture(output, pixels)
     return f"{pixels.shape[1]}x{pixels.shape[0]}"

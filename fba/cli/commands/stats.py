@@ -9,14 +9,17 @@ import click
 import numpy as np
 
 from fba.cli import options, step_tables
+from fba.cli.command import Command, EachFile, examples
+from fba.cli.inputs import EXISTING, input_file
+from fba.cli.printing import print_json
 from fba.codec.stream_info import StreamInfo
 
 LONGEST = 1 << 16
 """Characters of a row: names of files are shorter."""
 
 
-@click.command(cls=options.Command, epilog=options.examples("fba stats talk.fba", "fba stats --json *.fba"))
-@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=options.EXISTING)
+@click.command(cls=Command, epilog=examples("fba stats talk.fba", "fba stats --json *.fba"))
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
 @options.bap_steps_option
 @options.json_option
 def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
@@ -24,16 +27,16 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
     from fba.codec import probe_stream
 
     rows = []
-    each = options.EachFile(files)
+    each = EachFile(files)
     for path in files:
-        with each.file(path), options.input_file(path) as file:
+        with each.file(path), input_file(path) as file:
             data = file.read_bytes()
             info = probe_stream(data, bap_steps=bap_steps)
             if info.body is not None:
                 step_tables.warn_of_doubtful_stream(path, data, bap_steps)
             rows.append({"file": str(path), **statistics(info)})
     if as_json:
-        options.print_json(rows if len(files) > 1 else rows[0])
+        print_json(rows if len(files) > 1 else rows[0])
         each.finish()
         return
     if rows:

@@ -1,0 +1,160 @@
+"""Commands: how they take `--debug`, show help, and say errors in the words of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from fba.cli.program import as_typed
+from fba.errors import FbaError, FbaWarning, Remedy
+
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
+
+OPTIONS = {
+    "fps": "fps",
+    "rate": "fps",
+    "format": "format",
+    "salvage": "salvage",
+    "clamp": "clamp",
+    "points": "points",
+    "kind": "kind",
+    "replace": "replace",
+}
+"""Arguments of the library, and the parameters of commands that do the same."""
+OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))
+"""Commands that may have an option which the current one lacks."""
+STANDARD_INPUT = "standard input"
+
+
+class Command(click.Command):
+    """A subcommand: takes --debug anywhere, and its help shows commands as the user types them here."""
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        about = "Show tracebacks of errors."
+        self.params.append(click.Option(["--debug"], is_flag=True, expose_value=False, help=about))
+
+    def get_help(self, ctx: click.Context) -> str:
+        return as_typed(super().get_help(ctx), ctx)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except FbaError as error:
+            error.remedies = _as_options(error.remedies, ctx)
+            raise
+
+
+class Group(Command, click.Group):
+    """Several subcommands under one name."""
+
+    command_class = Command
+
+
+def examples(*lines: str) -> str:
+    """Return an epilog of the help that shows commands as they are typed."""
+    return "Examples:\n\n\b\n" + "\n".join(f"  {line}" for line in lines) + "\n"
+
+
+def describe(error: FbaError | FbaWarning) -> str:
+    """Return the text of an error or a warning, with the options of the command that runs now."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return str(error)
+    return "; ".join([error.finding, *map(str, _as_options(error.remedies, context))])
+
+
+def _as_options(remedies: Iterable[Remedy], context: click.Context) -> tuple[Remedy, ...]:
+    """Return remedies with options for arguments: of this command, else of another, else as Python."""
+    return tuple(Remedy("", _remedy_text(remedy, context), "") for remedy in remedies)
+
+
+def _remedy_text(remedy: Remedy, context: click.Context) -> str:
+    if not remedy.argument:
+        return remedy.text  # was translated before
+    name = OPTIONS.get(remedy.argument)
+    if remedy.call == "fba.write" and name == "format":
+        name = "to"
+    option = _option_text(context.command, name, remedy.value)
+    if option is not None:
+        return remedy.fill_in(option)
+    for words in OTHER_COMMANDS if name is not None else ():
+        command: click.Command | None = context.find_root().command
+        for word in words:
+            assert isinstance(command, click.Group)
+            command = command.get_command(context, word)
+        option = None if command is None else _option_text(command, name, remedy.value)
+        if option is not None:
+            return remedy.fill_in(f"{option} of `fba {' '.join(words)}`")
+    python = f"{remedy.call or 'fba.read'}(FILE, {remedy.argument}={remedy.value})"
+    return f"{remedy.fill_in(python)} in Python; the command line has no option for it"
+
+
+def _option_text(command: click.Command, name: str | None, value: str) -> str | None:
+    """Return an option with a value as it is typed, "--fps 25"; None if the command does not have it."""
+    for param in command.params:
+        if isinstance(param, click.Option) and param.name == name:
+            return param.opts[0] if param.is_flag else f"{param.opts[0]} {value.strip(chr(39))}"
+    return None
+
+
+@contextmanager
+def usage_errors(prefix: str = "") -> Iterator[None]:
+    """Turn a plain ValueError, which options caused, into a usage error. prefix: left out of its text."""
+    try:
+        yield
+    except ValueError as error:
+        if type(error) is not ValueError:
+            raise
+        raise click.UsageError(str(error).removeprefix(prefix)) from error
+
+
+class EachFile:
+    """Goes on with the next file where one is bad, and names the bad ones.
+
+    ::
+
+        each = EachFile(files)
+        for path in files:
+            with each.file(path):
+                ...
+        each.finish()
+    """
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self._several = len(files) > 1
+        self._failed = 0
+
+    @contextmanager
+    def file(self, path: Path) -> Iterator[None]:
+        """Print the error of one of several files; raise that of a single one, with its name."""
+        name = STANDARD_INPUT if str(path) == "-" else str(path)
+        try:
+            yield
+        except FbaError as error:
+            if name not in error.finding:
+                error.args = (f"{name}: {error.finding}",)
+            if not self._several:
+                raise
+            self._fail(describe(error))
+        except click.UsageError as error:
+            if not self._several:
+                raise
+            self._fail(error.message if name in error.message else f"{name}: {error.message}")
+        except OSError as error:
+            if not self._several:
+                raise
+            self._fail(f"{name}: {error.strerror or error}")
+
+    def _fail(self, text: str) -> None:
+        self._failed += 1
+        click.echo(f"fba: error: {as_typed(' '.join(text.split()))}", err=True)
+
+    def finish(self) -> None:
+        """End the command with exit code 1 if a file failed."""
+        if self._failed:
+            raise click.exceptions.Exit(1)

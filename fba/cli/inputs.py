@@ -1,0 +1,167 @@
+"""Files that commands read: animations of any format, standard input, models."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import click
+
+from fba.animation import Animation
+from fba.cli import step_tables
+from fba.cli.command import STANDARD_INPUT
+from fba.errors import FbaError, FbaWarning, FormatError, OptionError
+
+if TYPE_CHECKING:
+    from fba.body.model import BodyModel
+    from fba.codec.stream_info import StreamInfo
+    from fba.face.model import FaceModel
+    from fba.formats.registry import Format
+
+NAMES_OF_STANDARD_INPUT = ("-", "/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
+
+
+class InputType(click.Path):
+    """An existing file, "-" for standard input."""
+
+    def __init__(self) -> None:
+        super().__init__(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if str(value) in NAMES_OF_STANDARD_INPUT:
+            return Path("-")
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        return path if str(path) != "-" else path.absolute()  # it was "./-", a file of that name
+
+
+EXISTING = InputType()
+
+
+@contextmanager
+def input_file(path: Path) -> Iterator[Path]:
+    """Give the file itself, or for "-" a temporary one that holds standard input."""
+    if str(path) != "-":
+        yield path
+        return
+    with spooled(sys.stdin.buffer, STANDARD_INPUT) as file:
+        yield file
+
+
+@contextmanager
+def spooled(source: BinaryIO, name: str, head: bytes = b"") -> Iterator[Path]:
+    """Give a temporary file that holds a stream, read to its end.
+
+    name: of the stream, for messages. head: what was read from it before.
+    """
+    with tempfile.TemporaryDirectory(prefix="fba-") as folder:
+        path = Path(folder) / "stdin"
+        with path.open("wb") as file:
+            file.write(head)
+            while chunk := source.read(1 << 20):
+                file.write(chunk)
+        with renamed(path, name):
+            yield path
+
+
+@contextmanager
+def renamed(path: Path, name: str) -> Iterator[None]:
+    """Give a temporary file a name that the user knows in errors and warnings."""
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", FbaWarning)
+            yield
+    except FbaError as error:
+        error.args = (error.finding.replace(str(path), name),)
+        if isinstance(error, FormatError) and error.path == str(path):
+            error.path = name
+        raise
+    finally:
+        for warning in caught:
+            message = warning.message
+            if isinstance(message, FbaWarning):
+                message.args = (message.finding.replace(str(path), name),)
+            warnings.warn(message, warning.category, stacklevel=3)
+
+
+def read_input(
+    path: Path,
+    *,
+    bap_steps: str = "iso",
+    fps: Fraction | None = None,
+    header_fps: Fraction | None = None,
+    name: str | None = None,
+    salvage: bool = False,
+    capture: Mapping[str, object] | None = None,
+    said: list[str] | None = None,
+    format: str | None = None,
+) -> Animation:
+    """Return the animation of a file of any format, or of the one that `format` names.
+
+    Warns if the BAPs of a stream look wrong with these steps.
+
+    fps resamples the animation, and motion capture before it is retargeted. It, or header_fps, and name
+    replace a header that a file lacks. capture: options for the readers of motion capture. said: that warning
+    is appended to it.
+    """
+    from fba.formats import read
+
+    options: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
+    options |= {"salvage": salvage or None, "rate": fps, **(capture or {})}
+    with input_file(path) as file:
+        reader = _find_format(file, format)
+        animation = read(file, format=reader.name, **_taken(reader, options))
+    if reader.name == "fba" and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
+        (said if said is not None else []).append(doubt)
+    if fps is not None and animation.rate != fps:
+        animation = animation.resample(fps)
+    return animation
+
+
+def probe_input(
+    path: Path, *, bap_steps: str, fps: Fraction | None, format: str | None, salvage: bool
+) -> StreamInfo:
+    """Return what a file of any format holds. fps: the rate of a file that has none."""
+    from fba.formats import probe
+
+    reader = _find_format(path, format)
+    options = {} if reader.name == "fba" else _taken(reader, {"fps": fps, "salvage": salvage or None})
+    return probe(path, bap_steps=bap_steps, format=reader.name, **options)
+
+
+def _taken(reader: Format, options: Mapping[str, object]) -> dict[str, Any]:
+    """Return the options that are given and that a reader takes."""
+    return {key: value for key, value in options.items() if value is not None and key in reader.read_options}
+
+
+def _find_format(file: Path, format: str | None) -> Format:
+    from fba.formats import format_of
+
+    try:
+        return format_of(file, format)
+    except OptionError as error:
+        raise click.BadParameter(str(error), param_hint="--from") from error
+
+
+def read_model(path: Path | None) -> FaceModel | None:
+    """Return the face of `--model`, or None for the built-in one."""
+    if path is None:
+        return None
+    from fba.face.importers import import_model
+
+    return import_model(path)
+
+
+def read_body(path: Path | None) -> BodyModel | None:
+    """Return the body of `--body`, or None for the built-in one."""
+    if path is None:
+        return None
+    from fba.body.model import BodyModel
+
+    return BodyModel.load(path)

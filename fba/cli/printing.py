@@ -1,0 +1,84 @@
+"""What commands print: JSON, times, frame rates, and progress bars."""
+
+from __future__ import annotations
+
+import json
+import sys
+from fractions import Fraction
+from typing import Any
+
+import click
+
+
+def print_json(value: object) -> None:
+    """Print a report for programs."""
+    click.echo(json.dumps(value, indent=2))
+
+
+def seconds_text(value: Fraction | float) -> str:
+    """Return "12.34 s"."""
+    return f"{float(value):.2f} s"
+
+
+def rate_text(rate: Fraction) -> str:
+    """Return a frame rate as "25", "30.5", or "29.97" for 30000/1001."""
+    return f"{float(rate):.3f}".rstrip("0").rstrip(".")
+
+
+class Progress:
+    """A progress bar on standard error, if that is a terminal; for a `with` statement.
+
+    total: number of steps. While it is None, the bar only moves, and shows the seconds so far.
+    """
+
+    def __init__(self, label: str, total: int | None) -> None:
+        self._label, self._total = label, total
+        self._bar: Any = None
+        self._task: Any = None
+
+    def __enter__(self) -> Progress:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Task,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
+            from rich.progress import Progress as Bar
+            from rich.text import Text
+
+            class Steps(MofNCompleteColumn):
+                def render(self, task: Task) -> Text:
+                    return Text() if task.total is None else super().render(task)  # not "0/?"
+
+            class Time(TimeRemainingColumn):
+                def render(self, task: Task) -> Text:
+                    return TimeElapsedColumn().render(task) if task.total is None else super().render(task)
+
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(),
+                Steps(),
+                Time(),
+            )
+            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._task = self._bar.add_task(self._label, total=self._total)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def advance(self, count: int = 1) -> None:
+        """Show that more steps are done."""
+        if self._bar is not None:
+            self._bar.update(self._task, advance=count)
+
+    def show(self, done: int, total: int) -> None:
+        """Show the number of steps done, and the total."""
+        if self._bar is not None:
+            self._bar.update(self._task, completed=done, total=total)
