@@ -154,20 +154,8 @@ def read_body(document: Document) -> BodyModel:
             bind=bind,
             eyes=None if places is None else np.array(places).reshape(-1, 3),
             name="" if name is None else name.text(),
-            notes=_notes(content),
+            notes={key: value.text() for key, value in content.entries("notes", MAX_NOTES)},
         )
-
-
-def _notes(content: Value) -> dict[str, str]:
-    held = content.get("notes")
-    if held is None:
-        return {}
-    notes: dict[str, str] = {}
-    for key, value in held.members():
-        if len(notes) == MAX_NOTES:
-            raise held.error(f"more than the {MAX_NOTES} entries that are read")
-        notes[Value(key, held.file, held.path).text()] = value.text()
-    return notes
 
 
 def _skeleton(gltf: Gltf, joints: tuple[int, ...]) -> tuple[Skeleton, Float64, Int64]:

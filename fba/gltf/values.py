@@ -63,6 +63,18 @@ class Value:
         for key, data in self._object().items():
             yield key, self._member(key, data)
 
+    def entries(self, key: str, most: int) -> list[tuple[str, Value]]:
+        """Names and members of the object in member `key`, at most `most`; empty where there is none."""
+        content = self.get(key)
+        if content is None:
+            return []
+        entries = list(content.members())
+        if len(entries) > most:
+            raise content.error(f"more than the {most} entries that are read")
+        for name, _ in entries:
+            Value(name, content.file, content.path).text()  # names must be Unicode too
+        return entries
+
     def elements(self, most: int, key: str | None = None) -> list[Value]:
         """Elements of this list, or of the list in member `key` (empty where there is none)."""
         if key is not None:

@@ -1,6 +1,6 @@
-"""The extension object FBA_face of a glTF file, written: what makes its meshes a face that FAPs move.
+"""Writes the extension object FBA_face of a glTF file, which makes its meshes a face that FAPs move.
 
-`fba_face.schema.json` says what it may hold, docs/face-models.md what that means.
+`fba_face.schema.json` defines its members, docs/face-models.md explains them.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ VERSION = 1
 
 
 def extension(builder: Builder, model: FaceModel, nodes: list[int]) -> dict[str, Any]:
-    """The extension object; arrays go to buffer views of `builder`. nodes: one a part."""
-    place = {part.name: number for number, part in enumerate(model.parts)}
+    """The extension object of a model; its arrays are added to `builder`. nodes: the node of each part."""
+    part_numbers = {part.name: number for number, part in enumerate(model.parts)}
     content: dict[str, Any] = {
         "version": VERSION,
         "name": _text(model.name, "the model's name"),
         "notes": {_text(k, "a note"): _text(v, f"note {k!r}") for k, v in model.notes.items()},
         "parts": [_part(model, number, node) for number, node in enumerate(nodes)],
         "featurePoints": _points(model),
-        "tables": [_table(builder, table, place) for table in model.tables],
+        "tables": [_table(builder, table, part_numbers) for table in model.tables],
         "lost": {_fap(n): _text(model.lost[n], f"reason for FAP {n}") for n in sorted(model.lost)},
         "visemes": _definitions(model.definitions.visemes, VISEME_NAMES),
         "expressions": _definitions(model.definitions.expressions, EXPRESSION_NAMES),
@@ -56,30 +56,30 @@ def _part(model: FaceModel, number: int, node: int) -> dict[str, Any]:
 
 def _points(model: FaceModel) -> dict[str, Any]:
     starts = np.array(list(model.starts.values()))
-    found: dict[str, Any] = {}
+    points: dict[str, Any] = {}
     for row, name in enumerate(names()):
         if np.isnan(model.points[row]).any():
             continue
-        found[name] = {"position": model.points[row].tolist()}
+        points[name] = {"position": model.points[row].tolist()}
         vertex = int(model.bound[row])
         if vertex >= 0:
             part = int(np.searchsorted(starts, vertex, side="right")) - 1
-            found[name] |= {"part": part, "vertex": vertex - int(starts[part])}
-    return found
+            points[name] |= {"part": part, "vertex": vertex - int(starts[part])}
+    return points
 
 
-def _table(builder: Builder, table: FaceDefTables, place: dict[str, int]) -> dict[str, Any]:
+def _table(builder: Builder, table: FaceDefTables, part_numbers: dict[str, int]) -> dict[str, Any]:
     entry: dict[str, Any] = {"fap": _fap(table.fap)}
     if table.meshes:
-        entry["meshes"] = [_mesh(builder, mesh, place) for mesh in table.meshes]
+        entry["meshes"] = [_mesh(builder, mesh, part_numbers) for mesh in table.meshes]
     if table.transforms:
-        entry["transforms"] = [_transform(transform, place) for transform in table.transforms]
+        entry["transforms"] = [_transform(transform, part_numbers) for transform in table.transforms]
     return entry
 
 
-def _mesh(builder: Builder, mesh: FaceDefMesh, place: dict[str, int]) -> dict[str, Any]:
+def _mesh(builder: Builder, mesh: FaceDefMesh, part_numbers: dict[str, int]) -> dict[str, Any]:
     entry: dict[str, Any] = {
-        "part": place[mesh.part],
+        "part": part_numbers[mesh.part],
         "borders": mesh.borders.tolist(),
         "count": len(mesh.vertices),
     }
@@ -89,8 +89,8 @@ def _mesh(builder: Builder, mesh: FaceDefMesh, place: dict[str, int]) -> dict[st
     return entry
 
 
-def _transform(transform: FaceDefTransform, place: dict[str, int]) -> dict[str, Any]:
-    entry: dict[str, Any] = {} if transform.part == HEAD else {"part": place[transform.part]}
+def _transform(transform: FaceDefTransform, part_numbers: dict[str, int]) -> dict[str, Any]:
+    entry: dict[str, Any] = {} if transform.part == HEAD else {"part": part_numbers[transform.part]}
     return entry | {
         "kind": transform.kind,
         "amount": list(transform.amount),
@@ -98,11 +98,11 @@ def _transform(transform: FaceDefTransform, place: dict[str, int]) -> dict[str, 
     }
 
 
-def _definitions(table: Float32, words: tuple[str, ...]) -> list[dict[str, Any]]:
-    """FAPs of select 1, 2, ...; those at 0 are left out."""
+def _definitions(table: Float32, select_names: tuple[str, ...]) -> list[dict[str, Any]]:
+    """The FAPs that are not 0 of selects 1, 2, ..."""
     return [
-        {"name": word, "faps": {_fap(int(n) + 1): float(row[n]) for n in np.flatnonzero(row)}}
-        for word, row in zip(words[1:], table[1:], strict=True)
+        {"name": name, "faps": {_fap(int(n) + 1): float(row[n]) for n in np.flatnonzero(row)}}
+        for name, row in zip(select_names[1:], table[1:], strict=True)
     ]
 
 

@@ -1,13 +1,10 @@
-"""The extension object FBA_face of a glTF file, read: meshes, feature points and tables become a face.
+"""Reads the extension object FBA_face of a glTF file: meshes, feature points and tables become a face.
 
-Every number is checked against what the file really holds before anything is made of it. What is wrong
-is a ModelError that names the place, such as
+Every number is checked against the file's content before it is used. Errors name the position, such as
 "head.glb: extensions.FBA_face.tables[3].meshes[0].displacements: ...".
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -15,10 +12,11 @@ from fba.arrays import Float32, Float64, Int32
 from fba.face.expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.feature_points import names, row_of
 from fba.face.gltf._extension import NAME, VERSION
-from fba.face.gltf._tables import read_tables
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
+from fba.face.tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.gltf.document import Document
+from fba.gltf.packed import unpack
 from fba.gltf.part_materials import read_material
 from fba.gltf.reader import read_document
 from fba.gltf.scene import Gltf
@@ -27,11 +25,14 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
 MAX_PARTS = 1000
 MAX_NOTES = 1000
+MAX_BORDERS = 4096
+MAX_TRANSFORMS = 10_000
+INT32 = 2**31 - 1
 LARGEST = float(np.finfo(np.float32).max)
 
 
 def read_model(document: Document) -> FaceModel:
-    """The face in an opened glTF document. Raises ModelError naming the place of what is wrong."""
+    """The face in an opened glTF document. Raises ModelError naming the position of what is wrong."""
     content = optional_member(document.root.get("extensions"), NAME)
     if content is None:
         raise document.root.error(
@@ -44,21 +45,21 @@ def read_model(document: Document) -> FaceModel:
     gltf = read_document(document)
     parts = _parts(content.member("parts"), gltf, document.budget)
     points, bound = _points(content.member("featurePoints"), parts)
-    for name, value in _members(content, "morphValues", FAP_COUNT):  # for viewers' users, not for us
-        _fap(name, value)
+    for name, value in content.entries("morphValues", FAP_COUNT):  # only other programs use these
+        _fap_number(name, value)
         value.number()
     fit = content.get("fit")
-    with locating_errors(content), np.errstate(all="ignore"):  # absurd sizes overflow; no harm comes of it
+    with locating_errors(content), np.errstate(all="ignore"):  # absurd sizes may overflow
         return FaceModel(
             parts=parts,
             points=points,
             bound=bound,
-            tables=read_tables(document, content, parts),
+            tables=tuple(_table(document, entry, parts) for entry in content.elements(FAP_COUNT, "tables")),
             fit=None if fit is None else _fit(fit),
             definitions=_definitions(content),
             name=_text(content, "name"),
-            lost={_fap(key, value): value.text() for key, value in _members(content, "lost", FAP_COUNT)},
-            notes={key: value.text() for key, value in _members(content, "notes", MAX_NOTES)},
+            lost={_fap_number(key, value): value.text() for key, value in content.entries("lost", FAP_COUNT)},
+            notes={key: value.text() for key, value in content.entries("notes", MAX_NOTES)},
         )
 
 
@@ -85,7 +86,7 @@ def _part(entry: Value, where: Value, gltf: Gltf, number: int, budget: Budget) -
     if node.skin is not None or not np.array_equal(node.world, np.eye(4)):
         raise where.error(f"node {number} must stand where it is modelled: no transform, no skin")
     primitive = gltf.meshes[node.mesh].primitives[0]
-    # copies here and in the joined arrays of the face
+    # for the copies in the part and in the joined arrays of the face
     budget.charge(len(primitive.positions) * 120 + len(primitive.triangles) * 36, entry)
     with locating_errors(entry):
         return Part(
@@ -128,29 +129,66 @@ def _definitions(content: Value) -> Definitions:
     )
 
 
-def _poses(listed: Value, words: tuple[str, ...]) -> Float32:
-    """float32 (1 + selects, 68); row 0 is "none"."""
-    entries = listed.elements(len(words))
-    if len(entries) != len(words) - 1:
-        raise listed.error(f"{len(entries)} entries, but {len(words) - 1} are needed, from select 1 on")
-    table = np.zeros((len(words), FAP_COUNT), dtype=np.float32)
+def _poses(listed: Value, select_names: tuple[str, ...]) -> Float32:
+    """float32 (selects, 68): FAPs of each select; row 0 is "none"."""
+    count = len(select_names) - 1
+    entries = listed.elements(count + 1)
+    if len(entries) != count:
+        raise listed.error(f"{len(entries)} entries, but {count} are needed, from select 1 on")
+    table = np.zeros((count + 1, FAP_COUNT), dtype=np.float32)
     for select, entry in enumerate(entries, 1):
         for name, value in entry.member("faps").members():
-            table[select, _fap(name, value) - 1] = value.number(-LARGEST, LARGEST)
+            table[select, _fap_number(name, value) - 1] = value.number(-LARGEST, LARGEST)
     return table
 
 
-def _members(content: Value, key: str, most: int) -> list[tuple[str, Value]]:
-    held = content.get(key)
-    if held is None:
-        return []
-    found: list[tuple[str, Value]] = []
-    for name, value in held.members():
-        if len(found) == most:
-            raise held.error(f"more than the {most} entries that are read")
-        Value(name, held.file, held.path).text()  # names must be Unicode too
-        found.append((name, value))
-    return found
+def _table(document: Document, entry: Value, parts: tuple[Part, ...]) -> FaceDefTables:
+    name = entry.member("fap")
+    number = _fap_number(name.text(100), name)
+    meshes = tuple(_mesh(document, mesh, parts) for mesh in entry.elements(len(parts), "meshes"))
+    transforms = tuple(_transform(each, parts) for each in entry.elements(MAX_TRANSFORMS, "transforms"))
+    with locating_errors(entry):
+        return FaceDefTables(number, meshes, transforms)
+
+
+def _mesh(document: Document, entry: Value, parts: tuple[Part, ...]) -> FaceDefMesh:
+    part = parts[entry.member("part").index(len(parts), "part")]
+    borders = [border.integer(-INT32 - 1, INT32) for border in entry.member("borders").elements(MAX_BORDERS)]
+    if len(borders) < 2:
+        raise entry.member("borders").error("at least two borders are needed")
+    intervals = len(borders) - 1
+    count = entry.member("count").integer(0, len(part.vertices))
+    vertices: Int32 = np.zeros(0, dtype=np.int32)
+    displacements: Float32 = np.zeros((0, intervals, 3), dtype=np.float32)
+    if count:
+        reference = entry.member("vertices")
+        vertices = unpack(document, reference, np.int32, (count,))
+        if int(vertices.min()) < 0 or int(vertices.max()) >= len(part.vertices):
+            raise reference.error(
+                f"names vertices {vertices.min()} to {vertices.max()}, "
+                f"but part {part.name!r} has {len(part.vertices)}"
+            )
+        reference = entry.member("displacements")
+        document.budget.charge(count * intervals * 12, reference)  # the copy in the FaceDefMesh
+        displacements = unpack(document, reference, np.float32, (intervals, 3, count)).transpose(2, 0, 1)
+    with locating_errors(entry):
+        return FaceDefMesh(part.name, np.array(borders, dtype=np.int64), vertices, displacements)
+
+
+def _transform(entry: Value, parts: tuple[Part, ...]) -> FaceDefTransform:
+    amount = _three(entry.member("amount"))
+    part, centre = entry.get("part"), entry.get("centre")
+    return FaceDefTransform(
+        part=HEAD if part is None else parts[part.index(len(parts), "part")].name,
+        kind=entry.member("kind").choice(*KINDS),
+        amount=amount,
+        centre=(0.0, 0.0, 0.0) if centre is None else _three(centre),
+    )
+
+
+def _three(value: Value) -> tuple[float, float, float]:
+    x, y, z = value.numbers(3)
+    return x, y, z
 
 
 def _text(content: Value, key: str) -> str:
@@ -158,7 +196,8 @@ def _text(content: Value, key: str) -> str:
     return "" if given is None else given.text()
 
 
-def _fap(name: Any, value: Value) -> int:
+def _fap_number(name: str, value: Value) -> int:
+    """The number of a low-level FAP by its name. value: named in the error."""
     number = fap_numbers().get(name, 0)
     if number < FIRST_LOW_LEVEL_FAP:
         raise value.error(f"{name[:60]!a} is the name of no low-level FAP")

@@ -1,8 +1,8 @@
-"""Morph targets for plain glTF viewers: one per FAP, at a typical value.
+"""Morph targets for any glTF viewer: one per FAP, at a typical value.
 
 `morph_values.csv` lists the value of each FAP at which its target has weight 1, in the FAP's own unit:
 lids close, the jaw opens by some 16 mm on an adult, brows rise by some 9 mm, eyes and head turn by 0.3
-radians. Motions that turn or bend on the way become straight lines.
+radians. A morph target moves vertices in straight lines, even where the FAP rotates or bends.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ def morph_values() -> dict[int, int]:
 
 
 def displacements(model: FaceModel) -> Iterator[tuple[int, Float32]]:
-    """FAP number, and float32 (V, 3) by which it moves the model's vertices at its value, for every table.
+    """Yields, for every table, the FAP's number and the shifts of vertices at its value, float32 (V, 3).
 
-    Raises ModelError where that is not finite.
+    Raises ModelError for a shift that is not finite.
     """
     move = Deformer(model)
     neutral = move(np.zeros(FAP_COUNT))
@@ -41,6 +41,6 @@ def displacements(model: FaceModel) -> Iterator[tuple[int, Float32]]:
         shift = move(values) - neutral
         if not np.isfinite(shift).all():
             raise ModelError(
-                f"{faps()[table.fap - 1].label} moves vertices beyond all numbers at {values.max():g}"
+                f"{faps()[table.fap - 1].label} moves vertices beyond 32-bit floats at {values.max():g}"
             )
         yield table.fap, shift

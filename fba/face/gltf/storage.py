@@ -23,18 +23,18 @@ from fba.source import Path
 def load(path: Path) -> FaceModel:
     """Read a face model from a .glb (or .gltf) file, as `save` writes it.
 
-    Raises FormatError where the file cannot be opened, ModelError, which names the place in it, where it
-    is damaged, contradicts itself, or brings no extension FBA_face. Nothing of a bad file is used.
+    Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
+    damaged, contradicts itself, or lacks the extension FBA_face.
     """
     return read_model(open_document(path))
 
 
 def save(model: FaceModel, path: Path) -> None:
-    """Write a face model as .glb, whole or not at all; loading it gives an equal model again.
+    """Write a face model as .glb, atomically; loading it gives an equal model.
 
     Any glTF viewer shows its neutral face, with a morph target for every FAP that has tables. Raises
-    ModelError where glTF cannot hold the model (a part without triangles, a texture that is neither PNG
-    nor JPEG), FormatError where the file cannot be written.
+    ModelError where glTF cannot represent the model (a part without triangles, a texture that is neither
+    PNG nor JPEG), FormatError where the file cannot be written.
     """
     if os.fspath(path).lower().endswith(".gltf"):
         raise ModelError(f"{os.fspath(path)}: face models are written in one file; name it .glb")
@@ -42,15 +42,15 @@ def save(model: FaceModel, path: Path) -> None:
 
 
 def build(model: FaceModel) -> Builder:
-    """The whole document of a model. Raises ModelError where glTF cannot hold it, with the reason."""
+    """The glTF document of a model. Raises ModelError where glTF cannot represent it, with the reason."""
     builder = Builder()
     builder.root["extensionsUsed"] = [NAME]
     builder.root["scene"] = 0
     builder.add("scenes", {"nodes": [0]})
     nodes = list(range(1, len(model.parts) + 1))
     builder.add("nodes", {"name": HEAD, "children": nodes})
-    looks = PartWriter(builder)
-    primitives = [looks.primitive(part) for part in model.parts]
+    writer = PartWriter(builder)
+    primitives = [writer.primitive(part) for part in model.parts]
     targets = _targets(builder, model)
     for part, primitive, moved in zip(model.parts, primitives, targets, strict=True):
         mesh: dict[str, Any] = {"name": part.name, "primitives": [primitive]}
@@ -63,11 +63,11 @@ def build(model: FaceModel) -> Builder:
 
 
 def _targets(builder: Builder, model: FaceModel) -> list[dict[str, int]]:
-    """For each part the accessors of its morph targets, by name of the FAP."""
-    found: list[dict[str, int]] = [{} for _ in model.parts]
+    """For each part, the accessors of its morph targets by FAP name."""
+    targets: list[dict[str, int]] = [{} for _ in model.parts]
     ends = np.cumsum([len(part.vertices) for part in model.parts])[:-1]
     for number, shift in displacements(model):
-        for targets, moved in zip(found, np.split(shift, ends), strict=True):
+        for accessors, moved in zip(targets, np.split(shift, ends), strict=True):
             if moved.any():
-                targets[faps()[number - 1].name] = builder.displacements(moved)
-    return found
+                accessors[faps()[number - 1].name] = builder.displacements(moved)
+    return targets

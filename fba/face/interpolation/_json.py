@@ -1,4 +1,4 @@
-"""The FIT as lists and dicts, as JSON carries it.
+"""The FIT as lists and dicts, for JSON.
 
     {"links": [{"source": ["expression"],
                 "destination": {"raise_l_cornerlip": {
@@ -18,7 +18,7 @@ from fba.errors import ModelError
 from fba.face.interpolation.terms import Function, Link, Term
 
 
-def data_of(links: Sequence[Link]) -> dict[str, Any]:
+def dict_from_links(links: Sequence[Link]) -> dict[str, Any]:
     """Links as lists, dicts, strings and numbers."""
     return {
         "links": [
@@ -37,12 +37,12 @@ def data_of(links: Sequence[Link]) -> dict[str, Any]:
     }
 
 
-def links_of(data: object) -> list[Link]:
-    """Links from what `data_of` gave; ModelError naming the place of what is something else."""
+def links_from_dict(data: object) -> list[Link]:
+    """The links in what `dict_from_links` wrote. Raises ModelError naming the entry that is wrong."""
     top = _object(data, "the FIT", {"links"})
     links = []
-    for place, entry in enumerate(_list(top.get("links"), "the links of the FIT"), 1):
-        where = f"link {place} of the FIT"
+    for number, entry in enumerate(_list(top.get("links"), "the links of the FIT"), 1):
+        where = f"link {number} of the FIT"
         link = _object(entry, where, {"source", "destination"})
         source = _list(link.get("source"), f"{where}: source")
         if not all(isinstance(name, str) for name in source):

@@ -1,24 +1,25 @@
 """The FIT as the flat lists of its BIFS node, ISO/IEC 14496-1.
 
-What no public text says is read as follows.
+Where no public text defines the node, we decided:
 
 - Graph counts sets from 1: its bounds are 0..68, those of FAPs, which count from 1, and counting from
-  0 would never reach 68. A Graph that contains a 0 can only count from 0, and is read so.
-- A set with FAP 1 brings three numbers for it (select1, select2, blend), with FAP 2 four (select1,
+  0 would never reach 68. A Graph that contains a 0 is read as counting from 0.
+- FAP 1 in a source set stands for three numbers (select1, select2, blend), FAP 2 for four (select1,
   intensity1, select2, intensity2), in the order in which a stream sends them.
 - numeratorTerms and denominatorTerms hold one count for each FAP of each link's destination set, links
-  in the order of Graph, FAPs in the order of their set. Exponents and coefficients follow the same order,
-  term by term; a term has one exponent for each number of the source set. No terms make a numerator
-  0 and a denominator 1.
+  in the order of Graph, FAPs in the order of their set. Exponents and coefficients have the same order,
+  term by term; a term has one exponent for each number of the source set. A numerator without terms is
+  0, a denominator 1.
 - numeratorImpulse holds a pair (s, a) for each numerator term of the links whose source set contains
-  FAP 1 or 2, and nothing for the others: the term counts only where the s-th number of the source
-  set, counted from 1, equals a; (0, 0) is a term that always counts. Only selects can be asked for.
+  FAP 1 or 2, and nothing for the others: the term is 0 unless the s-th number of the source set, counted
+  from 1, equals a; (0, 0) sets no condition. The s-th number must be a select.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from fba.errors import ModelError
 from fba.face.interpolation.terms import (
@@ -28,7 +29,7 @@ from fba.face.interpolation.terms import (
     Function,
     Link,
     Term,
-    number_of,
+    to_float,
 )
 from fba.parameters import FAP_COUNT, fap_numbers, faps
 
@@ -47,15 +48,15 @@ NONE = -1
 """Ends a set in FAPs."""
 
 
-def links_of(node: Mapping[str, Sequence[float]]) -> list[Link]:
-    """Links from the fields of a node, by their names in the standard; absent ones are empty.
+def links_from_node(node: Mapping[str, Sequence[float]]) -> list[Link]:
+    """The links in the fields of a node, by their names in the standard; absent fields are empty.
 
     Raises ModelError naming the field where counts do not fit together or a number is out of bounds.
     """
     unknown = sorted(set(node) - {*INTEGER_FIELDS, *FLOAT_FIELDS})
     if unknown:
         raise ModelError(f"a FIT node has no field {unknown[0]!r}")
-    fields = {name: _Field(name, node.get(name, ())) for name in (*INTEGER_FIELDS, *FLOAT_FIELDS)}
+    fields = {name: _read_field(name, node.get(name, ())) for name in (*INTEGER_FIELDS, *FLOAT_FIELDS)}
     sets = _sets(fields["FAPs"])
     links: list[Link] = []
     graph = fields["Graph"]
@@ -63,73 +64,78 @@ def links_of(node: Mapping[str, Sequence[float]]) -> list[Link]:
         raise ModelError(f"Graph of the FIT holds {graph.left} numbers; it must be pairs")
     base = 0 if 0 in graph.numbers else 1
     while graph.left:
-        place = len(links) + 1
-        source, destination = (
-            _set(sets, int(number) - base, f"link {place} of the FIT") for number in graph.take(2, "")
-        )
-        links.append(_link(source, destination, fields, f"link {place} of the FIT"))
-    for one in fields.values():
-        if one.left:
-            raise ModelError(f"{one.name} of the FIT holds {one.left} numbers more than its links need")
+        where = f"link {len(links) + 1} of the FIT"
+        source, destination = (_set(sets, int(number) - base, where) for number in graph.take(2, ""))
+        links.append(_link(source, destination, fields, where))
+    for field in fields.values():
+        if field.left:
+            raise ModelError(f"{field.name} of the FIT holds {field.left} numbers more than its links need")
     return links
 
 
-def node_of(links: Sequence[Link]) -> dict[str, list[int] | list[float]]:
+def node_from_links(links: Sequence[Link]) -> dict[str, list[int] | list[float]]:
     """The fields of a node; equal sets are listed once."""
-    whole: dict[str, list[int]] = {name: [] for name in INTEGER_FIELDS}
+    integers: dict[str, list[int]] = {name: [] for name in INTEGER_FIELDS}
     coefficients: dict[str, list[float]] = {name: [] for name in FLOAT_FIELDS}
     sets: dict[tuple[str, ...], int] = {}
     for link in links:
         for names in (tuple(link.source), tuple(link.functions)):
             if names not in sets:
                 sets[names] = len(sets) + 1
-                whole["FAPs"] += [*(fap_numbers()[name] for name in names), NONE]
-            whole["Graph"].append(sets[names])
+                integers["FAPs"] += [*(fap_numbers()[name] for name in names), NONE]
+            integers["Graph"].append(sets[names])
         for function in link.functions.values():
             for part, terms in (("numerator", function.numerator), ("denominator", function.denominator)):
-                whole[f"{part}Terms"].append(len(terms))
+                integers[f"{part}Terms"].append(len(terms))
                 coefficients[f"{part}Coefs"] += [term.coefficient for term in terms]
                 for term in terms:
-                    whole[f"{part}Exp"] += [term.powers.get(number, 0) for number in link.numbers]
+                    integers[f"{part}Exp"] += [term.powers.get(number, 0) for number in link.numbers]
             if _high_level(link.source):
                 for term in function.numerator:
                     select, value = term.when or ("", 0)
                     position = link.numbers.index(select) + 1 if select else 0
-                    whole["numeratorImpulse"] += [position, value]
+                    integers["numeratorImpulse"] += [position, value]
     if len(sets) > FAP_COUNT:
         raise ModelError(f"the FIT has {len(sets)} different sets; a node can number {FAP_COUNT} at most")
-    return {**whole, **coefficients}
+    return {**integers, **coefficients}
 
 
+@dataclass
 class _Field:
-    """One list of the node, taken piece by piece."""
+    """One list of the node, of which `used` numbers have been taken."""
 
-    def __init__(self, name: str, numbers: Sequence[float]) -> None:
-        self.name = name
-        self._next = 0
-        if isinstance(numbers, (str, bytes)) or not isinstance(numbers, Iterable):
-            raise ModelError(f"{name} of the FIT must be a list of numbers, not {type(numbers).__name__}")
-        self.numbers = [number_of(number) for number in numbers]
-        low, high = INTEGER_FIELDS.get(name, (-math.inf, math.inf))
-        for place, (number, given) in enumerate(zip(self.numbers, numbers, strict=True), 1):
-            whole = name not in INTEGER_FIELDS or number.is_integer()
-            if not whole or not math.isfinite(number) or not low <= number <= high:
-                wanted = f"a whole number {low}..{high}" if name in INTEGER_FIELDS else "finite"
-                said = str(given) if isinstance(given, float) else repr(given)[:40]
-                raise ModelError(f"{name} of the FIT: number {place} is {said}, which must be {wanted}")
+    name: str
+    numbers: list[float]
+    used: int = 0
 
     @property
     def left(self) -> int:
-        return len(self.numbers) - self._next
+        return len(self.numbers) - self.used
 
     def take(self, count: int, why: str) -> list[float]:
+        """The next numbers; ModelError where too few are left. why: what needs them, for the message."""
         if self.left < count:
             raise ModelError(
                 f"{self.name} of the FIT ends after {len(self.numbers)} numbers: {why} needs {count} more, "
                 f"and {self.left} are left"
             )
-        self._next += count
-        return self.numbers[self._next - count : self._next]
+        self.used += count
+        return self.numbers[self.used - count : self.used]
+
+
+def _read_field(name: str, values: Sequence[float]) -> _Field:
+    """The numbers of a field; ModelError where one is out of bounds."""
+    if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
+        raise ModelError(f"{name} of the FIT must be a list of numbers, not {type(values).__name__}")
+    numbers = [to_float(value) for value in values]
+    is_integer = name in INTEGER_FIELDS
+    low, high = INTEGER_FIELDS.get(name, (-math.inf, math.inf))
+    for position, (number, value) in enumerate(zip(numbers, values, strict=True), 1):
+        if (is_integer and not number.is_integer()) or not math.isfinite(number) or not low <= number <= high:
+            wanted = f"a whole number {low}..{high}" if is_integer else "finite"
+            text = str(value) if isinstance(value, float) else repr(value)[:40]
+            raise ModelError(f"{name} of the FIT: number {position} is {text}, which must be {wanted}")
+    return _Field(name, numbers)
 
 
 def _sets(field: _Field) -> list[tuple[str, ...]]:
@@ -149,10 +155,10 @@ def _sets(field: _Field) -> list[tuple[str, ...]]:
     return sets
 
 
-def _set(sets: list[tuple[str, ...]], place: int, where: str) -> tuple[str, ...]:
-    if not 0 <= place < len(sets):
-        raise ModelError(f"{where} asks for set {place + 1}, but FAPs lists {len(sets)}")
-    return sets[place]
+def _set(sets: list[tuple[str, ...]], index: int, where: str) -> tuple[str, ...]:
+    if not 0 <= index < len(sets):
+        raise ModelError(f"{where} asks for set {index + 1}, but FAPs lists {len(sets)}")
+    return sets[index]
 
 
 def _high_level(source: Sequence[str]) -> bool:

@@ -1,4 +1,4 @@
-"""Values that a FIT gives to FAPs that were not sent, for many frames at once."""
+"""Fills in unsent FAPs by a FIT, for many frames at once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fba.face.interpolation.terms import HIGH_LEVEL_NUMBERS, Function, Term
 from fba.parameters import INTENSITY_MAX, fap_numbers, faps
 
 VALUE_MAX = float(2**31 - 1)
-"""A result beyond this is no FAP value: FAPs are 32-bit integers."""
+"""A result beyond this counts as no value: FAPs are 32-bit integers."""
 
 
 def evaluate(
@@ -24,26 +24,26 @@ def evaluate(
     viseme: Int16,
     expression: Int16,
 ) -> tuple[Float64, Bool, Bool]:
-    """FAP values, with missing ones filled in by a FIT.
+    """FAP values with unknown ones filled in by a FIT: (values, known, from_high_level), all (T, 68).
 
-    values: (T, 68). known: bool (T, 68), which of them stand; columns 0 and 1 say whether a viseme and
-    an expression are in force. viseme: int16 (T, 4), expression: int16 (T, 6), their fields. Returns
-    new arrays (T, 68): values float64; known; and from_high_level, which values follow from a viseme or
-    an expression, straight or through others.
+    values: (T, 68). known: bool (T, 68), mask of those to keep; columns 0 and 1 say whether a viseme and an
+    expression are in force. viseme: int16 (T, 4), expression: int16 (T, 6), their fields. Returns new
+    arrays: values, float64; a mask of the values now known; and one of those computed from a viseme or an
+    expression, directly or through other FAPs.
     """
-    given, known = values.astype(np.float64), known.copy()
+    filled, known = values.astype(np.float64), known.copy()
     from_high_level = np.zeros_like(known)
     fields = {
-        name: np.clip(array[:, place], 0, INTENSITY_MAX).astype(np.float64)
+        name: np.clip(array[:, column], 0, INTENSITY_MAX).astype(np.float64)
         for high, array in (("viseme", viseme), ("expression", expression))
-        for place, name in enumerate(HIGH_LEVEL_NUMBERS[high])
+        for column, name in enumerate(HIGH_LEVEL_NUMBERS[high])
     }
 
     def number(rows: Intp | slice, name: str) -> Float64:
-        column: Float64 = fields[name] if name in fields else given[:, fap_numbers()[name] - 1]
+        column: Float64 = fields[name] if name in fields else filled[:, fap_numbers()[name] - 1]
         return column[rows]
 
-    with np.errstate(all="ignore"):  # what is no number is found and left out
+    with np.errstate(all="ignore"):  # results that are not finite are left out below
         for fap in table.order:
             column = fap - 1
             for link in table.links_to[fap]:
@@ -52,11 +52,11 @@ def evaluate(
                 rows = np.flatnonzero(reduce(np.logical_and, (known[:, s] for s in sources), missing))
                 if not len(rows):
                     continue
-                some = slice(None) if len(rows) == len(given) else rows
+                frames = slice(None) if len(rows) == len(filled) else rows
                 function = link.functions[faps()[column].name]
-                result, good = _ratio(function, partial(number, some), len(rows))
-                rows = rows[good]
-                given[rows, column] = result[good]
+                result, valid = _ratio(function, partial(number, frames), len(rows))
+                rows = rows[valid]
+                filled[rows, column] = result[valid]
                 known[rows, column] = True
                 if any(name in HIGH_LEVEL_NUMBERS for name in link.source):
                     from_high_level[rows, column] = True
@@ -64,18 +64,18 @@ def evaluate(
                     from_high_level[rows, column] = reduce(
                         np.logical_or, (from_high_level[rows, source] for source in sources)
                     )
-    return given, known, from_high_level
+    return filled, known, from_high_level
 
 
 def _ratio(function: Function, number: Callable[[str], Float64], count: int) -> tuple[Float64, Bool]:
-    """(count,) values, and which of them are values at all."""
+    """(count,) values of a function, and a mask of those that are valid."""
     result = _sum(function.numerator, number, count)
-    good = np.isfinite(result)
+    valid = np.isfinite(result)
     if function.denominator:
-        below = _sum(function.denominator, number, count)
-        good &= np.isfinite(below) & (below != 0)
-        result = result / below
-    return result, good & (np.abs(result) <= VALUE_MAX)
+        divisor = _sum(function.denominator, number, count)
+        valid &= np.isfinite(divisor) & (divisor != 0)
+        result = result / divisor
+    return result, valid & (np.abs(result) <= VALUE_MAX)
 
 
 def _sum(terms: Sequence[Term], number: Callable[[str], Float64], count: int) -> Float64:

@@ -1,12 +1,12 @@
-"""The FIT: how FAPs that a stream leaves out follow from those that it sends.
+"""The FIT (FAP interpolation table): functions that give unsent FAPs from sent ones.
 
-ISO/IEC 14496-1, node FIT (FAP interpolation table). Sets of FAPs hang together by directed links; a
-link gives each FAP of its destination set as a rational function of the numbers of its source set:
+ISO/IEC 14496-1, node FIT. Directed links connect sets of FAPs; a link gives each FAP of its destination
+set as a rational function of the numbers of its source set:
 
     sum_i( when_i  c_i  prod_j F_j ** l_ij ) / sum_i( b_i  prod_j F_j ** m_ij )
 
-where `when_i`, the impulse of a term, is 1 or 0: whether a select of the source set has one certain
-value ("the expression is joy").
+where `when_i`, the impulse of a term, is 1 or 0: whether a select of the source set has a certain value
+("the expression is joy").
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 
 from fba.errors import ModelError
 from fba.face.interpolation import _json, _node
-from fba.face.interpolation.terms import EXPONENT_MAX, TERMS_MAX, Function, Link, Term, number_of
+from fba.face.interpolation.terms import EXPONENT_MAX, TERMS_MAX, Function, Link, Term, to_float
 from fba.parameters import (
     EXPRESSION_FIELDS,
     EXPRESSION_SELECT_MAX,
@@ -34,49 +34,48 @@ from fba.parameters import (
 
 @dataclass(frozen=True)
 class InterpolationTable:
-    """How unsent FAPs follow from sent ones.
+    """Functions that give unsent FAPs from sent ones.
 
-    links: for each FAP the links that lead to it are tried in this order; the first one counts whose
-    source FAPs are all available (sent, or themselves interpolated) and whose function has a value
-    there. A denominator of zero, or a result that is not finite or beyond 32 bits, is no value. A FAP
-    that no link gives is left to the standard's mates.
+    links: the links to a FAP are tried in this order; the first is used whose source FAPs are all known
+    (sent, or themselves interpolated) and whose function has a value: no denominator of zero, and a finite
+    result within 32 bits. A FAP that no link gives copies its mate.
 
-    Raises ModelError for links that lead round in a circle, empty sets, FAPs that are unknown, listed
-    twice or high-level in a destination set, wrong exponents, term counts, impulses and coefficients.
+    Raises ModelError for links in a circle, empty sets, FAPs that are unknown, listed twice or high-level
+    in a destination set, wrong exponents, term counts, impulses and coefficients.
     """
 
     links: Sequence[Link]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "links", tuple(_checked(link, i) for i, link in enumerate(self.links, 1)))
+        object.__setattr__(self, "links", tuple(_check_link(link, i) for i, link in enumerate(self.links, 1)))
         circle = find_circle(self.links)
         if circle:
             raise ModelError(
-                f"the links of the FIT lead round in a circle: {' -> '.join(circle)}; "
-                "each FAP must follow from others, never from itself"
+                f"the links of the FIT form a circle: {' -> '.join(circle)}; "
+                "no FAP may be computed from itself"
             )
 
     @classmethod
     def from_node(cls, node: Mapping[str, Sequence[float]]) -> InterpolationTable:
-        """The table that the fields of a BIFS node FIT describe; see `fba.face.interpolation._node`."""
-        return cls(_node.links_of(node))
+        """The table described by the fields of a BIFS node FIT, by name; ModelError for wrong ones."""
+        return cls(_node.links_from_node(node))
 
     def to_node(self) -> dict[str, list[int] | list[float]]:
-        """The fields of a BIFS node FIT: `from_node` of them is this table again."""
-        return _node.node_of(self.links)
+        """The fields of a BIFS node FIT; `from_node` reads them back."""
+        return _node.node_from_links(self.links)
 
     @classmethod
     def from_dict(cls, data: object) -> InterpolationTable:
-        """The table that `to_dict` gave; ModelError naming the place where it is something else."""
-        return cls(_json.links_of(data))
+        """The table that `to_dict` wrote. Raises ModelError naming the entry that is wrong."""
+        return cls(_json.links_from_dict(data))
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as lists, dicts, strings and numbers, for JSON."""
-        return _json.data_of(self.links)
+        """The table as lists, dicts, strings and numbers, for JSON."""
+        return _json.dict_from_links(self.links)
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """Destination FAPs, every one after those that it may follow from."""
+        """Destination FAPs, each after those that it may be computed from."""
         done: dict[int, None] = {}
         sources = sources_of(self.links)
         while len(done) < len(sources):
@@ -87,35 +86,33 @@ class InterpolationTable:
 
     @cached_property
     def links_to(self) -> dict[int, tuple[Link, ...]]:
-        """For each destination FAP its links, in the order in which they are tried."""
-        numbers = fap_numbers()
-        found: dict[int, list[Link]] = {}
-        for link in self.links:
-            for name in link.functions:
-                found.setdefault(numbers[name], []).append(link)
-        return {fap: tuple(links) for fap, links in found.items()}
+        """Links to each destination FAP, in the order in which they are tried."""
+        return {
+            fap: tuple(link for link in self.links if faps()[fap - 1].name in link.functions)
+            for fap in sources_of(self.links)
+        }
 
 
 def sources_of(links: Iterable[Link]) -> dict[int, set[int]]:
-    """For each destination FAP the FAPs that some link to it starts from."""
+    """By destination FAP: the source FAPs of all links to it."""
     numbers = fap_numbers()
-    found: dict[int, set[int]] = {}
+    sources: dict[int, set[int]] = {}
     for link in links:
         for name in link.functions:
-            found.setdefault(numbers[name], set()).update(numbers[source] for source in link.source)
-    return found
+            sources.setdefault(numbers[name], set()).update(numbers[source] for source in link.source)
+    return sources
 
 
 def find_circle(links: Iterable[Link]) -> list[str]:
-    """Names of FAPs that follow from one another in a circle, the first again at the end; else []."""
+    """Names of FAPs that depend on one another in a circle, the first again at the end; else []."""
     sources = sources_of(links)
-    open_, path = set(sources), list[int]()
-    while open_:
-        path = [min(open_)]
+    unvisited, path = set(sources), list[int]()
+    while unvisited:
+        path = [min(unvisited)]
         while path:
-            further = next((n for n in sorted(sources[path[-1]]) if n in open_), None)
+            further = next((n for n in sorted(sources[path[-1]]) if n in unvisited), None)
             if further is None:
-                open_.discard(path.pop())
+                unvisited.discard(path.pop())
             elif further in path:
                 circle = [*path[path.index(further) :], further]
                 return [faps()[number - 1].name for number in reversed(circle)]
@@ -131,8 +128,9 @@ def select_limits() -> dict[str, int]:
     return limits | {name: EXPRESSION_SELECT_MAX for name in EXPRESSION_FIELDS if "select" in name}
 
 
-def _checked(link: Link, place: int) -> Link:
-    where = f"link {place} of the FIT"
+def _check_link(link: Link, number: int) -> Link:
+    """The link with its numbers normalised; ModelError where something in it is wrong."""
+    where = f"link {number} of the FIT"
     if not isinstance(link, Link):
         raise ModelError(f"{where} is {type(link).__name__}, not a Link")
     for what, names in (("source", tuple(link.source)), ("destination", tuple(link.functions))):
@@ -151,32 +149,32 @@ def _checked(link: Link, place: int) -> Link:
     numbers = Link(tuple(link.source), {}).numbers
     functions = {
         name: Function(
-            _checked_terms(function.numerator, numbers, f"{where}, numerator of {name}", True),
-            _checked_terms(function.denominator, numbers, f"{where}, denominator of {name}", False),
+            _check_terms(function.numerator, numbers, f"{where}, numerator of {name}", True),
+            _check_terms(function.denominator, numbers, f"{where}, denominator of {name}", False),
         )
         for name, function in link.functions.items()
     }
     return Link(tuple(link.source), functions)
 
 
-def _checked_terms(
+def _check_terms(
     terms: Sequence[Term], numbers: tuple[str, ...], where: str, impulses: bool
 ) -> tuple[Term, ...]:
     if len(terms) > TERMS_MAX:
         raise ModelError(f"{where}: {len(terms)} terms, but there may be {TERMS_MAX} at most")
     return tuple(
-        _checked_term(term, numbers, f"{where}, term {i}", impulses) for i, term in enumerate(terms, 1)
+        _check_term(term, numbers, f"{where}, term {i}", impulses) for i, term in enumerate(terms, 1)
     )
 
 
-def _checked_term(term: Term, numbers: tuple[str, ...], where: str, impulses: bool) -> Term:
-    coefficient = number_of(term.coefficient)
+def _check_term(term: Term, numbers: tuple[str, ...], where: str, impulses: bool) -> Term:
+    coefficient = to_float(term.coefficient)
     if not math.isfinite(coefficient):
         raise ModelError(f"{where}: the coefficient {term.coefficient!r} is not a finite number")
     for name, exponent in term.powers.items():
         if name not in numbers:
             raise ModelError(f"{where}: {name!r} is not in the source set ({', '.join(numbers)})")
-        if not _whole(exponent) or not 0 <= exponent <= EXPONENT_MAX:
+        if isinstance(exponent, bool) or not isinstance(exponent, int) or not 0 <= exponent <= EXPONENT_MAX:
             raise ModelError(
                 f"{where}: the exponent of {name} must be a whole number 0..{EXPONENT_MAX}, not {exponent!r}"
             )
@@ -193,7 +191,3 @@ def _checked_term(term: Term, numbers: tuple[str, ...], where: str, impulses: bo
             raise ModelError(f"{where}: the impulse asks for {select} = {value!r}, which must be 0..{limit}")
     powers = {name: int(term.powers[name]) for name in numbers if term.powers.get(name)}
     return Term(coefficient, powers, None if term.when is None else (term.when[0], int(term.when[1])))
-
-
-def _whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)

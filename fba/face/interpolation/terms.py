@@ -1,4 +1,4 @@
-"""Terms, functions and links: what an interpolation table (FIT) consists of."""
+"""Terms, functions and links of an interpolation table (FIT)."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from functools import cached_property
 from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS
 
 EXPONENT_MAX = 15
-"""Largest exponent that the node can carry."""
+"""Largest exponent in a FIT node."""
 TERMS_MAX = 10
-"""Most terms of a numerator or denominator that the node can carry."""
+"""Most terms of a numerator or denominator in a FIT node."""
 HIGH_LEVEL_NUMBERS = {"viseme": VISEME_FIELDS[:3], "expression": EXPRESSION_FIELDS[:4]}
-"""The numbers that FAP 1 and FAP 2 bring to a source set."""
+"""The numbers that FAP 1 and FAP 2 stand for in a source set."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """coefficient x product of powers, where the impulse holds, else 0.
+    """coefficient x product of powers if the impulse is met, else 0.
 
     coefficient: finite. powers: exponent 0..15 of each number of the source set, by name; absent is 0.
     when: (select, value), such as ("expression_select1", 1), or None for always; numerators only.
@@ -60,8 +60,8 @@ class Link:
         return tuple(n for name in self.source for n in HIGH_LEVEL_NUMBERS.get(name, (name,)))
 
 
-def number_of(value: object) -> float:
-    """The value as a float; NaN if it is no number."""
+def to_float(value: object) -> float:
+    """The value as a float; NaN if it is not a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return math.nan
     try:

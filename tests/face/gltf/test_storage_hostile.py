@@ -105,7 +105,7 @@ CASES: list[tuple[str, Any, str]] = [
     (FACE + "/visemes/0/faps", {"open_jaw": 1e39}, r"visemes\[0\].faps.open_jaw: 1e\+39 is not within"),
     (FACE + "/expressions/5", 3, r"expressions\[5\]: expected an object, found 3"),
     (FACE + "/fit", {"links": 3}, "FBA_face.fit: the links of the FIT must be a list"),
-    (FACE + "/fit/links", [LOOP], "FBA_face.fit: the links of the FIT lead round in a circle"),
+    (FACE + "/fit/links", [LOOP], "FBA_face.fit: the links of the FIT form a circle"),
     (FACE + "/morphValues", {"open_jaw": "wide"}, "FBA_face.morphValues.open_jaw: expected a number"),
     ("meshes/0/primitives/0/targets/0/POSITION", 0.5, r"targets\[0\].POSITION: expected a whole number"),
 ]  # fmt: skip
