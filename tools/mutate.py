@@ -36,6 +36,8 @@ CLOCK = "fba/codec/_clock.py"
 TIME_BASE = "fba/codec/_time_base.py"
 RANGES = "fba/codec/_ranges.py"
 HEADERS = "fba/codec/_headers.py"
+RUNS = "fba/codec/_runs.py"
+QUANTISER = "fba/codec/_plane/quantiser.py"
 ENCODER = "fba/codec/_encoder.py"
 SETTINGS = "fba/codec/settings.py"
 BVH = "fba/formats/bvh/reader.py"
@@ -76,14 +78,19 @@ MUTANTS = (
     Mutant(HEADERS, "_HOURS = 32", "_HOURS = 24", TIMES_TEST),
     Mutant(HEADERS, "index / rate + Fraction(1, 2))", "index / rate)", TIMES_TEST),
     Mutant(HEADERS, "seconds * rate + Fraction(1, 2))", "seconds * rate)", TIMES_TEST),
-    Mutant(HEADERS, "if all(sent):", "if any(sent):", RANGES_TEST),
-    Mutant(HEADERS, "syntax.MASK_KEEP", "syntax.MASK_INTERPOLATE", RANGES_TEST),
-    Mutant(HEADERS, "else syntax.MASK_NONE", "else syntax.MASK_KEEP", RANGES_TEST),
-    Mutant(RANGES, "limit * step + (step - 1) // 2", "limit * step", RANGES_TEST),
+    Mutant(RUNS, "if all(sent):", "if any(sent):", RANGES_TEST),
+    Mutant(RUNS, "syntax.MASK_KEEP", "syntax.MASK_INTERPOLATE", RANGES_TEST),
+    Mutant(RUNS, "else syntax.MASK_NONE", "else syntax.MASK_KEEP", RANGES_TEST),
+    Mutant(QUANTISER, "limit * step + (step - 1) // 2", "limit * step", RANGES_TEST),
     Mutant(RANGES, "RANGE_CODE_MAX, 0) + 1", "RANGE_CODE_MAX, 0)", RANGES_TEST),
-    Mutant(RANGES, "(step - 1) // 2", "step // 2", RANGES_TEST),
+    Mutant(QUANTISER, "(step - 1) // 2", "step // 2", RANGES_TEST),
     Mutant(RANGES, "<= RANGE_CODE_MAX", "< RANGE_CODE_MAX", RANGES_TEST),
-    Mutant(RANGES, "amounts > _ROUNDED_AMOUNT_MAX", "amounts >= _ROUNDED_AMOUNT_MAX", RANGES_TEST),
+    Mutant(
+        ENCODER,
+        "amounts > quantiser.ROUNDED_AMOUNT_MAX",
+        "amounts >= quantiser.ROUNDED_AMOUNT_MAX",
+        RANGES_TEST,
+    ),
     Mutant(RANGES, "np.maximum(held, wanted)", "wanted", RANGES_TEST),
     Mutant(ENCODER, "> SKIP_MAX", ">= SKIP_MAX", RANGES_TEST),
     Mutant(BVH, "r.denominator > 1", "r.denominator < 1", BVH_TEST),

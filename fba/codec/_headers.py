@@ -1,48 +1,15 @@
-"""Choose header fields for the encoder: mask types, frame rate and time code."""
+"""Header fields of a stream: frame rate and time code."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from fractions import Fraction
-from functools import lru_cache
 
-from fba.arrays import Bool
-from fba.codec._plane import slots, syntax
 from fba.codec.settings import FrameRate, TimeCode
 from fba.errors import FbaWarning, RangeError, Remedy
 
 _HOURS = 32
-
-
-def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) -> tuple[int, ...]:
-    """Return the mask type of every group: none, all, or masked.
-
-    mask: bool (68,) or (296,), what is sent. interpolated: bool (68,), the FAPs that the animation wants
-    interpolated, or None. unsent: "keep" or "interpolate", for groups in which the animation does not want
-    all unsent FAPs interpolated. Unsent BAPs always keep their values.
-    """
-    return _mask_types(
-        part, mask.tobytes(), interpolated.tobytes() if interpolated is not None else b"", unsent
-    )
-
-
-@lru_cache(maxsize=64)
-def _mask_types(part: int, mask: bytes, interpolated: bytes, unsent: str) -> tuple[int, ...]:
-    """Do the same with bytes, so that results can be cached: an encoder asks for every frame."""
-    masked = (
-        syntax.MASK_INTERPOLATE if unsent == "interpolate" and part == slots.FACE_BIT else syntax.MASK_KEEP
-    )
-    types = []
-    for group in syntax.groups(part):
-        sent = [mask[number - 1] for number in group]
-        if all(sent):
-            types.append(syntax.MASK_ALL)
-        elif interpolated and all(mask[number - 1] or interpolated[number - 1] for number in group):
-            types.append(syntax.MASK_INTERPOLATE)
-        else:
-            types.append(masked if any(sent) else syntax.MASK_NONE)
-    return tuple(types)
 
 
 def frame_rate(rate: Fraction) -> FrameRate:

@@ -12,23 +12,23 @@ from fba.codec._plane.loops import quantise
 from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT, RangeLists
 from fba.compiled import compiled
 from fba.errors import RangeError, Remedy
-from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, INTENSITY_MAX, Bap, Fap, baps, faps
-
-_ROUNDED_AMOUNT_MAX = max((INTENSITY_MAX + quant // 2) // quant * quant for quant in range(1, QUANT_MAX + 1))
-"""Largest blend or intensity that a decoder returns for any quantiser: 75, with fap_quant 25."""
+from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, Bap, Fap, baps, faps
 
 
 class Ranges:
     """Range codes of the face or the body, which grow with the data.
 
-    codes: uint8 (4, 68) or (4, 296); I max, I min, P max, P min.
+    codes: uint8 (4, 68) or (4, 296); I max, I min, P max, P min. changed: a decoder does not know them yet.
     """
 
-    def __init__(self, part: int, quant: int) -> None:
+    def __init__(self, part: int, options: EncoderOptions) -> None:
         self._part = part
-        self._scale = quantiser.scale(part, quant)
+        self._options = options
+        self._scale = quantiser.scale(part, options.quant(part))
+        self._step = quantiser.steps(part, options.quant(part), options.bap_steps)
         self._first = slots.FAPS.start - 2 if part == slots.FACE_BIT else slots.BAPS.start
         self.codes = np.zeros((4, FAP_COUNT if part == slots.FACE_BIT else BAP_COUNT), dtype=np.uint8)
+        self.changed = True
 
     def start_from_tables(self) -> None:
         """Set the standard's own limits, for data that is not known in advance."""
@@ -38,38 +38,64 @@ class Ranges:
                 limits = (one.i_limits[1], -one.i_limits[0], one.p_limits[1], -one.p_limits[0])
                 self.codes[:, column] = [-(-limit // RANGE_UNIT) for limit in limits]
 
-    def widen(self, slots_: Int64, levels: Int64) -> bool:
-        """Widen the ranges of slots (K,) to hold these levels as far as possible; return whether any changed.
+    def widen(self, slots_: Int64, levels: Int64) -> None:
+        """Widen the ranges of slots (K,) to hold these levels as far as possible.
 
         levels: (4, K): I max, I min, P max, P min, the minima negated.
         """
         columns = slots_ - self._first
         wanted = np.minimum(self._codes(np.maximum(levels, 0)), RANGE_CODE_MAX)
         held = self.codes[:, columns]
-        wider = bool((wanted > held).any())
-        if wider:
+        if (wanted > held).any():
             self.codes[:, columns] = np.maximum(held, wanted)
-        return wider
+            self.changed = True
+
+    def widen_for_intra(self, mask: Bool, row: Int32, position: int) -> None:
+        """Widen the ranges to hold the values of row (columns,) that are sent, in an I plane.
+
+        With options.clamp, P planes get room to catch up with a value that no I plane can carry; without,
+        RangeError for it. position: the frame that the error names.
+        """
+        coded, levels = self._levels(mask, row)
+        beyond = ~self._fit(levels)
+        if beyond.any():
+            slot = int(coded[beyond][0])
+            if not self._options.clamp:
+                raise does_not_fit(slot, int(row[slot]), position, self._options)
+            self.widen_to_catch_up(coded[beyond], levels[beyond])
+        zeros = np.zeros_like(levels)
+        self.widen(coded, np.stack([levels, -levels, zeros, zeros]))
 
     def widen_to_catch_up(self, slots_: Int64, levels: Int64) -> None:
         """Widen the ranges of P planes, which catch up after an I plane could not carry these levels."""
         columns = slots_ - self._first
         missing = np.maximum(self._codes(np.abs(levels)) - RANGE_CODE_MAX, 0) + 1
         self.codes[2:, columns] = np.minimum(self.codes[2:, columns] + missing, RANGE_CODE_MAX)
+        self.changed = True
 
     def is_widest(self, slot: int) -> bool:
         """Whether differences of a slot have the widest range there is."""
         return bool((self.codes[2:, slot - self._first] == RANGE_CODE_MAX).all())
 
-    def fits(self, levels: Int64) -> Bool:
-        """Return bool (K,): whether the widest range can hold each level."""
-        fitting: Bool = self._codes(np.abs(levels)) <= RANGE_CODE_MAX
-        return fitting
+    def can_carry(self, mask: Bool, row: Int32) -> bool:
+        """Whether an I plane with the widest ranges can carry the values of row (columns,) that are sent."""
+        return bool(self._fit(self._levels(mask, row)[1]).all())
 
     def lists(self) -> RangeLists:
         """Return a copy of all four lists."""
         copies: list[UInt8] = [row.copy() for row in self.codes]
         return RangeLists(*copies)
+
+    def _levels(self, mask: Bool, row: Int32) -> tuple[Int64, Int64]:
+        """Return slots (K,) and levels (K,) of what an I plane sends, but the viseme and expression."""
+        face = self._part == slots.FACE_BIT
+        coded = np.flatnonzero(mask[2:]) + slots.FAPS.start if face else np.flatnonzero(mask) + self._first
+        return coded, quantiser.levels(row[coded], self._step[coded - (0 if face else self._first)])
+
+    def _fit(self, levels: Int64) -> Bool:
+        """Return bool (K,): whether the widest range holds each level."""
+        fitting: Bool = self._codes(np.abs(levels)) <= RANGE_CODE_MAX
+        return fitting
 
     def _codes(self, levels: Int64) -> Int64:
         """Return the smallest codes whose limits, 60 x code / scale rounded down, reach levels from 0 up."""
@@ -83,16 +109,15 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
     for part, track in ((slots.FACE_BIT, animation.face), (slots.BODY_BIT, animation.body)):
         if track is None:
             continue
-        ranges = Ranges(part, options.quant(part))
         step = quantiser.steps(part, options.quant(part), options.bap_steps)
-        skipped = 2 if part == slots.FACE_BIT else 0  # the viseme and expression have fixed ranges
+        # The viseme and expression, the first two columns of a face, have fixed ranges.
+        skipped, first = 2 * (part == slots.FACE_BIT), slots.BAPS.start
         if part == slots.FACE_BIT:
-            step = step[slots.FAPS]
-        extremes = np.zeros((4, track.values.shape[1] - skipped), dtype=np.int64)
+            step, first = step[slots.FAPS], slots.FAPS.start
+        extremes = np.zeros((4, len(step)), dtype=np.int64)
         _extremes(track.values[:, skipped:], track.mask[:, skipped:], step, extremes)
-        first = slots.FAPS.start if part == slots.FACE_BIT else slots.BAPS.start
-        ranges.widen(np.arange(extremes.shape[1]) + first, extremes)
-        result[part] = ranges
+        result[part] = Ranges(part, options)
+        result[part].widen(np.arange(len(step)) + first, extremes)
     return result
 
 
@@ -126,15 +151,16 @@ CLAMP = Remedy("clamp", "or bring what does not fit as near as can be with {}", 
 
 def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) -> RangeError:
     """Return the error for a value that no range can carry, with frame, parameter, limits and a remedy."""
-    part = slots.FACE_BIT if slot < slots.FAPS.stop else slots.BODY_BIT
-    column = slot if part == slots.FACE_BIT else slot - slots.BAPS.start
+    part = slots.part_of(slot)
     name = "fap_quant" if part == slots.FACE_BIT else "bap_quant"
     tables = BAP_STEP_TABLES if part == slots.BODY_BIT else (options.bap_steps,)
     fitting = {
-        table: next((q for q in range(QUANT_MAX + 1) if _largest(part, column, q, table) >= abs(value)), None)
+        table: next(
+            (q for q in range(QUANT_MAX + 1) if quantiser.largest(part, slot, q, table) >= abs(value)), None
+        )
         for table in tables
     }
-    largest = _largest(part, column, options.quant(part), options.bap_steps)
+    largest = quantiser.largest(part, slot, options.quant(part), options.bap_steps)
     here = fitting[options.bap_steps]
     others = [
         f"bap_steps {table} with {name} {q}"
@@ -155,21 +181,3 @@ def does_not_fit(slot: int, value: int, position: int, options: EncoderOptions) 
         limits=(-largest, largest),
         frame=position,
     ).with_remedies(CLAMP)
-
-
-def _largest(part: int, column: int, quant: int, table: str) -> int:
-    """Return the largest value that an I plane can carry in a column with this quantiser."""
-    step = int(quantiser.steps(part, quant, table)[column])
-    limit = RANGE_CODE_MAX * RANGE_UNIT // quantiser.scale(part, quant)
-    return limit * step + (step - 1) // 2
-
-
-def clip_amounts(rows: Int32) -> list[tuple[int, int, int]]:
-    """Limit blends and intensities to 0..63, in place: a coarse quantiser makes a decoder round beyond that.
-
-    Returns row, slot and value of those that no quantiser explains, in order.
-    """
-    amounts = rows[:, slots.AMOUNTS]
-    wrong = np.argwhere((amounts < 0) | (amounts > _ROUNDED_AMOUNT_MAX)).tolist()
-    rows[:, slots.AMOUNTS] = np.clip(amounts, 0, INTENSITY_MAX)
-    return [(row, slots.AMOUNTS[column], int(amounts[row, column])) for row, column in wrong]

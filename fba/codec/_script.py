@@ -20,7 +20,7 @@ def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_
     `face_frame` and `body_frame` of a plane are the frame numbers that it codes, as in `animation.index`. Its
     masks override those of the animation: values that were not sent there are coded as 0.
 
-    Raises RangeError if a value does not fit the ranges in force or a frame is gap, ValueError if the
+    Raises RangeError if a value does not fit the ranges in force or a frame is missing, ValueError if the
     first plane is no I plane or a plane codes a part that has no settings yet.
     """
     if not planes:
@@ -40,12 +40,12 @@ def encode_planes(animation: Animation, planes: Sequence[PlaneSettings], *, bap_
                 count = _run_length(planes, position)
                 skips = np.array([one.skip for one in planes[position : position + count]], dtype=np.int64)
                 for part in (slots.FACE_BIT, slots.BODY_BIT):
-                    if _object_mask(settings) & part and writer.mask_in_force(part) is None:
+                    if _object_mask(settings) & part and writer.settings_in_force(part) is None:
                         raise ValueError(
                             f"encode_planes: plane {position} is a P plane before the first I plane"
                         )
-                chosen = rows[position : position + count]
-                writer.predicted(_object_mask(settings), chosen, skips, start_code=settings.start_code)
+                coding = rows[position : position + count]
+                writer.predicted(_object_mask(settings), coding, skips, start_code=settings.start_code)
         except DoesNotFitError as error:
             plane = position + error.position
             value = int(rows[plane, error.slot])
@@ -70,32 +70,30 @@ def _rows(animation: Animation, planes: Sequence[PlaneSettings]) -> Int32:
         track = animation.face
         if track is None:
             raise RangeError("the planes to be coded carry FAPs, but the animation has no face track")
-        chosen, positions = _frames(animation, [p.face_frame if p.face is not None else None for p in planes])
-        source = np.zeros((len(animation), slots.row_width(body=False)), dtype=np.int32)
-        slots.face_rows(track, source)
-        rows[chosen, : slots.FLAGS.stop] = source[positions]
+        coding, positions = _frames(animation, [p.face_frame if p.face is not None else None for p in planes])
+        rows[coding, : slots.FLAGS.stop] = slots.track_rows(track, None)[positions]
     if any(one.body is not None for one in planes):
         if animation.body is None:
             raise RangeError("the planes to be coded carry BAPs, but the animation has no body track")
-        chosen, positions = _frames(animation, [p.body_frame if p.body is not None else None for p in planes])
-        rows[chosen, slots.BAPS] = animation.body.values[positions]
+        coding, positions = _frames(animation, [p.body_frame if p.body is not None else None for p in planes])
+        rows[coding, slots.BAPS] = animation.body.values[positions]
     return rows
 
 
 def _frames(animation: Animation, numbers: Sequence[int | None]) -> tuple[Intp, Intp]:
     """Return the planes that code a frame, and the positions of these frames in the animation."""
-    chosen = np.array([i for i, number in enumerate(numbers) if number is not None], dtype=np.intp)
+    coding = np.array([i for i, number in enumerate(numbers) if number is not None], dtype=np.intp)
     wanted = np.array([number for number in numbers if number is not None], dtype=np.int64)
     positions = np.searchsorted(animation.index, wanted)
     exists = animation.index[np.minimum(positions, len(animation) - 1)] == wanted
     if not exists.all():
         gap = int(np.argmin(exists))
         raise RangeError(
-            f"plane {chosen[gap]} codes frame {wanted[gap]}, but the animation has no frame of that number "
+            f"plane {coding[gap]} codes frame {wanted[gap]}, but the animation has no frame of that number "
             f"(it has {animation.index[0]}..{animation.index[-1]})",
             frame=int(wanted[gap]),
         )
-    return chosen, positions
+    return coding, positions
 
 
 def _object_mask(settings: PlaneSettings) -> int:

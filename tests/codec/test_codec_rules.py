@@ -11,10 +11,11 @@ import fba
 from fba import Animation, FaceTrack
 from fba.codec import EncoderOptions, FrameRate, TimeCode
 from fba.codec._clock import StreamClock
-from fba.codec._headers import mask_types, time_code
+from fba.codec._headers import time_code
 from fba.codec._plane import slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._ranges import Ranges
+from fba.codec._runs import mask_types
 from fba.codec._time_base import TimeBase
 from fba.errors import RangeError
 
@@ -172,7 +173,7 @@ def test_a_range_that_was_widened_stays_wide() -> None:
 
 
 def test_differences_get_one_step_more_than_a_clamped_value_lacks() -> None:
-    ranges = Ranges(slots.FACE_BIT, 1)
+    ranges = Ranges(slots.FACE_BIT, EncoderOptions())
     column = np.array([slots.FAPS.start])
     ranges.widen_to_catch_up(column, np.array([1861]))  # 1 beyond 31 x 60, in the next step
     assert ranges.codes[2:, 2].tolist() == [2, 2]

@@ -6,13 +6,17 @@ import numpy as np
 
 from fba.arrays import Int64, Integer
 from fba.codec._plane import slots
-from fba.parameters import bap_steps, fap_steps
+from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT
+from fba.parameters import INTENSITY_MAX, bap_steps, fap_steps
 
 BAP_PREDICTIVE_SCALE = (
     0, 1, 2, 3, 5, 7, 9, 11, 14, 17, 20, 23, 27, 31, 35, 39, 43, 47, 52, 57, 62, 67, 72, 77, 82, 88, 94, 100,
     106, 113, 120, 127,
 )  # fmt: skip
 """bap_pred_scale by bap_quant; 0: not quantised."""
+
+ROUNDED_AMOUNT_MAX = max((INTENSITY_MAX + quant // 2) // quant * quant for quant in range(1, QUANT_MAX + 1))
+"""Largest blend or intensity that a decoder returns for any quantiser: 75, with fap_quant 25."""
 
 
 def scale(part: int, quant: int) -> int:
@@ -38,3 +42,10 @@ def levels(values: Integer, step: Int64) -> Int64:
     size, half = np.abs(values.astype(np.int64)), step // 2
     quantised: Int64 = np.sign(values) * np.where(size <= half, 0, (size + half) // step)
     return quantised
+
+
+def largest(part: int, slot: int, quant: int, bap_table: str) -> int:
+    """Return the largest value that an I plane can carry in a slot with this quantiser."""
+    step = int(steps(part, quant, bap_table)[slot if part == slots.FACE_BIT else slot - slots.BAPS.start])
+    limit = RANGE_CODE_MAX * RANGE_UNIT // scale(part, quant)
+    return limit * step + (step - 1) // 2

@@ -51,6 +51,11 @@ def body_order() -> Int64:
     return np.array([bap_slot(number) for group in bap_groups() for number in group], dtype=np.int64)
 
 
+def part_of(slot: int) -> int:
+    """Return the bit of fba_object_mask for the part that a slot belongs to."""
+    return FACE_BIT if slot < FLAGS.stop else BODY_BIT
+
+
 def label(slot: int) -> str:
     """Return the standard's name of what a slot carries."""
     if slot < VISEME.stop:
@@ -88,18 +93,19 @@ def coding_order(face_mask: Bool | None, body_mask: Bool | None) -> tuple[Int64,
     return np.array(order, dtype=np.int64), np.array(segments, dtype=np.int64).reshape(-1, 3)
 
 
-def face_rows(track: FaceTrack, rows: Int32) -> None:
-    """Write a face track into rows (T, columns)."""
-    rows[:, VISEME] = track.viseme[:, :3]
-    rows[:, VISEME_DEF] = track.viseme[:, 3]
-    rows[:, EXPRESSION] = track.expression[:, :4]
-    rows[:, INIT_FACE : FLAGS.stop] = track.expression[:, 4:]
-    rows[:, FAPS] = track.values[:, 2:]
-
-
-def body_rows(track: BodyTrack, rows: Int32) -> None:
-    """Write a body track into rows (T, columns)."""
-    rows[:, BAPS] = track.values
+def track_rows(face: FaceTrack | None, body: BodyTrack | None) -> Int32:
+    """Return the values of tracks of T frames as rows, int32 (T, columns), 0 for a part without a track."""
+    count = len(face if face is not None else body or ())
+    result = np.zeros((count, row_width(body=body is not None)), dtype=np.int32)
+    if face is not None:
+        result[:, VISEME] = face.viseme[:, :3]
+        result[:, VISEME_DEF] = face.viseme[:, 3]
+        result[:, EXPRESSION] = face.expression[:, :4]
+        result[:, INIT_FACE : FLAGS.stop] = face.expression[:, 4:]
+        result[:, FAPS] = face.values[:, 2:]
+    if body is not None:
+        result[:, BAPS] = body.values
+    return result
 
 
 def face_track(rows: Int32, mask: Bool, interpolated: Bool | None) -> FaceTrack:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fba.arrays import Bool, Int32, Int64
+from fba.arrays import Int32, Int64
 from fba.codec._plane import loops, quantiser, slots, syntax
 from fba.codec._plane.arithmetic import OUT_OF_DATA
 from fba.codec._plane.bits import BitWriter
@@ -60,15 +60,9 @@ class PlaneWriter:
         self._writer.align()
         self._write_start_code(syntax.END_CODE)
 
-    def mask_in_force(self, part: int) -> Bool | None:
-        """Return the mask of the last I plane with this part, or None."""
-        settings = self._settings.get(part)
-        return settings.mask if settings is not None else None
-
-    def types_in_force(self, part: int) -> tuple[int, ...] | None:
-        """Return the mask types of the last I plane with this part, or None."""
-        settings = self._settings.get(part)
-        return settings.mask_types if settings is not None else None
+    def settings_in_force(self, part: int) -> PartSettings | None:
+        """Return the settings of the last I plane with this part, or None."""
+        return self._settings.get(part)
 
     def nearest(self, slot: int, level: int) -> int:
         """Return the value closest to a difference of this level that a P plane can carry in a slot."""
