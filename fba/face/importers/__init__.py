@@ -25,40 +25,42 @@ def import_model(
 ) -> FaceModel:
     """A face model from a file that knows nothing of FAPs, with tables for all FAPs that it can serve.
 
-    path: a file, or MakeHuman's folder. kind: one of `KINDS`, found from the content where None.
+    path: a file, or MakeHuman's folder. kind: one of `KINDS`, by default recognised.
     points: the feature points, as the path of a CSV, JSON or FDP file, an array (84, 3) in the file's
-    unit with NaN where unknown, or a mapping from names to a position or a vertex number; without them
-    a file of the mesh's name beside it (.points.csv, .points.json, .fdp) is looked for, and on a glTF
-    head with ARKit's shapes they are found. unit: metres per unit, else judged by the distance of the
-    pupils. up: the file's vertical axis, "y" or "z". kinds: kind of part (or "none", left out) by the
-    name of a group, object, mesh or material, where the names do not tell. name: of the model.
+    unit with NaN where unknown, or a mapping from names to a position or a vertex number; by default they
+    are read from a file of the mesh's name beside it (.points.csv, .points.json, .fdp), or located by the
+    shapes of a glTF head. unit: metres per unit, by default judged by the distance of the pupils. up: the
+    file's vertical axis, "y" or "z". kinds: kind of part ("none" to leave it out) by the name of a group,
+    object, mesh or material, where that name does not say. name: of the model.
 
     Raises ModelError for a file that is damaged, unknown (it lists what is read) or lacks what a face
     needs; OptionError for options that do not fit. FAPs that cannot be served are in `lost`.
     """
-    chosen = sniff(path) if kind is None else kind
-    if chosen not in KINDS:
+    form = sniff(path) if kind is None else kind
+    if form not in KINDS:
         raise OptionError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
-    named = name or Path(path).stem or "face"
-    if chosen == "makehuman":
+    if form == "makehuman":
         from fba.face.importers.makehuman.makehuman import import_makehuman
 
         _refuse_options(
             "MakeHuman's base mesh", points=points, unit=unit, kinds=kinds, up=None if up == "y" else up
         )
         return import_makehuman(path, name=name or "MakeHuman")
-    if chosen == "fdp":
+    from fba.face.importers.assembly.model import ImportOptions
+
+    options = ImportOptions(path, name or Path(path).stem or "face", unit, up, kinds)
+    if form == "fdp":
         from fba.face.importers._fdp import import_fdp
 
         _refuse_options("an FDP file", points=points)
-        return import_fdp(path, unit=unit, up=up, kinds=kinds, name=named)
-    if chosen == "gltf":
+        return import_fdp(options)
+    if form == "gltf":
         from fba.face.importers._gltf import import_gltf
 
-        return import_gltf(path, points=points, unit=unit, up=up, kinds=kinds, name=named)
+        return import_gltf(options, points)
     from fba.face.importers.mesh import import_mesh
 
-    return import_mesh(path, chosen, points=points, unit=unit, up=up, kinds=kinds, name=named)
+    return import_mesh(options, form, points)
 
 
 def _refuse_options(what: str, **options: object) -> None:

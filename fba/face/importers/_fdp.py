@@ -1,19 +1,18 @@
-"""FDP files as faces: with the mesh that lies beside them."""
+"""Imports FDP files with the mesh that lies beside them."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fba.errors import ModelError
-from fba.face.feature_points import names, row_of
-from fba.face.importers.assembly.model import finish_import
+from fba.face.feature_points import row_of
+from fba.face.importers.assembly.model import ImportOptions, finish_import
 from fba.face.importers.assembly.pieces import Piece
 from fba.face.importers.assembly.polygon_parts import make_part
-from fba.face.importers.mesh import READERS, import_mesh
+from fba.face.importers.mesh import import_mesh
 from fba.face.importers.points.fdp import load_fdp
 from fba.face.importers.points.fdp_data import Fdp
 from fba.face.importers.points.points_file import GivenPoints
@@ -29,62 +28,55 @@ BINDS = {
     "Tongue": "tongue",
     "Hair": "hair",
 }
-"""Xface's words for what a submesh is -> kinds of parts."""
+"""Kinds of parts by Xface's words for what a submesh is."""
 
 
-def import_fdp(
-    path: str | os.PathLike[str],
-    *,
-    unit: float | None = None,
-    up: str = "y",
-    kinds: Mapping[str, str] | None = None,
-    name: str | None = None,
-) -> FaceModel:
+def import_fdp(options: ImportOptions) -> FaceModel:
     """A face from an FDP file and its mesh: a .wfm, .obj or .ply of the same name, or Xface's .wrl files.
 
     Raises ModelError where the mesh is missing.
     """
-    fdp = load_fdp(path)
+    fdp = load_fdp(options.path)
     if fdp.format == "xface":
-        return _xface(fdp, unit=unit, up=up, kinds=kinds, name=name)
-    place = Path(path)
+        return _import_xface(fdp, options)
+    path = Path(options.path)
     for form in ("wfm", "obj", "ply"):
-        mesh = place.with_suffix(f".{form}")
-        if form in READERS and mesh.is_file():
+        mesh = path.with_suffix(f".{form}")
+        if mesh.is_file():
             given = GivenPoints(fdp.points, {point: vertex for point, (_, vertex) in fdp.vertices.items()})
-            return import_mesh(mesh, form, points=given, unit=unit, up=up, kinds=kinds, name=name)
+            return import_mesh(replace(options, path=mesh), form, given)
     raise ModelError(
-        f"{place}: an FDP file says where feature points are, but brings no mesh; put {place.stem}.wfm, .obj "
-        "or .ply beside it, or fit a head that is there to its points: fba model fit"
+        f"{path}: an FDP file says where feature points are, but brings no mesh; put {path.stem}.wfm, .obj "
+        "or .ply beside it, or fit an existing head to its points: fba model fit"
     )
 
 
-def _xface(
-    fdp: Fdp, *, unit: float | None, up: str, kinds: Mapping[str, str] | None, name: str | None
-) -> FaceModel:
-    """The neutral mesh of an Xface face. Its regions and weights are for the eye, not to the standard's
-    measure (a point follows its FAP by a tenth to a third), so tables are made anew."""
+def _import_xface(fdp: Fdp, options: ImportOptions) -> FaceModel:
+    """The neutral mesh of an Xface face, with new tables.
+
+    The file's own regions and weights do not follow the standard: a point moves by a tenth to a third of what
+    its FAP says.
+    """
     points = xface_points(fdp)
     neutral = [mesh for mesh in fdp.meshes if mesh.alias == NEUTRAL]
     if not neutral:
         raise ModelError(f"{fdp.path}: no mesh is called {NEUTRAL!r}, the neutral face")
     file = Path(fdp.path).parent / Path(neutral[0].file).name
-    bind = dict(neutral[0].bind)
-    pieces, chosen = [], dict(kinds or {})
+    bind = neutral[0].bind
+    pieces, kinds = [], dict(options.kinds or {})
     numbers: dict[str, int] = {}
     start = 0
-    for place, shape in enumerate(read_vrml(file)):
-        label = f"{file.name}_{place}"
+    for number, shape in enumerate(read_vrml(file)):
+        label = f"{file.name}_{number}"
         if len(shape):
             source = make_part(shape, np.ones(len(shape), dtype=np.bool_), label, "other")
             pieces.append(Piece(source.part, "", source.origin + np.int32(start)))
-            chosen.setdefault(label, BINDS.get(bind.get(label, ""), "skin"))
+            kinds.setdefault(label, BINDS.get(bind.get(label, ""), "skin"))
         for point, (submesh, vertex) in fdp.vertices.items():
             if submesh == label:
                 numbers[point] = start + vertex
         start += len(shape.vertices)
-    known = [n for n, p in zip(names(), points, strict=True) if np.isfinite(p).all()]
-    numbers = {point: number for point, number in numbers.items() if point in known and point in row_of()}
-    return finish_import(
-        pieces, points, numbers, path=file, unit=unit, up=up, kinds=chosen, name=name or Path(fdp.path).stem
-    )
+    numbers = {
+        point: vertex for point, vertex in numbers.items() if np.isfinite(points[row_of()[point]]).all()
+    }
+    return finish_import(pieces, points, numbers, replace(options, path=file, kinds=kinds))

@@ -14,7 +14,7 @@ from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
 from fba.face.importers.makehuman._targets import expression_shapes, read_target, shape_of
-from fba.face.importers.makehuman.makehuman import makehuman_parts, read_makehuman
+from fba.face.importers.makehuman.makehuman import read_makehuman
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 
@@ -108,12 +108,12 @@ def test_faps_by_the_standard(
 
 def test_the_file_itself_and_a_folder_without_fitted_eyes(folder: Path, tmp_path: Path) -> None:
     shutil.copy(folder / "base.obj", tmp_path / "base.obj")
-    parts, points, bound = makehuman_parts(tmp_path / "base.obj")
-    eye = next(part for part in parts if part.name == "left eye")
+    head = read_makehuman(tmp_path / "base.obj")
+    eye = next(part for part in head.parts if part.name == "left eye")
     assert eye.material.texture is None
     assert len(np.unique(eye.vertices, axis=0)) == 72  # vertices 14598 to 14669 of the base mesh
-    assert bound[row_of()["3.5"]] >= 0
-    assert np.isfinite(points).all()
+    assert head.bound[row_of()["3.5"]] >= 0
+    assert np.isfinite(head.points).all()
     with pytest.raises(OptionError, match="brings its own"):
         import_model(tmp_path, points={"9.3": 1})
 
@@ -142,7 +142,7 @@ def test_broken_fitted_eyes_are_named(folder: Path, tmp_path: Path) -> None:
         assert old in text
         (tmp_path / "high-poly.mhclo").write_text(text.replace(old, new, 1))
         with pytest.raises(ModelError, match=words):
-            makehuman_parts(tmp_path)
+            read_makehuman(tmp_path)
 
 
 def test_targets_move_the_head(folder: Path, tmp_path: Path) -> None:

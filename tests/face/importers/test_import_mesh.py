@@ -11,8 +11,8 @@ from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face.deform.deformer import Deformer
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
-from fba.face.importers.assembly._kinds import kind_of
 from fba.face.importers.assembly.model import metres_per_unit
+from fba.face.importers.assembly.pieces import guess_kind
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers
 from mesh_files import ply, write_obj, write_points
@@ -206,7 +206,7 @@ def test_kinds_can_be_given(head: FaceModel, tmp_path: Path) -> None:
     ],
 )
 def test_kinds_by_name(names: tuple[str, ...], kind: str | None) -> None:
-    assert kind_of(*names) == kind
+    assert guess_kind(*names) == kind
 
 
 @pytest.mark.parametrize(

@@ -14,63 +14,66 @@ STEPS = 400
 """Number of heights at which the profile is sampled."""
 
 
-def profile_points(skin: Part, found: Mapping[str, Float64]) -> dict[str, Float64]:
+def profile_points(skin: Part, located: Mapping[str, Float64]) -> dict[str, Float64]:
     """9.3, 9.15, 8.1, 8.2, 2.10 and 2.1 on the profile of a skin, and 11.4, 11.6, 10.3, 10.4 of the head.
 
-    found: at least the pupils (3.5, 3.6) and the lips (2.2, 2.3). Only those that show clearly are given.
+    located: at least the pupils (3.5, 3.6) and the lips (2.2, 2.3). Points that do not show clearly are
+    left out.
     """
-    pupils = (found["3.5"] + found["3.6"]) / 2
-    apart = float(found["3.5"][0] - found["3.6"][0])
-    tall = float(pupils[1] - found["2.2"][1])
+    pupils = (located["3.5"] + located["3.6"]) / 2
+    apart = float(located["3.5"][0] - located["3.6"][0])
+    tall = float(pupils[1] - located["2.2"][1])
     result = _head(skin.vertices.astype(np.float64), pupils, apart)
-    heights = np.linspace(found["2.3"][1] - 1.2 * tall, pupils[1], STEPS)
+    heights = np.linspace(located["2.3"][1] - 1.2 * tall, pupils[1], STEPS)
     front = _front(skin, float(pupils[0]), heights)
     if not np.isfinite(front).any():
         return result
 
-    def place(index: int) -> Float64:
+    def point(index: int) -> Float64:
         return np.array([pupils[0], heights[index], front[index]])
 
     def foremost(low: float, high: float) -> int | None:
         inside = (heights > low) & (heights < high) & np.isfinite(front)
         return int(np.where(inside, front, -np.inf).argmax()) if inside.any() else None
 
-    lip, tip = found["2.2"], foremost(found["2.2"][1] + 0.2 * tall, pupils[1] - 0.2 * tall)
+    lip, tip = located["2.2"], foremost(located["2.2"][1] + 0.2 * tall, pupils[1] - 0.2 * tall)
     if tip is None:
         return result
-    result["9.3"] = place(tip)
+    result["9.3"] = point(tip)
     upper = foremost(lip[1], float(lip[1] + 0.5 * (heights[tip] - lip[1])))
     if upper is not None:
-        # the nose ends where the profile stands furthest behind the line from its tip to the lip
+        # the nose ends where the profile is furthest behind the line from its tip to the lip
         along = (heights - heights[upper]) / (heights[tip] - heights[upper])
         behind = front[upper] + along * (front[tip] - front[upper]) - front
         between = (np.arange(STEPS) > upper) & (np.arange(STEPS) < tip) & np.isfinite(front)
         if between.any():
-            result["8.1"] = place(upper)
-            result["9.15"] = place(int(np.where(between, behind, -np.inf).argmax()))
-    chin = _hill(front, (heights > found["2.3"][1] - 0.8 * tall) & (heights < found["2.3"][1] - 0.2 * tall))
+            result["8.1"] = point(upper)
+            result["9.15"] = point(int(np.where(between, behind, -np.inf).argmax()))
+    chin = _hill(
+        front, (heights > located["2.3"][1] - 0.8 * tall) & (heights < located["2.3"][1] - 0.2 * tall)
+    )
     if chin is None:
         return result
-    result["2.10"] = place(chin)
-    dent = (heights > heights[chin]) & (heights < found["2.3"][1] - 0.02 * tall) & np.isfinite(front)
+    result["2.10"] = point(chin)
+    dent = (heights > heights[chin]) & (heights < located["2.3"][1] - 0.02 * tall) & np.isfinite(front)
     if dent.any():
-        # the lower lip ends on the way from its foremost to the dent above the chin
+        # the lower lip ends between its foremost point and the dent above the chin
         low = int(np.where(dent, front, np.inf).argmin())
-        lower = foremost(float(heights[low]), float(found["2.3"][1]))
+        lower = foremost(float(heights[low]), float(located["2.3"][1]))
         if lower is not None:
-            result["8.2"] = place((low + 3 * lower) // 4)
+            result["8.2"] = point((low + 3 * lower) // 4)
     below = np.flatnonzero(
         np.isfinite(front) & (heights < heights[chin]) & (front > front[chin] - 0.3 * apart)
     )
     if len(below):
-        result["2.1"] = place(int(below[0]))
+        result["2.1"] = point(int(below[0]))
     return result
 
 
 def _front(skin: Part, x: float, heights: Float64) -> Float64:
     """For each height the foremost z where the skin cuts the plane at x; NaN where it does not."""
     vertices = skin.vertices.astype(np.float64)
-    # a plane through vertices cuts twice or not at all; beside them it is clean
+    # a plane through vertices cuts twice or not at all; one beside them cuts once
     beside = x + 1e-5 * float(np.ptp(vertices[:, 0]))
     corners = vertices[skin.triangles]
     side = corners[:, :, 0] > beside

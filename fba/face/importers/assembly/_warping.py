@@ -1,4 +1,4 @@
-"""Warps the adult head's feature points to those that were found on another head."""
+"""Warps the adult head's feature points to those located on another head."""
 
 from __future__ import annotations
 
@@ -8,36 +8,35 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
-from fba.face.importers.assembly.pieces import Piece
+from fba.face.importers.assembly.pieces import FREE, Piece
 
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
+"""Parts that points of the teeth stand on."""
 LOCAL = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")
 """Points that are not used for the warp."""
-FREE = ("7.1", "11.5")
-"""Points that stand on no surface."""
 SMOOTHING = 0.1
 """Smoothing of the warp: points that coincide on the adult head may be apart on another."""
 
 
-def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float64:
-    """(84, 3) the adult head's points, warped to those found and moved onto parts of their kind."""
+def warp_points(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> Float64:
+    """(84, 3) the adult head's points, warped to those located and moved onto parts of their kind."""
     from scipy.interpolate import RBFInterpolator
     from scipy.spatial import cKDTree
 
     from fba.face.authoring.surface.binding import kinds_for_point
 
     row, adult = row_of(), neutral_points()
-    known = dict(found)
+    known = dict(located)
     middle = (known["3.5"] + known["3.6"])[0] / 2
     for left, right in MIRRORED.items():
         if (left in known) != (right in known):
-            have, lack = (left, right) if left in known else (right, left)
-            known[lack] = known[have] * (-1, 1, 1) + (2 * middle, 0, 0)
-    # pupils may lie behind the lids or before them; they do not determine the skin
-    held = [name for name in known if name not in LOCAL]
+            present, absent = (left, right) if left in known else (right, left)
+            known[absent] = known[present] * (-1, 1, 1) + (2 * middle, 0, 0)
+    # pupils may lie behind the lids or in front of them; they do not determine the skin
+    used = [name for name in known if name not in LOCAL]
     scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
-    source = np.array([adult[row[name]] for name in held])
-    target = np.array([known[name] for name in held]) / scale
+    source = np.array([adult[row[name]] for name in used])
+    target = np.array([known[name] for name in used]) / scale
     warp = RBFInterpolator(source, target, kernel="linear", degree=1, smoothing=SMOOTHING)
     points: Float64 = warp(adult) * scale
     centre = points[[row["3.5"], row["3.6"], row["7.1"]]].mean(axis=0)
@@ -47,17 +46,17 @@ def warp_points(pieces: Sequence[Piece], found: Mapping[str, Float64]) -> Float6
             points[row[name]] = known[name]
         if name in FREE:
             continue
-        # found points are vertices, or lie on the profile between some
-        pool = (*kinds_for_point(name), ROWS.get(name, ""), str(name in known))
-        if pool not in trees:
-            fit = [piece for piece in pieces if piece.part.kind in kinds_for_point(name)]
-            fit = [piece for piece in fit if piece.part.name == ROWS.get(name, piece.part.name)]
-            chosen = [
+        # located points are vertices, or lie on the profile between some
+        key = (*kinds_for_point(name), ROWS.get(name, ""), str(name in known))
+        if key not in trees:
+            candidates = [
                 piece.part.vertices.astype(np.float64) if name in known else _outside(piece, centre)
-                for piece in fit
+                for piece in pieces
+                if piece.part.kind in kinds_for_point(name)
+                and piece.part.name == ROWS.get(name, piece.part.name)
             ]
-            trees[pool] = cKDTree(np.concatenate(chosen)) if chosen else None
-        tree = trees[pool]
+            trees[key] = cKDTree(np.concatenate(candidates)) if candidates else None
+        tree = trees[key]
         points[row[name]] = np.nan if tree is None else tree.data[tree.query(points[row[name]])[1]]
     return points
 

@@ -18,25 +18,25 @@ def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece],
     inside out the other pieces are taken to be so too.
     """
     result: list[Piece] = []
-    turned, over = 0, False
+    count, all_inside_out = 0, False
     for piece in pieces:
         if piece.part.kind == "skin":
             wrong = _opposing(piece.part.triangles)
             triangles = _flip(piece.part.triangles, wrong)
             vertices = piece.part.vertices.astype(np.float64)
             inside_out = float(_facing(vertices, triangles, centre).sum()) < 0
-            over |= inside_out
+            all_inside_out |= inside_out
             wrong = ~wrong if inside_out else wrong
-            turned += int(wrong.sum())
+            count += int(wrong.sum())
             result.append(_turn_triangles(piece, wrong) if wrong.any() else piece)
         else:
             result.append(piece)
-    if over:
+    if all_inside_out:
         for number, piece in enumerate(result):
             if piece.part.kind != "skin":
                 result[number] = _turn_triangles(piece, np.ones(len(piece.part.triangles), dtype=np.bool_))
-                turned += len(piece.part.triangles)
-    return result, turned
+                count += len(piece.part.triangles)
+    return result, count
 
 
 def _turn_triangles(piece: Piece, wrong: Bool) -> Piece:
@@ -50,12 +50,13 @@ def _flip(triangles: Int32, wrong: Bool) -> Int32:
 
 
 def _facing(vertices: Float64, triangles: Int32, centre: Float64) -> Float64:
+    """(F,) positive for triangles that face away from a centre, in proportion to their areas."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), (a + b + c) / 3 - centre))
 
 
 def _opposing(triangles: Int32) -> Bool:
-    """bool (F,): triangles that must turn so that neighbours agree, the fewer of each connected lot."""
+    """bool (F,): triangles to turn so that neighbours agree, at most half of each connected piece."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -68,10 +69,10 @@ def _opposing(triangles: Int32) -> Bool:
     key, face, forward = key[order], face[order], forward[order]
     first = np.flatnonzero(key[1:] == key[:-1])
     # an edge of three or more triangles does not define sides
-    crowd = np.zeros(len(key) + 1, dtype=np.bool_)
+    crowded = np.zeros(len(key) + 1, dtype=np.bool_)
     triple = np.flatnonzero(key[2:] == key[:-2])
-    crowd[triple] = crowd[triple + 1] = True
-    first = first[~crowd[first]]
+    crowded[triple] = crowded[triple + 1] = True
+    first = first[~crowded[first]]
     if not len(first):
         return np.zeros(count, dtype=np.bool_)
     a, b = face[first], face[first + 1]
@@ -82,8 +83,8 @@ def _opposing(triangles: Int32) -> Bool:
     clashes = {(int(x), int(y)) for x, y in zip(a[clash], b[clash], strict=True)}
     total, label = connected_components(graph, directed=False)
     wrong = np.zeros(count, dtype=np.bool_)
-    for lot in np.unique(label[np.concatenate([a[clash], b[clash]])]) if total else ():
-        start = int(np.flatnonzero(label == lot)[0])
+    for piece in np.unique(label[np.concatenate([a[clash], b[clash]])]) if total else ():
+        start = int(np.flatnonzero(label == piece)[0])
         walk, before = breadth_first_order(graph, start, directed=False)
         for here in walk[1:]:
             there = int(before[here])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.eyeball import sphere
+from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.pieces import Piece
 from fba.face.model import Material, Part
@@ -37,7 +37,7 @@ def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Pi
     result = []
     for piece in pieces:
         part = piece.part
-        if part.material.texture is None and part.colours is None and _plain(part.material):
+        if part.material.texture is None and part.colours is None and _is_grey(part.material):
             material = LOOKS.get(part.kind, part.material)
             part = replace(part, material=material)
             if part.kind == "eye":
@@ -46,16 +46,16 @@ def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Pi
     return result
 
 
-def _plain(material: Material) -> bool:
+def _is_grey(material: Material) -> bool:
     return max(material.colour) - min(material.colour) < GREY and min(material.colour) > 0.5
 
 
 def _with_iris(part: Part, points: Float64) -> Part:
     """The eye with the standard's neutral iris: as wide as the lids are apart, its pupil a third of it."""
     side = "left" if "left" in part.name else "right"
-    pupil = points[row_of()["3.5" if side == "left" else "3.6"]]
-    lids = ("3.1", "3.3") if side == "left" else ("3.2", "3.4")
-    wide = float(points[row_of()[lids[0]], 1] - points[row_of()[lids[1]], 1])
+    pupil = points[row_of()[PUPIL_POINT[side]]]
+    upper, lower = (float(points[row_of()[name], 1]) for name in LID_POINTS[side])
+    wide = upper - lower
     ball = sphere(part)
     if ball is None or not np.isfinite(pupil).all() or not wide > 0:
         return part

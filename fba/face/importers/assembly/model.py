@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.default_materials import apply_default_materials
-from fba.face.importers.assembly.pieces import Piece, assemble, shift_pieces
+from fba.face.importers.assembly.pieces import FREE, Piece, assemble, shift_piece
 from fba.face.model import FaceModel
 
 PUPILS = 0.062
@@ -23,9 +23,19 @@ USUAL = (0.04, 0.08)
 """Limits of the distance between the pupils of a real head, metres."""
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
-"""Vertical axis of a file -> rotation to +x left, +y up, +z forward. z-up faces look to -y."""
-FREE = ("7.1", "11.5")
+"""Rotations to +x left, +y up, +z forward, by the vertical axis of a file; faces with z up look to -y."""
 EYES = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """What a user says about a file. path: of the file; the others as in `import_model`."""
+
+    path: str | os.PathLike[str]
+    name: str
+    unit: float | None = None
+    up: str = "y"
+    kinds: Mapping[str, str] | None = None
 
 
 def turn_upright(pieces: Sequence[Piece], points: Float64, up: str) -> tuple[list[Piece], Float64]:
@@ -49,39 +59,36 @@ def finish_import(
     pieces: Sequence[Piece],
     points: Float64,
     vertices: Mapping[str, int],
-    *,
-    path: str | os.PathLike[str],
-    unit: float | None = None,
-    up: str = "y",
-    kinds: Mapping[str, str] | None = None,
-    name: str | None = None,
+    options: ImportOptions,
     notes: Mapping[str, str] | None = None,
 ) -> FaceModel:
-    """A face from the pieces of a file and its feature points, both in the file's unit.
+    """A face from the pieces of a file and its feature points (84, 3), both in the file's unit.
 
     vertices: numbers of the vertices in the file that points stand on. The face is converted to
     metres, with its origin between the pupils. Pieces with shapes get tables measured from them.
     """
     if not pieces:
-        raise ModelError(f"{os.fspath(path)}: there are no triangles in it")
-    pieces, points = turn_upright(pieces, points, up)
-    size, how = metres_per_unit(points, unit)
+        raise ModelError(f"{os.fspath(options.path)}: there are no triangles in it")
+    pieces, points = turn_upright(pieces, points, options.up)
+    size, how = metres_per_unit(points, options.unit)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
     middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else 0.0
     origin = pupils.mean(axis=0) if np.isfinite(pupils).all() else np.zeros(3)
-    parts = [shift_pieces(piece, size, -origin * size) for piece in assemble(pieces, kinds, middle=middle)]
+    parts = [
+        shift_piece(piece, size, -origin * size) for piece in assemble(pieces, options.kinds, middle=middle)
+    ]
     # a point in the middle of the head, behind the pupils or the lids
     eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
-    parts, over = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
-    placed = (points - origin) * size
-    parts = apply_default_materials(parts, placed)
-    bound = bound_by_number(parts, vertices)
+    parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * pupil_distance(points) * size))
+    points = (points - origin) * size
+    parts = apply_default_materials(parts, points)
+    bound = bind_by_number(parts, vertices)
     everything = np.concatenate([piece.part.vertices for piece in parts]).astype(np.float64)
-    placed[bound >= 0] = everything[bound[bound >= 0]]
-    all_notes = {"source": Path(path).name, "unit": how, **(notes or {})}
-    if over:
-        all_notes["triangles"] = f"{over} turned to face outwards"
-    return author_pieces(parts, placed, bound, name=name or Path(path).stem, notes=all_notes)
+    points[bound >= 0] = everything[bound[bound >= 0]]
+    all_notes = {"source": Path(options.path).name, "unit": how, **(notes or {})}
+    if turned:
+        all_notes["triangles"] = f"{turned} turned to face outwards"
+    return author_pieces(parts, points, bound, name=options.name, notes=all_notes)
 
 
 def author_pieces(
@@ -89,8 +96,8 @@ def author_pieces(
 ) -> FaceModel:
     """The face of finished pieces, its tables made from their shapes if there are any, else from the mesh."""
     parts = tuple(piece.part for piece in pieces)
-    # with no vertex given, the nearest are sought, upper and lower lip told apart
-    held = bound if (bound >= 0).any() else None
+    # without any vertex, `author` binds points to the nearest, and separates upper and lower lip
+    known = bound if (bound >= 0).any() else None
     shapes = sorted({shape for piece in pieces for shape in piece.morphs})
     if shapes:
         from fba.face.authoring.shapes.morphs import from_morphs
@@ -99,22 +106,25 @@ def author_pieces(
             shape: {piece.part.name: piece.morphs[shape] for piece in pieces if shape in piece.morphs}
             for shape in shapes
         }
-        return from_morphs(parts, points, morphs, bound=held, name=name, notes=notes)
+        return from_morphs(parts, points, morphs, bound=known, name=name, notes=notes)
     from fba.face.authoring import author
 
-    return author(parts, points, bound=held, name=name, notes=notes)
+    return author(parts, points, bound=known, name=name, notes=notes)
 
 
-def bound_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:
-    """int32 (84,): vertices counted through the parts, by their numbers in the file; -1 for others."""
+def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:
+    """int32 (84,): vertex of each feature point counted through the pieces, -1 for those without one.
+
+    vertices: their numbers in the file, by point.
+    """
     bound = np.full(len(names()), -1, dtype=np.int32)
     first: dict[int, int] = {}
     start = 0
     for piece in pieces:
         if len(piece.origin):
             numbers, where = np.unique(piece.origin, return_index=True)
-            for number, place in zip(numbers.tolist(), where.tolist(), strict=True):
-                first.setdefault(number, start + place)
+            for number, vertex in zip(numbers.tolist(), where.tolist(), strict=True):
+                first.setdefault(number, start + vertex)
         start += len(piece.part.vertices)
     for name, vertex in vertices.items():
         if name not in FREE and vertex in first:
@@ -123,7 +133,7 @@ def bound_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int
 
 
 def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, str]:
-    """(metres per unit of the mesh, how that was found, in words).
+    """(metres per unit of the mesh, how that was found out, in words).
 
     points: (84, 3). unit: given by the user, used unchanged. Otherwise the unit with which the pupils
     (3.5, 3.6; without them the eyes) stand as far apart as on a real head; where none does, as with

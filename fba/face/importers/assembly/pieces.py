@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import csv
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Bool, Float32, Float64, Int32
-from fba.errors import ModelError
-from fba.face.importers.assembly._kinds import DROPPED, checked_kinds, kind_of
+from fba.errors import ModelError, OptionError
 from fba.face.importers.assembly.polygon_parts import vertex_components
-from fba.face.model import Part
+from fba.face.model import PART_KINDS, Part
 
+DROPPED = "none"
+"""Kind of parts that are left out: transparent shells in front of the eye, which would hide it."""
+FREE = ("7.1", "11.5")
+"""Feature points that stand on no surface."""
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
 EYE_SIZES = (0.02, 0.12)
@@ -41,15 +48,15 @@ def assemble(
     """Parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and lower.
 
     kinds: what the user says, by the name of a group, object, mesh or material. middle: the x of the
-    plane between left and right. Where no name tells, round shells in pairs are eyes and the largest
+    plane between left and right. Where names do not say, round shells in pairs are eyes and the largest
     piece is skin. Raises ModelError where nothing is left.
     """
-    chosen = checked_kinds(kinds)
+    given = check_kinds(kinds)
     guessed: list[tuple[Piece, str | None]] = []
     for piece in pieces:
-        kind = chosen.get(piece.part.name, chosen.get(piece.material))
+        kind = given.get(piece.part.name, given.get(piece.material))
         if kind is None:
-            kind = kind_of(piece.part.name, piece.material)
+            kind = guess_kind(piece.part.name, piece.material)
         if kind != DROPPED:
             guessed.append((piece, kind))
     if not guessed:
@@ -67,7 +74,7 @@ def assemble(
     return _join_by_kind([(p, kind or "other") for p, kind in guessed], middle)
 
 
-def shift_pieces(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
+def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
     """The piece scaled, then shifted."""
     vertices = piece.part.vertices.astype(np.float64) * scale + np.asarray(shift)
     part = replace(piece.part, vertices=vertices.astype(np.float32))
@@ -84,7 +91,7 @@ def _with_eyes(
         return []
     heights = np.concatenate([piece.part.vertices[:, 1] for piece in pieces])
     tall = max(float(np.ptp(heights)), 1e-9)
-    round_: list[tuple[int, int, Float64, float]] = []
+    spheres: list[tuple[int, int, Float64, float]] = []
     labels = [
         vertex_components(piece.part.triangles, len(piece.part.vertices), piece.part.vertices)
         for piece in pieces
@@ -92,16 +99,16 @@ def _with_eyes(
     for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
         sizes = np.bincount(label)
         for shell in np.flatnonzero((sizes >= 20) & (sizes < len(heights) / 2))[:500]:
-            found = sphere(_cut(piece, label == shell, f"shell {shell}").part)
-            if found is None:
+            fit = sphere(_cut(piece, label == shell, f"shell {shell}").part)
+            if fit is None:
                 continue
-            centre, radius, error, share = found
+            centre, radius, error, share = fit
             if error < EYE_ROUND * radius and share > 0.5 and EYE_SIZES[0] < radius / tall < EYE_SIZES[1]:
-                round_.append((number, int(shell), centre, radius))
+                spheres.append((number, int(shell), centre, radius))
     eyes: set[tuple[int, int]] = set()
-    for a in round_:
+    for a in spheres:
         mirror = a[2] * (-1, 1, 1) + (2 * middle, 0, 0)
-        if any(b[:2] != a[:2] and np.linalg.norm(b[2] - mirror) < 0.5 * a[3] for b in round_):
+        if any(b[:2] != a[:2] and np.linalg.norm(b[2] - mirror) < 0.5 * a[3] for b in spheres):
             eyes.add(a[:2])
     result: list[tuple[Piece, str | None]] = []
     for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
@@ -115,11 +122,12 @@ def _with_eyes(
 
 
 def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
-    found: list[Piece] = []
+    """One piece each for skin, eyes, brows, lashes, rows of teeth, tongue and mouth; others as they are."""
+    result: list[Piece] = []
 
-    def add(kind: str, name: str, chosen: Sequence[Piece]) -> None:
-        if chosen:
-            found.append(_join(chosen, name, kind))
+    def add(kind: str, name: str, own: Sequence[Piece]) -> None:
+        if own:
+            result.append(_join(own, name, kind))
 
     def of_kind(kind: str) -> list[Piece]:
         return [piece for piece, each in pieces if each == kind]
@@ -140,16 +148,12 @@ def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[P
         add("teeth", "lower teeth", _side(teeth, lambda centre: centre[1] <= between))
     for kind in ("tongue", "mouth"):
         add(kind, kind, of_kind(kind))
-    taken = {piece.part.name for piece in found}
+    taken = {piece.part.name for piece in result}
     for piece, kind in pieces:
         if kind in ("hair", "other"):
-            name, count = piece.part.name, 1
-            while name in taken:
-                count += 1
-                name = f"{piece.part.name} {count}"
-            taken.add(name)
-            found.append(replace(piece, part=replace(piece.part, name=name, kind=kind)))
-    return tuple(found)
+            name = unused_name(piece.part.name, taken)
+            result.append(replace(piece, part=replace(piece.part, name=name, kind=kind)))
+    return tuple(result)
 
 
 def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], bool]) -> list[Piece]:
@@ -174,25 +178,18 @@ def _cut(piece: Piece, mask: Bool, name: str) -> Piece:
     number = np.cumsum(mask) - 1
     triangles = number[part.triangles[mask[part.triangles].all(axis=1)]].astype(np.int32)
 
-    def chosen(array: Float32 | None) -> Float32 | None:
-        return None if array is None else array[mask]
-
-    cut = Part(
-        name,
-        part.kind,
-        part.vertices[mask],
-        triangles,
-        chosen(part.normals),
-        chosen(part.texcoords),
-        chosen(part.colours),
-        part.material,
+    cut = replace(
+        part,
+        name=name,
+        vertices=part.vertices[mask],
+        triangles=triangles,
+        normals=None if part.normals is None else part.normals[mask],
+        texcoords=None if part.texcoords is None else part.texcoords[mask],
+        colours=None if part.colours is None else part.colours[mask],
     )
-    return Piece(
-        cut,
-        piece.material,
-        piece.origin[mask] if len(piece.origin) else piece.origin,
-        {shape: morph[mask] for shape, morph in piece.morphs.items()},
-    )
+    origin = piece.origin[mask] if len(piece.origin) else piece.origin
+    morphs = {shape: morph[mask] for shape, morph in piece.morphs.items()}
+    return replace(piece, part=cut, origin=origin, morphs=morphs)
 
 
 def _join(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
@@ -202,54 +199,80 @@ def _join(pieces: Sequence[Piece], name: str, kind: str) -> Piece:
     parts = [piece.part for piece in pieces]
     main = max(parts, key=lambda part: len(part.vertices))
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    plain = all(part.colours is None and part.material.colour == main.material.colour for part in parts)
-    shapes = {shape for piece in pieces for shape in piece.morphs}
-    same_texture = [
-        part.texcoords is not None and part.material.texture == main.material.texture for part in parts
-    ]
-    material = main.material
-    if not plain:
-        material = replace(material, colour=(1.0, 1.0, 1.0))
+    same_colour = all(part.colours is None and part.material.colour == main.material.colour for part in parts)
     joined = Part(
         name,
         kind,
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.triangles + start for part, start in zip(parts, starts[:-1], strict=True)]),
         np.concatenate([part.normals for part in parts if part.normals is not None]),
-        np.concatenate(
-            [
-                part.texcoords
-                if part.texcoords is not None and same
-                else np.zeros((len(part.vertices), 2), np.float32)
-                for part, same in zip(parts, same_texture, strict=True)
-            ]
+        None if main.texcoords is None else np.concatenate([_texcoords(part, main) for part in parts]),
+        None if same_colour else np.concatenate([_colours(part) for part in parts]),
+        main.material if same_colour else replace(main.material, colour=(1.0, 1.0, 1.0)),
+    )
+    origins = [
+        piece.origin if len(piece.origin) else np.full(len(piece.part.vertices), -1, dtype=np.int32)
+        for piece in pieces
+    ]
+    morphs = {
+        shape: np.concatenate(
+            [piece.morphs.get(shape, np.zeros_like(piece.part.vertices)) for piece in pieces]
         )
-        if main.texcoords is not None
-        else None,
-        None if plain else np.concatenate([_colours(part) for part in parts]),
-        material,
-    )
-    return Piece(
-        joined,
-        pieces[0].material,
-        np.concatenate(
-            [
-                piece.origin if len(piece.origin) else np.full(len(piece.part.vertices), -1, dtype=np.int32)
-                for piece in pieces
-            ]
-        ),
-        {
-            shape: np.concatenate(
-                [piece.morphs.get(shape, np.zeros_like(piece.part.vertices)) for piece in pieces]
-            )
-            for shape in sorted(shapes)
-        },
-    )
+        for shape in sorted({shape for piece in pieces for shape in piece.morphs})
+    }
+    return Piece(joined, pieces[0].material, np.concatenate(origins), morphs)
+
+
+def _texcoords(part: Part, main: Part) -> Float32:
+    """(V, 2) texture coordinates of a part, 0 where it has another texture than the main part."""
+    if part.texcoords is None or part.material.texture != main.material.texture:
+        return np.zeros((len(part.vertices), 2), np.float32)
+    return part.texcoords
 
 
 def _colours(part: Part) -> Float32:
+    """(V, 4) colours of a part's vertices times those of its material."""
     own = np.ones((len(part.vertices), 4), np.float32) if part.colours is None else part.colours.copy()
     own[:, :3] *= np.array(part.material.colour, dtype=np.float32)
     if part.colours is None:
         own[:, 3] = 1.0 - part.material.roughness
     return own
+
+
+def unused_name(name: str, taken: set[str]) -> str:
+    """The name, numbered where it is taken or reserved ("head" stands for all parts); taken from now on."""
+    result, count = name, 1
+    while result in taken or result == "head":
+        count += 1
+        result = f"{name} {count}"
+    taken.add(result)
+    return result
+
+
+@cache
+def _words() -> tuple[tuple[str, str], ...]:
+    with (files(__package__) / "kinds.csv").open(encoding="utf-8") as file:
+        return tuple((row["word"], row["kind"]) for row in csv.DictReader(file))
+
+
+def guess_kind(*names: str) -> str | None:
+    """The kind of a part by its names, the most specific first; None where no name is known.
+
+    The first word of `kinds.csv` that is in a name decides; "ear" and "hat" must be words of their own,
+    as they are inside "pearl" and "that".
+    """
+    for name in names:
+        parts = {part.lower() for part in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
+        plain = re.sub(r"[^a-z]", "", name.lower())
+        for word, kind in _words():
+            if word in parts or word + "s" in parts or (len(word) > 4 and word in plain):
+                return kind
+    return None
+
+
+def check_kinds(kinds: Mapping[str, str] | None) -> dict[str, str]:
+    """The kinds that a user gave by name; OptionError for one that does not exist."""
+    for name, kind in (kinds or {}).items():
+        if kind not in PART_KINDS and kind != DROPPED:
+            raise OptionError(f"kind of {name!r}: {kind!r} is none of {', '.join((*PART_KINDS, DROPPED))}")
+    return dict(kinds or {})

@@ -1,4 +1,4 @@
-"""MakeHuman clothes (.mhclo): a mesh of its own whose vertices hang on triangles of the base mesh."""
+"""MakeHuman clothes (.mhclo): a mesh whose vertices are attached to triangles of the base mesh."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def fit_clothes(path: Path, base: Float64) -> Polygons:
         elif tokens[0] == "verts":
             reading = True
         elif reading and tokens[0][0].isdigit():
-            rows.append(_place(tokens, base, scale, where))
-        elif reading:
+            rows.append(_position(tokens, base, scale, where))
+        else:
             reading = False
     if mesh is None:
         raise ModelError(f"{path}: the mesh that its line 'obj_file' names does not lie beside it")
@@ -56,7 +56,8 @@ def _vertex(token: str, base: Float64, where: str) -> int:
     return index
 
 
-def _place(tokens: list[str], base: Float64, scale: Float64, where: str) -> Float64:
+def _position(tokens: list[str], base: Float64, scale: Float64, where: str) -> Float64:
+    """(3,) position of the vertex of one line."""
     if len(tokens) == 1:
         return np.asarray(base[_vertex(tokens[0], base, where)])
     if len(tokens) < 6:

@@ -14,7 +14,7 @@ from fba.face.importers.makehuman.makehuman import EYES, METRES, MakeHumanHead, 
 from fba.mesh.text_files import parse_integer, parse_number, read_words
 
 FOLDERS = ("expression-units", "targets/expression/units/caucasian", "../targets/expression/units/caucasian")
-"""Where MakeHuman's expression units lie, seen from the base mesh."""
+"""Folders of MakeHuman's expression units, relative to the base mesh."""
 
 
 def read_target(path: str | os.PathLike[str], vertices: int) -> Float64:
@@ -40,20 +40,19 @@ def read_target(path: str | os.PathLike[str], vertices: int) -> Float64:
 
 
 def target_files(folder: str | os.PathLike[str]) -> dict[str, Path]:
-    """Expression units beside a base mesh, by name; none where there are none."""
+    """Files of the expression units beside a base mesh, by name."""
     for name in FOLDERS:
-        place = Path(folder) / name
-        if place.is_dir():
-            return {file.stem: file for file in sorted(place.glob("*.target"))}
+        if (Path(folder) / name).is_dir():
+            return {file.stem: file for file in sorted((Path(folder) / name).glob("*.target"))}
     return {}
 
 
 def shape_of(head: MakeHumanHead, moved: Float64) -> Mapping[str, Float32]:
     """Displacements of the parts of a head, metres, by part, for displacements (V, 3) of the base mesh.
 
-    Eyes that are fitted to the base mesh follow it. Parts that stay are left out.
+    Eyes that are fitted to the base mesh follow it. Parts that do not move are left out.
     """
-    found: dict[str, Float32] = {}
+    moves: dict[str, Float32] = {}
     eyes = None
     for source in head.sources:
         if len(source.origin) and source.origin[0] < 0:
@@ -68,8 +67,8 @@ def shape_of(head: MakeHumanHead, moved: Float64) -> Mapping[str, Float32]:
         else:
             shift = (moved[source.origin] * METRES).astype(np.float32)
         if np.abs(shift).max() > 1e-7:
-            found[source.part.name] = shift
-    return found
+            moves[source.part.name] = shift
+    return moves
 
 
 def expression_shapes(head: MakeHumanHead) -> dict[str, Mapping[str, Float32]]:

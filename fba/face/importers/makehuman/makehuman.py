@@ -1,6 +1,6 @@
 """MakeHuman's base mesh: the head and neck of it, with eyes, teeth, tongue, lashes and feature points.
 
-Users point it at a copy of their own (the files are CC0). `makehuman.csv` says which vertices of the base
+Users give a copy of their own (the files are CC0). `makehuman.csv` says which vertices of the base
 mesh "hm08" are the feature points, `makehuman_cuts.csv` where head and neck end, where the sockets behind
 the eyeballs are cut off and where the inside of the mouth begins. The base mesh is in decimetres, +x the
 subject's left, +y up, +z forward.
@@ -31,11 +31,11 @@ from fba.mesh.text_files import find_beside, read_bytes
 METRES = 0.1
 """Metres per unit of the base mesh."""
 VERTICES = 19158
-"""How many vertices the base mesh hm08 has."""
+"""Number of vertices of the base mesh hm08."""
 CROWN, PALATE = 881, 656
 """Vertices of the head and of the inside of the mouth."""
 EYES = "high-poly.mhclo"
-"""The eyes that are fitted where they lie beside the base mesh; else its helper eyes are taken."""
+"""The eyes that are used if they lie beside the base mesh; otherwise its helper eyes are."""
 
 HELPERS = (
     ("upper teeth", "teeth", ("helper-upper-teeth",)),
@@ -51,10 +51,9 @@ HELPERS = (
 class MakeHumanHead:
     """The head of a base mesh, before it gets tables.
 
-    folder: where it lies. base: the whole base mesh, in decimetres. sources: the parts and which vertex of
+    folder: of the base mesh. base: all of it, in decimetres. sources: the parts and which vertex of
     the base mesh each of theirs is (-1 for eyes fitted from a file of their own). points: float64
-    (84, 3), metres; bound: int32 (84,), vertices counted through the parts. shift: metres, what was
-    added to bring the origin between the pupils.
+    (84, 3), metres; bound: int32 (84,), vertices counted through the parts.
     """
 
     folder: Path
@@ -62,7 +61,6 @@ class MakeHumanHead:
     sources: tuple[Source, ...]
     points: Float64
     bound: Int32
-    shift: Float64
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -70,18 +68,12 @@ class MakeHumanHead:
         return tuple(source.part for source in self.sources)
 
 
-def makehuman_parts(path: str | os.PathLike[str]) -> tuple[tuple[Part, ...], Float64, Int32]:
-    """Parts, feature points (84, 3) in metres and bound vertices (84,) of a MakeHuman base mesh.
-
-    path: its `base.obj`, or the folder that holds it. The origin is brought between the pupils. Raises
-    ModelError where the file is missing, damaged, or not the base mesh hm08.
-    """
-    head = read_makehuman(path)
-    return head.parts, head.points, head.bound
-
-
 def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
-    """The head, with what is needed to apply targets of the base mesh to it; as `makehuman_parts`."""
+    """The head of a MakeHuman base mesh, its origin between the pupils.
+
+    path: its `base.obj`, or the folder that holds it. Raises ModelError where the file is missing, damaged,
+    or not the base mesh hm08.
+    """
     file = base_file(path)
     base = read_obj(file)
     missing = [
@@ -100,23 +92,25 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
     points, bound = _feature_points(base, sources)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
     shift = -pupils.mean(axis=0)
-    # float32 positions decide, so that bound points stand on their vertices
-    moved = [Source(_moved(source.part, shift), source.origin) for source in sources]
+    for number, source in enumerate(sources):
+        vertices = (source.part.vertices.astype(np.float64) + shift).astype(np.float32)
+        sources[number] = replace(source, part=replace(source.part, vertices=vertices))
     points = points + shift
-    everything = np.concatenate([source.part.vertices for source in moved])
+    # float32 as the vertices are, so that bound points stand exactly on them
+    everything = np.concatenate([source.part.vertices for source in sources])
     points[bound >= 0] = everything[bound[bound >= 0]]
-    return MakeHumanHead(file.parent, base, tuple(moved), points, bound, shift)
+    return MakeHumanHead(file.parent, base, tuple(sources), points, bound)
 
 
 def base_file(path: str | os.PathLike[str]) -> Path:
     """The base mesh in a folder, or the file itself; ModelError where there is none."""
-    place = Path(path)
+    path = Path(path)
     for name in ("base.obj", "3dobjs/base.obj", "data/3dobjs/base.obj"):
-        if (place / name).is_file():
-            return place / name
-    if place.is_dir():
-        raise ModelError(f"{place}: there is no base.obj in this folder; give MakeHuman's base mesh")
-    return place
+        if (path / name).is_file():
+            return path / name
+    if path.is_dir():
+        raise ModelError(f"{path}: there is no base.obj in this folder; give MakeHuman's base mesh")
+    return path
 
 
 @cache
@@ -126,10 +120,10 @@ def _rows(name: str, key: str) -> dict[str, tuple[int, ...]]:
 
 
 def _head(base: Polygons) -> tuple[Bool, Bool]:
-    """Faces of the body that are the head, and among them those of the inside of the mouth.
+    """(faces of the body that are the head, those of them that are the inside of the mouth), masks (F,).
 
-    Head is what is reached from the crown, mouth what is reached from the palate, without crossing a
-    loop of `makehuman_cuts.csv`.
+    The head is what can be reached from the crown, the mouth what can be reached from the palate, without
+    crossing a loop of `makehuman_cuts.csv`.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -137,9 +131,9 @@ def _head(base: Polygons) -> tuple[Bool, Bool]:
     body = np.flatnonzero(base.in_groups("body"))
     starts, sizes = base.starts[body], np.diff(base.starts)[body]
     face = np.repeat(np.arange(len(body)), sizes)
-    place = np.arange(len(face)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    first = base.corners[starts[face] + place].astype(np.int64)
-    second = base.corners[starts[face] + (place + 1) % sizes[face]].astype(np.int64)
+    corner = np.arange(len(face)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    first = base.corners[starts[face] + corner].astype(np.int64)
+    second = base.corners[starts[face] + (corner + 1) % sizes[face]].astype(np.int64)
     edge = np.minimum(first, second) << 32 | np.maximum(first, second)
     walls = []
     for loop in _rows("makehuman_cuts.csv", "loop").values():
@@ -153,15 +147,15 @@ def _head(base: Polygons) -> tuple[Bool, Bool]:
     shared = np.flatnonzero(edge[1:] == edge[:-1])
     links = (np.ones(len(shared)), (of_edge[shared], of_edge[shared + 1]))
     _, label = connected_components(coo_array(links, shape=(len(body), len(body))), directed=False)
-    found = []
+    masks = []
     for start in (CROWN, PALATE):
         around = face[first == start]
         if not len(around):
             raise ModelError(f"the base mesh has no faces around vertex {start} of its head; is it damaged?")
-        chosen = np.zeros(len(base), dtype=np.bool_)
-        chosen[body[label == label[around[0]]]] = True
-        found.append(chosen)
-    return found[0] | found[1], found[1]
+        mask = np.zeros(len(base), dtype=np.bool_)
+        mask[body[label == label[around[0]]]] = True
+        masks.append(mask)
+    return masks[0] | masks[1], masks[1]
 
 
 def _skin(base: Polygons) -> Source:
@@ -174,7 +168,7 @@ def _skin(base: Polygons) -> Source:
 
 
 def _eyes(file: Path, base: Polygons) -> list[Source]:
-    """Left and right eyeball, of the fitted eyes where they are there."""
+    """Left and right eyeball: the fitted eyes, else those of the base mesh."""
     clothes = find_beside(file, EYES)
     if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
@@ -200,7 +194,7 @@ def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
 
 
 def _eyeball(eyes: Polygons, side: float) -> Bool:
-    """The faces of one eyeball; the transparent cornea before it, a shell of its own, is left out."""
+    """The faces of one eyeball, without the transparent cornea in front of it, which is a mesh of its own."""
     best = None
     for faces in polygon_components(eyes):
         vertices = eyes.vertices[eyes.used(faces)]
@@ -212,14 +206,14 @@ def _eyeball(eyes: Polygons, side: float) -> Bool:
 
 
 def _feature_points(base: Polygons, sources: list[Source]) -> tuple[Float64, Int32]:
-    """Points in metres, not yet shifted, and the vertices they are bound to."""
+    """(points (84, 3) in metres, origin as in the base mesh; vertices (84,) they are bound to)."""
     points = np.full((len(row_of()), 3), np.nan)
     bound = np.full(len(row_of()), -1, dtype=np.int32)
     first: dict[int, int] = {}
     start = 0
     for source in sources:
-        for place, origin in enumerate(source.origin.tolist()):
-            first.setdefault(origin, start + place)
+        for vertex, origin in enumerate(source.origin.tolist()):
+            first.setdefault(origin, start + vertex)
         if source.part.kind == "eye":
             row = row_of()["3.5" if "left" in source.part.name else "3.6"]
             front = _front(source.part.vertices)
@@ -240,21 +234,8 @@ def _front(vertices: Float32) -> int:
     return int(away.argmin())
 
 
-def _moved(part: Part, shift: Float64) -> Part:
-    return Part(
-        part.name,
-        part.kind,
-        (part.vertices.astype(np.float64) + shift).astype(np.float32),
-        part.triangles,
-        part.normals,
-        part.texcoords,
-        part.colours,
-        part.material,
-    )
-
-
 def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> FaceModel:
-    """The head of MakeHuman's base mesh with tables; ModelError as `makehuman_parts`."""
+    """The head of MakeHuman's base mesh with tables; ModelError as `read_makehuman`."""
     from fba.face.authoring import author
 
     head = read_makehuman(path)

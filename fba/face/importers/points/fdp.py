@@ -20,9 +20,9 @@ from fba.mesh.text_files import parse_integer, parse_number, read_bytes, read_wo
 
 
 def read_fdp(path: str | os.PathLike[str]) -> Float64:
-    """Feature points of an FDP file: float64 (84, 3), in the file's unit, NaN where it has none.
+    """Feature points of an FDP file: float64 (84, 3), in the file's unit, NaN for those not in it.
 
-    A point on the wrong side of the face, or eye corners that changed places, are put right with an
+    A point on the wrong side of the face, or eye corners that are swapped, are corrected with an
     FbaWarning. An Xface file names vertices of mesh files; the points are looked up there. Raises
     ModelError where the file is damaged or its mesh files are missing.
     """
@@ -33,7 +33,7 @@ def read_fdp(path: str | os.PathLike[str]) -> Float64:
 
 
 def load_fdp(path: str | os.PathLike[str]) -> Fdp:
-    """The whole content of an FDP file, points repaired as by `read_fdp`. ModelError if damaged."""
+    """The content of an FDP file, points repaired as by `read_fdp`. Raises ModelError if it is damaged."""
     name = os.fspath(path)
     if read_bytes(name)[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         return load_xface(name)
@@ -43,7 +43,7 @@ def load_fdp(path: str | os.PathLike[str]) -> Fdp:
 def _load_text(path: str) -> Fdp:
     points = np.full((len(names()), 3), np.nan)
     vertices: dict[str, tuple[str, int]] = {}
-    strange: list[str] = []
+    unknown: list[str] = []
     header = False
     for where, tokens in read_words(path):
         if not header:
@@ -59,7 +59,7 @@ def _load_text(path: str) -> Fdp:
                 f"{where}: a feature point is 'GROUP.INDEX x y z MESH.VERTEX', not {' '.join(tokens)[:60]!r}"
             )
         elif tokens[0] not in row_of():
-            strange.append(tokens[0])
+            unknown.append(tokens[0])
         else:
             point = tokens[0]
             if np.isfinite(points[row_of()[point]]).any():
@@ -72,9 +72,9 @@ def _load_text(path: str) -> Fdp:
                     vertices[point] = (mesh, index)
     if not np.isfinite(points).any():
         raise ModelError(f"{path}: there is no feature point in it")
-    if strange:
+    if unknown:
         warnings.warn(
-            f"{path}: left out {', '.join(strange[:5])}: the standard has no such feature point",
+            f"{path}: left out {', '.join(unknown[:5])}: the standard has no such feature point",
             FbaWarning,
             stacklevel=4,
         )

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,15 @@ def given_points(points: object) -> GivenPoints:
     return GivenPoints(array)
 
 
+def points_beside(path: Path, endings: Sequence[str]) -> GivenPoints | None:
+    """Feature points from the first file beside a mesh that has its name and one of the endings, or None."""
+    for ending in endings:
+        candidate = path.with_name(path.stem + ending)
+        if candidate.is_file():
+            return read_points(candidate)
+    return None
+
+
 def read_points(path: str | os.PathLike[str]) -> GivenPoints:
     """Feature points from a file.
 
@@ -75,7 +85,7 @@ def read_points(path: str | os.PathLike[str]) -> GivenPoints:
         if isinstance(content, dict) and isinstance(content.get("points"), dict):
             content = content["points"]
         if not isinstance(content, dict):
-            raise ModelError(f"{name}: an object from names of feature points to places is expected")
+            raise ModelError(f"{name}: an object from names of feature points to positions is expected")
         return _from_mapping(content, name)
     if suffix in (".fdp", ".xml"):
         return _from_fdp(name)
@@ -107,30 +117,30 @@ def _from_csv(path: str) -> GivenPoints:
             points[row_of()[name]] = [parse_number(token, where, "a coordinate") for token in tokens[1:]]
         else:
             raise ModelError(f"{where}: 'name,x,y,z' or 'name,vertex' is expected, not {bare[:60]!r}")
-    return _filled(GivenPoints(points, vertices), path)
+    return _check_given(GivenPoints(points, vertices), path)
 
 
 def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
     points = np.full((len(names()), 3), np.nan)
     vertices: dict[str, int] = {}
-    for name, place in content.items():
+    for name, value in content.items():
         if name not in row_of():
             raise ModelError(
                 f"{where}: there is no feature point {str(name)[:40]!r}; they are named 2.1 to 11.6"
             )
-        if isinstance(place, int | np.integer) and not isinstance(place, bool):
-            vertices[name] = int(place)
+        if isinstance(value, int | np.integer) and not isinstance(value, bool):
+            vertices[name] = int(value)
             continue
         try:
-            position = np.array(place, dtype=np.float64)
+            position = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             position = np.array([np.nan])
         if position.shape != (3,) or not np.isfinite(position).all():
             raise ModelError(
-                f"{where}: feature point {name} must be [x, y, z] or a vertex, not {str(place)[:60]}"
+                f"{where}: feature point {name} must be [x, y, z] or a vertex, not {str(value)[:60]}"
             )
         points[row_of()[name]] = position
-    return _filled(GivenPoints(points, vertices), where)
+    return _check_given(GivenPoints(points, vertices), where)
 
 
 def _from_fdp(path: str) -> GivenPoints:
@@ -140,7 +150,8 @@ def _from_fdp(path: str) -> GivenPoints:
     return GivenPoints(fdp.points, {name: vertex for name, (_, vertex) in fdp.vertices.items()})
 
 
-def _filled(given: GivenPoints, where: str) -> GivenPoints:
+def _check_given(given: GivenPoints, where: str) -> GivenPoints:
+    """The points, if there are any; ModelError otherwise, and for a negative vertex."""
     if not given:
         raise ModelError(f"{where}: there is no feature point in it")
     for name, vertex in given.vertices.items():

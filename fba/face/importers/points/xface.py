@@ -51,8 +51,8 @@ def load_xface(path: str) -> Fdp:
             )
     vertices: dict[str, tuple[str, int]] = {}
     influences: list[Influence] = []
-    for place, element in enumerate(root.iter("fdp"), start=1):
-        where = f"{path}: <fdp> number {place}"
+    for number, element in enumerate(root.iter("fdp"), start=1):
+        where = f"{path}: <fdp> number {number}"
         name, mesh_name = element.get("name", ""), element.get("affects", "")
         if name not in row_of():
             raise ModelError(f"{where}: there is no feature point {name[:40]!r}")
@@ -81,27 +81,27 @@ def load_xface(path: str) -> Fdp:
 
 
 def xface_submeshes(fdp: Fdp) -> dict[str, tuple[Path, int]]:
-    """Mesh file and place in it of each submesh ("alice.wrl_3": the fourth shape of alice.wrl).
+    """Mesh file and index in it of each submesh ("alice.wrl_3": the fourth shape of alice.wrl).
 
     Raises ModelError that says which mesh files are missing.
     """
-    found: dict[str, tuple[Path, int]] = {}
+    submeshes: dict[str, tuple[Path, int]] = {}
     missing: set[str] = set()
     for submesh in sorted({mesh for mesh, _ in fdp.vertices.values()} | {i.mesh for i in fdp.influences}):
-        file, _, place = submesh.rpartition("_")
-        if not file or not place.isascii() or not place.isdigit() or len(place) > 6:
+        file, _, index = submesh.rpartition("_")
+        if not file or not index.isascii() or not index.isdigit() or len(index) > 6:
             raise ModelError(f"{fdp.path}: {submesh[:40]!r} is not named FILE_NUMBER, as a submesh is")
         mesh = find_beside(fdp.path, file)
         if mesh is None:
             missing.add(file)
         else:
-            found[submesh] = (mesh, int(place))
+            submeshes[submesh] = (mesh, int(index))
     if missing:
         raise ModelError(
             f"{fdp.path}: needs {', '.join(sorted(missing))}, whose vertices it names, beside it; "
             "without the mesh it holds no positions"
         )
-    return found
+    return submeshes
 
 
 def xface_points(fdp: Fdp) -> Float64:
@@ -110,12 +110,12 @@ def xface_points(fdp: Fdp) -> Float64:
     files = {path: read_vrml(path) for path in {path for path, _ in submeshes.values()}}
     points = np.full((len(names()), 3), np.nan)
     for name, (submesh, vertex) in fdp.vertices.items():
-        path, place = submeshes[submesh]
+        path, index = submeshes[submesh]
         shapes = files[path]
-        if place >= len(shapes) or vertex >= len(shapes[place].vertices):
+        if index >= len(shapes) or vertex >= len(shapes[index].vertices):
             raise ModelError(
-                f"{fdp.path}: feature point {name} is vertex {vertex} of shape {place} of {path.name}, "
+                f"{fdp.path}: feature point {name} is vertex {vertex} of shape {index} of {path.name}, "
                 "which does not exist; is it the mesh this file was made for?"
             )
-        points[row_of()[name]] = shapes[place].vertices[vertex]
+        points[row_of()[name]] = shapes[index].vertices[vertex]
     return repair_sides_with_warning(points, fdp.path, stacklevel=4)
