@@ -48,6 +48,12 @@ RETARGET = "fba/capture/retarget.py"
 PLANTING = "fba/capture/limbs/foot_planting.py"
 WEIGHTS = "fba/body/skin/skin_weights.py"
 TRANSPORT = "player/fba_player/playback/transport.py"
+TIMELINE = "player/fba_player/playback/timeline.py"
+LIVE = "player/fba_player/playback/live.py"
+MIXER = "player/fba_player/sound/_mixer.py"
+DEVICE_CLOCK = "player/fba_player/sound/_device_clock.py"
+FAP_JOINTS = "fba/formats/gltf/_fap_joints.py"
+DECODER = "fba/codec/_decoder.py"
 
 TIMES_TEST = "tests/codec/test_codec_rules.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
@@ -59,6 +65,9 @@ CAPTURE_TEST = (
 )
 WEIGHTS_TEST = "tests/body/skin/test_skin_weights.py"
 TRANSPORT_TEST = "tests/player/playback/test_transport.py"
+LIVE_TEST = "tests/player/playback/test_live.py"
+MIXER_TEST = "tests/player/sound/test_sound_mixer.py"
+DEVICE_CLOCK_TEST = "tests/player/sound/test_sound_clock.py"
 
 MUTANTS = (
     Mutant(CLOCK, "DEFAULT_RATE = Fraction(25)", "DEFAULT_RATE = Fraction(30)", TIMES_TEST),
@@ -119,6 +128,24 @@ MUTANTS = (
     Mutant(TRANSPORT, "AT_ONCE = 0.1", "AT_ONCE = 0.0", TRANSPORT_TEST),
     Mutant(TRANSPORT, "AT_ONCE = 0.1", "AT_ONCE = 1.0", TRANSPORT_TEST),
     Mutant(TRANSPORT, "BUFFER = 0.25", "BUFFER = 0.05", "tests/player/playback"),
+    Mutant(TIMELINE, "FRAME_ROUNDING = 1e-6", "FRAME_ROUNDING = 0.0", "tests/player/playback"),
+    Mutant(LIVE, "PATIENCE = 0.5", "PATIENCE = 0.0", LIVE_TEST),
+    Mutant(LIVE, "PATIENCE = 0.5", "PATIENCE = 5.0", LIVE_TEST),
+    Mutant(LIVE, "CHECK_BAP_STEPS_AFTER = 4", "CHECK_BAP_STEPS_AFTER = 1", LIVE_TEST),
+    Mutant(LIVE, "CHECK_BAP_STEPS_AFTER = 4", "CHECK_BAP_STEPS_AFTER = 40", LIVE_TEST),
+    Mutant(MIXER, "FADE = 0.004", "FADE = 0.001", MIXER_TEST),
+    Mutant(MIXER, "FADE = 0.004", "FADE = 0.04", MIXER_TEST),
+    Mutant(MIXER, "ROUNDING = 1e-7", "ROUNDING = 0.0", MIXER_TEST),
+    Mutant(MIXER, "ROUNDING = 1e-7", "ROUNDING = 1e-2", MIXER_TEST),
+    Mutant(MIXER, "SLIP = 0.002", "SLIP = 0.001", MIXER_TEST),
+    Mutant(MIXER, "SLIP = 0.002", "SLIP = 0.004", MIXER_TEST),
+    Mutant(DEVICE_CLOCK, "GAIN = 0.05", "GAIN = 0.0", DEVICE_CLOCK_TEST),
+    Mutant(DEVICE_CLOCK, "GAIN = 0.05", "GAIN = 0.5", DEVICE_CLOCK_TEST),
+    Mutant(DEVICE_CLOCK, "WINDOW = 10", "WINDOW = 1", DEVICE_CLOCK_TEST),
+    Mutant(DEVICE_CLOCK, "JUMP = 0.05", "JUMP = 9.0", DEVICE_CLOCK_TEST),
+    Mutant(DEVICE_CLOCK, "JUMP = 0.05", "JUMP = 0.001", DEVICE_CLOCK_TEST),
+    Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),
+    Mutant(DECODER, "_DOUBTFUL = 8", "_DOUBTFUL = 0", "tests/codec/test_damage.py"),
 )
 
 

@@ -151,6 +151,8 @@ def test_positions_of_inner_joints() -> None:
         (text("HIERARCHY\n{\n}\n"), 2, "brace opens"),
         (text("HIERARCHY\n"), 2, "no ROOT"),
         (text("HIERARCHY\nJOINT a\n{\n}\n"), 2, "inside"),
+        (text("HIERARCHY\nEnd Site\n{\n}\n"), 2, "an End Site must stand inside a joint"),
+        (text("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n}\n"), None, "no joint has channels"),
         (text(HEAD.replace("HIERARCHY", "HIERARHCY")), 1, "HIERARCHY"),
         ("", None, "before MOTION"),
     ],
@@ -161,6 +163,13 @@ def test_errors_say_where(content: str, line: int | None, message: str) -> None:
     assert caught.value.path == "walk.bvh"
     if line is not None:
         assert caught.value.line == line
+
+
+def test_a_file_of_another_kind_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "walk.bvh"
+    path.write_bytes(b"glTF" + bytes(60))
+    with pytest.raises(FormatError, match=r"a BVH file begins with HIERARCHY.*glTF"):
+        reader.read_motion(path)
 
 
 def test_deep_nesting() -> None:

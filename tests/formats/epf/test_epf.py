@@ -11,7 +11,7 @@ import pytest
 import fba
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
 from fba.errors import FbaWarning, FormatError, UnsupportedError
-from fba.formats.epf.epf import read_epf, write_epf
+from fba.formats.epf.epf import read_animation, read_epf, write_epf
 from format_files import file
 
 FMT = "FMT 0 3 0 0 1 1 0 0 0 0 0 0 2 1 0 0 0 0"
@@ -160,6 +160,14 @@ def part(**changes: Any) -> PartSettings:
         ([PlaneSettings(True, face_frame=0, face=part(mask=np.zeros(68, bool)))], "contradicts its mask"),
         ([PlaneSettings(True, face_frame=0, face=part(mask_types=(3,)))], "10 mask types"),
         (
+            [PlaneSettings(True, face_frame=0, face=part(mask_types=(4, *[0] * 9)))],
+            "group 1 has mask type 4",
+        ),
+        (
+            [PlaneSettings(True, body_frame=0, body=PartSettings((2, *[0] * 23), np.zeros(296, bool)))],
+            "group 1 has mask type 2",
+        ),
+        (
             [
                 PlaneSettings(
                     True, face_frame=0, face=part(ranges=RangeLists(i_max=np.full(68, 32, np.uint8)))
@@ -194,6 +202,11 @@ def test_what_no_tag_says(tmp_path: Path) -> None:
 def test_reading_one_as_an_animation_says_what_it_is(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedError, match=r"encoder parameter file.*--epf"):
         fba.read(file(tmp_path, "a.txt", *FIRST))
+
+
+def test_a_file_of_another_kind_has_its_own_error(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"a\.epf:1: unknown tag; an EPF line begins with FBM"):
+        read_animation(file(tmp_path, "a.epf", "2.1 a 25 1", "0 " * 68, "0"))
 
 
 def test_every_real_file_reads_and_writes_back(shared: Path, tmp_path: Path) -> None:

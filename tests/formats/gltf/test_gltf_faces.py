@@ -215,9 +215,19 @@ def test_targets_that_are_gone(tmp_path: Path) -> None:
         (lambda face: face["joints"][0].update(rest=[0] * 8), "a list of 9 numbers"),
         (lambda face: face["joints"][0].update(turns=[[49, [0, 0, 0]]]), "does not determine"),
         (
-            lambda face: face["joints"][0].update(turns=[[49, [0, 1, 0]], [50, [0, 1, 1]]]),
+            lambda face: face["joints"][0].update(
+                turns=[[49, [0, 1, 0]], [50, [0, 1, 1]]], shifts=[], told=[49, 50]
+            ),
             "does not determine",
         ),
+        (
+            lambda face: face["joints"][0].update(
+                turns=[], shifts=[[49, [0, 1, 0]], [50, [0, 2, 0]]], told=[49, 50]
+            ),
+            "does not determine",
+        ),
+        (lambda face: face["joints"][0].update(turns=[[49]]), "expected a FAP and its axis"),
+        (lambda face: face.update(numbers=[[5]]), "expected a FAP and an accessor"),
         (lambda face: face["joints"][0].update(told=[5]), "does not determine"),
         (lambda face: face.update(numbers=[[5, 10**6]]), "1000000 is not within"),
         (lambda face: face.update(numbers=[[5, 0, 0]]), "more than the 2"),

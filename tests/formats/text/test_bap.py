@@ -6,12 +6,21 @@ import tempfile
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from fba.animation import Animation, FaceTrack
 from fba.errors import FbaWarning, FormatError
 from fba.formats.text.bap import read_bap, write_bap
 from format_files import animations, file, mask
+
+
+def test_a_face_is_not_written_as_a_body(tmp_path: Path) -> None:
+    face = FaceTrack(np.zeros((1, 68), np.int32), np.ones((1, 68), bool))
+    with pytest.raises(FormatError, match="a BAP file holds a body, and this animation has only a face"):
+        write_bap(tmp_path / "a.bap", Animation(25, np.arange(1), face, None))
+    assert not (tmp_path / "a.bap").exists()
 
 
 @pytest.mark.parametrize("width", [186, 187, 296, 297])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from fba.animation import Animation, BodyTrack
+from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.errors import FbaWarning, FormatError
 from fba.formats.text.fap import read_fap, write_fap
 from format_files import animations, file, mask
@@ -184,6 +184,17 @@ def test_a_body_is_not_written_as_a_face(tmp_path: Path) -> None:
     body = BodyTrack(np.zeros((1, 296), np.int32), np.ones((1, 296), bool))
     with pytest.raises(FormatError, match="only a body"):
         write_fap(tmp_path / "a.fap", Animation(Fraction(25), np.arange(1), None, body))
+    assert not (tmp_path / "a.fap").exists()
+
+
+def test_times_that_the_text_cannot_carry(tmp_path: Path) -> None:
+    face = FaceTrack(np.zeros((2, 68), np.int32), np.ones((2, 68), bool))
+    late = Animation(Fraction(25), np.array([0, 2**31]), face, None)
+    with pytest.raises(FormatError, match=r"frame numbers 0\.\.2147483648 do not fit this format"):
+        write_fap(tmp_path / "a.fap", late)
+    odd = Animation(Fraction(10**40 + 1, 10**39), np.arange(2), face, None)
+    with pytest.raises(FormatError, match="the frame rate is too long a fraction; resample"):
+        write_fap(tmp_path / "a.fap", odd)
     assert not (tmp_path / "a.fap").exists()
 
 

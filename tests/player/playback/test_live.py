@@ -14,6 +14,7 @@ import pytest
 
 import fba
 from fba.animation import Animation
+from fba.body import gait
 from fba.codec import Decoder, EncoderOptions, FrameBuffer, FrameRate, PlaneSettings, encode_planes
 from fba.errors import FbaError
 from fba_player.playback.live import LiveAnimation, LiveTimeline
@@ -345,3 +346,39 @@ def test_arrays_that_somebody_looks_at_do_not_change(wire: Wire) -> None:
     assert early == fba.decode(data)[: len(early)]
     assert not early.index.flags.writeable
     assert live.snapshot() == fba.decode(data)
+
+
+def test_how_long_a_slow_stream_is_waited_for(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Longer than a stream sent at its own speed fills the buffer in, and at most a second."""
+    waits: list[float | None] = []
+
+    def waited(self: object, condition: Callable[[], object], timeout: float | None = None) -> bool:
+        waits.append(timeout)
+        return bool(condition())
+
+    data, ends = stream(performance(100))
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[0]])
+    until(lambda: len(live))
+    monkeypatch.setattr(threading.Condition, "wait_for", waited)
+    assert live.wait()
+    monkeypatch.undo()
+    first, patience = waits
+    assert first is None
+    assert patience is not None
+    assert BUFFER < patience <= 1
+    live.close()
+
+
+def test_the_steps_of_a_body_are_doubted_after_four_seconds(wire: Wire) -> None:
+    """A second is too little to judge by; after a minute the viewer has long seen it."""
+    walk = gait.walk(rate=25, seconds=8)
+    data, ends = stream(walk, bap_steps="visage")
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[90]])  # 3.6 s
+    until(lambda: len(live) >= 90)
+    assert live.doubt == ""
+    wire.send(data[ends[90] : ends[105]])
+    until(lambda: live.doubt)
+    assert "made with --bap-steps visage?" in live.doubt
+    live.close()

@@ -91,3 +91,15 @@ def test_a_device_that_stops_for_a_while_loses_that_sound() -> None:
     device.run(1.0)  # half of that to be sure
     assert device.firsts[-1] == pytest.approx(first + 4.0, abs=0.05)  # and the sound is at the same place
     assert device.clock() == pytest.approx(before + 4.0, abs=0.05)
+
+
+def test_unpunctual_calls_hardly_move_it() -> None:
+    """Calls are up to 35 ms late; each may move the clock by a twentieth of that, which is less than 2 ms."""
+    device = Device(lateness=0.035)
+    device.run(5.0)
+    moves = []
+    for _ in range(500):
+        before = device.clock() - device.now
+        device.run(PERIOD)
+        moves.append(device.clock() - device.now - before)
+    assert max(map(abs, moves)) < 0.002

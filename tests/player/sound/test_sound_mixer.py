@@ -169,3 +169,30 @@ def test_a_motion_tells_when_it_turns() -> None:
     still = Motion(10.0, 1.0, 2.0, True, 3.0, 0.5, 3.0, 3.0, False)
     assert still.until_turn(11.5) == float("inf")
     assert not still.moving(11.5)
+
+
+def test_fades_last_four_milliseconds() -> None:
+    """Shorter ones click, longer ones swallow the beginning of a word."""
+    player = Player()
+    player.transport.seek(1.0)
+    player.transport.play()
+    heard = player.hear(10)
+    np.testing.assert_array_equal(heard[4:], np.arange(1004, 1010))
+    np.testing.assert_allclose(heard[:4] / np.arange(1000, 1004), [0, 0.25, 0.5, 0.75], atol=0.001)
+
+
+@pytest.mark.parametrize(
+    ("slip", "jumps"), [(0.0015, False), (0.0025, True), (-0.0015, False), (-0.0025, True)]
+)
+def test_a_clock_that_is_off_by_two_milliseconds_makes_no_jump(slip: float, jumps: bool) -> None:
+    """Nobody sees that; each jump would be heard."""
+    player = Player()
+    player.transport.seek(1.0)
+    player.transport.play()
+    player.hear(100)
+    player.now += slip
+    heard = player.hear(100)[4:]
+    straight_on = np.arange(1104, 1200)
+    assert np.array_equal(heard, straight_on) != jumps
+    if jumps:
+        assert abs(heard - straight_on - 1000 * slip).max() <= 1
