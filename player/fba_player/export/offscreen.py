@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from fba_player.view.view import View
 
 SAMPLES = 0
 """Samples per pixel; 0 is one, with edges smoothed afterwards."""
-SAMPLES_OF_CLEAR = 4
+TRANSPARENT_SAMPLES = 4
 """Least samples per pixel if the background is transparent."""
 
 
@@ -55,7 +54,7 @@ class Offscreen:
         self._gl: Any = offscreen_context()
         self._target: Target | None = None
         self._renderer: Renderer | None = None
-        self._exact: Target | None = None
+        self._multisampled: Target | None = None
         self._samples = samples
         try:
             with (
@@ -103,10 +102,10 @@ class Offscreen:
     def _draw_over_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
         """Both pictures, multisampled: the pass that smooths edges would miss dark ones before black."""
         with self._gl:
-            if self._exact is None:
-                self._exact = Target(self._gl, self.size, max(self._samples, SAMPLES_OF_CLEAR))
+            if self._multisampled is None:
+                self._multisampled = Target(self._gl, self.size, max(self._samples, TRANSPARENT_SAMPLES))
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)]
-        return [self._read(one, camera, self._exact).copy() for one in views]
+        return [self._read(one, camera, self._multisampled).copy() for one in views]
 
     def _read(self, view: View, camera: Camera, target: Target) -> UInt8:
         assert self._renderer is not None
@@ -125,19 +124,17 @@ class Offscreen:
         if self._gl is None:
             return
         with self._gl:
-            for part in (self._renderer, self._target, self._exact):
+            for part in (self._renderer, self._target, self._multisampled):
                 if part is not None:
                     part.close()
-        self._renderer = self._target = self._exact = None
+        self._renderer = self._target = self._multisampled = None
         self._gl.release()
         self._gl = None
 
     def __enter__(self) -> Offscreen:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -145,10 +142,10 @@ def cut_out(black: UInt8, white: UInt8) -> UInt8:
     """The foreground with alpha, uint8 (H, W, 4), from the same picture before black and before white."""
     dark, light = (picture[..., :3].astype(np.float32) for picture in (black, white))
     opaque = np.clip(1 - (light - dark).mean(axis=2) / 255, 0.0, 1.0)
-    found = np.empty_like(black)
-    found[..., :3] = np.clip(np.round(dark / np.maximum(opaque, 1 / 255)[..., None]), 0, 255)
-    found[..., 3] = np.round(opaque * 255)
-    return found
+    foreground = np.empty_like(black)
+    foreground[..., :3] = np.clip(np.round(dark / np.maximum(opaque, 1 / 255)[..., None]), 0, 255)
+    foreground[..., 3] = np.round(opaque * 255)
+    return foreground
 
 
 def follow_camera(camera: Camera, scene: Scene, time: float) -> Camera:

@@ -15,7 +15,6 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
@@ -25,6 +24,7 @@ from fba_player.gl.context import missing_libraries, missing_text
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera
+from fba_player.view.geometry import turn_partly
 from fba_player.view.view import Eye, FaceMesh, Mesh
 
 if TYPE_CHECKING:
@@ -99,13 +99,13 @@ def _import_pyrender() -> Any:
 
 @contextmanager
 def _numpy_1_names() -> Iterator[None]:
-    lent = [name for name in NUMPY_1 if name not in vars(np)]
-    for name in lent:
+    added = [name for name in NUMPY_1 if name not in vars(np)]
+    for name in added:
         setattr(np, name, NUMPY_1[name])
     try:
         yield
     finally:
-        for name in lent:
+        for name in added:
             delattr(np, name)
 
 
@@ -118,8 +118,8 @@ def _add(pyrender: Any, scene: Any, name: str, attributes: dict[str, Any], mater
 
 def _of_face(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
     shape = face.shape
-    positions = sway_with_head(face.positions, shape.sway, face.turn, face.centre)
-    normals = sway_with_head(face.normals, shape.sway, face.turn, np.zeros(3))
+    positions = turn_partly(face.positions, shape.sway, face.turn, face.centre)
+    normals = turn_partly(face.normals, shape.sway, face.turn, np.zeros(3))
     attributes = _world_attributes(positions, normals, face.matrix, shape.triangles, shape.colours)
     texture = None
     if shape.picture is not None and shape.texcoords is not None:
@@ -144,13 +144,13 @@ def _of_mesh(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
 
 
 def _of_eye(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
-    places, triangles = sphere_mesh(EYE_ROWS, EYE_AROUND)
-    across = np.hypot(places[:, 0], places[:, 1])
-    front = places[:, 2] > 0
-    colours = np.tile(np.array([*WHITE, 1.0], dtype=np.float32), (len(places), 1))
+    points, triangles = sphere_mesh(EYE_ROWS, EYE_AROUND)
+    across = np.hypot(points[:, 0], points[:, 1])
+    front = points[:, 2] > 0
+    colours = np.tile(np.array([*WHITE, 1.0], dtype=np.float32), (len(points), 1))
     colours[front & (across < ball.iris), :3] = np.array(ball.tint) * IRIS_LIGHT
     colours[front & (across < ball.pupil), :3] = PUPIL
-    attributes = _world_attributes(places, places, ball.matrix, triangles, colours)
+    attributes = _world_attributes(points, points, ball.matrix, triangles, colours)
     material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=WET, doubleSided=True)
     return attributes, material
 
@@ -172,19 +172,6 @@ def _world_attributes(
         "indices": np.ascontiguousarray(triangles, dtype=np.uint32),
         "color_0": np.hstack([colours[:, :3], opaque]).astype(np.float32),
     }
-
-
-def sway_with_head(places: npt.ArrayLike, sway: Float32, turn: Float64, centre: Float64) -> Float64:
-    """Positions (V, 3) turned about a centre by sway (V,) times `turn`, a rotation vector in radians."""
-    at = np.asarray(places, dtype=np.float64)
-    angle = float(np.linalg.norm(turn))
-    if angle < 1e-6:
-        return at
-    axis, arm = turn / angle, at - centre
-    sine, cosine = np.sin(angle * sway)[:, None], np.cos(angle * sway)[:, None]
-    along = (arm @ axis)[:, None] * axis
-    turned: Float64 = arm * cosine + np.cross(axis, arm) * sine + along * (1 - cosine) + centre
-    return turned
 
 
 def _roughness(colours: Float32) -> float:

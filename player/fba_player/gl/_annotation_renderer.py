@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,16 @@ from fba_player.gl._labels import (
     SMALLEST_WITH_LEGEND,
     legend_picture,
     names_picture,
-    placed_names,
+    place_names,
 )
-from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
+from fba_player.gl.resources import (
+    RecentlyUsed,
+    load_program,
+    make_texture,
+    matrix_bytes,
+    set_uniform,
+    write_buffer,
+)
 from fba_player.view.camera import Camera
 from fba_player.view.geometry import world_normals, world_positions
 from fba_player.view.view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
@@ -31,25 +39,25 @@ LEAST_RADIUS = 0.8
 NAME_SIZE, SMALLEST_NAME = 13, 10
 LEAST_LEGEND = 0.65
 MARGIN = 14
-MOST_WORDS = 16
+MOST_LABELS = 16
 """Number of label textures that are cached."""
 MOST_SHELLS = 48
 """Number of shells whose triangles are cached; the least recently used goes first."""
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
 
 
-def projected(places: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
+def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
     """Pixels (N, 2) from the upper left and depths (N,), 0..1, of points (N, 3); NaN behind the camera.
 
     matrix: (4, 4), world to clip space.
     """
-    clip = np.column_stack([places, np.ones(len(places))]) @ matrix.T
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
     clip[clip[:, 3] < 1e-6] = np.nan
     flat = clip[:, :3] / clip[:, 3:]
     return (flat[:, :2] * (0.5, -0.5) + 0.5) * size, flat[:, 2] * 0.5 + 0.5
 
 
-def _pixels_a_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
+def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
     """Pixels per metre at the middle of the dots."""
     if not len(dots.places):
         return 0.0
@@ -57,10 +65,11 @@ def _pixels_a_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
     return size[1] / (2 * max(away, 1e-6) * math.tan(math.radians(camera.field_of_view) / 2))
 
 
-def _towards(eye: Float64, places: Float64, lift: float) -> Float64:
-    way = eye - places
-    shift: Float64 = way * (lift / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6))
-    return shift
+def _lift(points: Float64, eye: Float64, lift: float) -> Float64:
+    """Points (N, 3) moved by `lift` metres towards the eye."""
+    way = eye - points
+    lifted: Float64 = points + way * (lift / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6))
+    return lifted
 
 
 class ExtrasRenderer:
@@ -71,9 +80,9 @@ class ExtrasRenderer:
         self._programs: dict[str, Any] = {}
         self._square: Any = None
         self._buffers: dict[str, Any] = {}
-        self._textures: dict[Hashable, tuple[Any, Any]] = {}
+        self._labels = RecentlyUsed[tuple[Any, Any]](MOST_LABELS, lambda label: label[0].release())
         self._depths: Float32 | None = None
-        self._indices: dict[int, tuple[FaceShape, Any]] = {}
+        self._triangles = RecentlyUsed[Any](MOST_SHELLS, lambda triangles: triangles.release())
 
     def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
         """Draw into the bound framebuffer, over a picture from that camera and with its depths."""
@@ -98,7 +107,7 @@ class ExtrasRenderer:
             self._draw_lines(lines, scale)
         for dots in extras.dots:
             if dots.radius > 0:
-                self._draw_dots(dots, scale, _pixels_a_metre(dots, camera, size))
+                self._draw_dots(dots, scale, _pixels_per_metre(dots, camera, size))
         gl.enable_only(gl.BLEND)
         self._depths = None
         if size[1] >= SMALLEST:
@@ -111,30 +120,27 @@ class ExtrasRenderer:
 
     def close(self) -> None:
         """Free all OpenGL objects."""
-        for texture, _ in self._textures.values():
-            texture.release()
-        for _, triangles in self._indices.values():
-            triangles.release()
+        self._labels.clear()
+        self._triangles.clear()
         for part in (*self._buffers.values(), *self._programs.values()):
             part.release()
         if self._square is not None:
             self._square.release()
         self._square = None
-        self._textures.clear()
-        self._indices.clear()
         self._buffers.clear()
         self._programs.clear()
 
-    def _filled(self, name: str, data: Array) -> Any:
+    def _fill_buffer(self, name: str, data: Array) -> Any:
         """The buffer of this name, filled with data; it grows as needed."""
-        held = self._buffers.get(name)
-        if held is None or held.size < data.nbytes:
-            if held is not None:
-                held.release()
-            held = self._buffers[name] = self._gl.buffer(reserve=max(data.nbytes, 64) * 5 // 4, dynamic=True)
-        held.orphan()
-        held.write(np.ascontiguousarray(data))
-        return held
+        buffer = self._buffers.get(name)
+        if buffer is None or buffer.size < data.nbytes:
+            if buffer is not None:
+                buffer.release()
+            buffer = self._buffers[name] = self._gl.buffer(
+                reserve=max(data.nbytes, 64) * 5 // 4, dynamic=True
+            )
+        write_buffer(buffer, data)
+        return buffer
 
     def _render(self, program: str, content: list[tuple[Any, ...]], instances: int) -> None:
         array = self._gl.vertex_array(self._programs[program], content)
@@ -145,9 +151,9 @@ class ExtrasRenderer:
         gl, arrays = self._gl, []
         for number, mesh in enumerate(shells):
             at = np.concatenate([world_positions(mesh), world_normals(mesh)], axis=1).astype("f4")
-            vertices = self._filled(f"shell {number}", at)
+            vertices = self._fill_buffer(f"shell {number}", at)
             content = [(vertices, "3f 3f", "in_position", "in_normal")]
-            triangles = self._triangles(mesh.shape)
+            triangles = self._triangles.get(mesh.shape, partial(self._upload_triangles, mesh.shape))
             arrays.append(gl.vertex_array(self._programs["shell"], content, index_buffer=triangles))
         # Depths first, so that only the nearest surface shows.
         gl.blend_func = gl.ZERO, gl.ONE
@@ -161,16 +167,8 @@ class ExtrasRenderer:
         for array in arrays:
             array.release()
 
-    def _triangles(self, shape: FaceShape) -> Any:
-        """The index buffer of a shell, cached."""
-        held = self._indices.pop(id(shape), None)
-        if held is None:
-            data = np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()
-            held = (shape, self._gl.buffer(data))
-        self._indices[id(shape)] = held  # most recently used
-        while len(self._indices) > MOST_SHELLS:
-            self._indices.pop(next(iter(self._indices)))[1].release()
-        return held[1]
+    def _upload_triangles(self, shape: FaceShape) -> Any:
+        return self._gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes())
 
     def _draw_grid(self, grid: Grid) -> None:
         program = self._programs["grid"]
@@ -187,14 +185,14 @@ class ExtrasRenderer:
         set_uniform(program, "width", max(lines.width * scale, 0.8))
         set_uniform(program, "lift", lines.lift)
         set_uniform(program, "crowded", CROWDED * scale)
-        corners = self._filled("corners", np.array([0, -1, 1, -1, 0, 1, 1, 1], dtype="f4"))
-        ends = self._filled("ends", lines.ends.astype("f4"))
+        corners = self._fill_buffer("corners", np.array([0, -1, 1, -1, 0, 1, 1, 1], dtype="f4"))
+        ends = self._fill_buffer("ends", lines.ends.astype("f4"))
         names = ("in_from_colour", "in_to_colour")
         if isinstance(lines.colours, tuple):
-            colours = self._filled("colour", np.array([lines.colours] * 2, dtype="f4"))
+            colours = self._fill_buffer("colour", np.array([lines.colours] * 2, dtype="f4"))
             tint = (colours, "4f 4f/r", *names)
         else:
-            colours = self._filled("colours", lines.colours.astype("f4"))
+            colours = self._fill_buffer("colours", lines.colours.astype("f4"))
             tint = (colours, "4f 4f/i", *names)
         content = [(corners, "2f", "in_corner"), (ends, "3f 3f/i", "in_from", "in_to"), tint]
         self._render("line", content, len(lines.ends))
@@ -209,7 +207,7 @@ class ExtrasRenderer:
         set_uniform(program, "colour", dots.colour)
         content = [
             (self._square, "2f", "in_corner"),
-            (self._filled("places", dots.places.astype("f4")), "3f/i", "in_place"),
+            (self._fill_buffer("places", dots.places.astype("f4")), "3f/i", "in_place"),
         ]
         for opacity, depth in ((HIDDEN, ">"), (1.0, "<")):
             set_uniform(program, "opacity", opacity)
@@ -220,29 +218,29 @@ class ExtrasRenderer:
         self, dots: Dots, matrix: Float64, eye: Float64, size: tuple[int, int], scale: float
     ) -> None:
         pixels = max(round(NAME_SIZE * scale), SMALLEST_NAME)
-        words, boxes = self._words((dots.names, pixels), lambda: names_picture(dots.names, pixels))
+        texture, boxes = self._label((dots.names, pixels), lambda: names_picture(dots.names, pixels))
         at = dots.places.astype(np.float64)
         facing = np.einsum("ij,ij->i", dots.facing, eye - at) >= 0
-        pixel, depth = projected(at, matrix, size)
-        nearer = projected(at + _towards(eye, at, dots.lift), matrix, size)[1]
+        pixel, depth = project(at, matrix, size)
+        nearer = project(_lift(at, eye, dots.lift), matrix, size)[1]
         inside = facing & np.isfinite(depth) & ((pixel >= 0) & (pixel < size)).all(axis=1)
         if not 0 < inside.sum() <= MOST_NAMES:
             return
         column, row = pixel[inside].astype(int).T
         inside[inside] = nearer[inside] <= self._depths_of(size)[size[1] - 1 - row, column]
         pixel[~inside] = np.nan
-        chosen, corners = placed_names(pixel, boxes[:, 2:], dots.radius * scale, size)
-        if len(chosen):
-            own = boxes[chosen].astype(np.float64)
-            whole = np.array(words.size * 2, dtype=np.float64)
-            self._draw_labels(words, np.concatenate([corners, own[:, 2:], own / whole], axis=1))
+        shown, corners = place_names(pixel, boxes[:, 2:], dots.radius * scale, size)
+        if len(shown):
+            own = boxes[shown].astype(np.float64)
+            texture_size = np.array(texture.size * 2, dtype=np.float64)
+            self._draw_labels(texture, np.concatenate([corners, own[:, 2:], own / texture_size], axis=1))
 
     def _draw_legend(self, legend: Legend, size: tuple[int, int], scale: float) -> None:
-        words, _ = self._words((legend, scale), lambda: (legend_picture(legend, scale), None))
-        wide, high = words.size
+        texture, _ = self._label((legend, scale), lambda: (legend_picture(legend, scale), None))
+        wide, high = texture.size
         edge = round(MARGIN * scale)
         if wide + 2 * edge <= size[0]:
-            self._draw_labels(words, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
+            self._draw_labels(texture, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
 
     def _depths_of(self, size: tuple[int, int]) -> Float32:
         """float32 (H, W): depths of the picture, 0..1, bottom row first; read once for each picture."""
@@ -260,24 +258,21 @@ class ExtrasRenderer:
         self._depths = np.frombuffer(data, dtype=np.float32).reshape(size[1], size[0])
         return self._depths
 
-    def _words(self, key: Hashable, make: Callable[[], tuple[UInt8, Any]]) -> tuple[Any, Any]:
-        """A texture of labels and what `make` returned with it; the last few are cached."""
-        held = self._textures.pop(key, None)
-        if held is None:
-            picture, more = make()
-            texture = self._gl.texture((picture.shape[1], picture.shape[0]), 4, picture.tobytes())
-            texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
-            held = (texture, more)
-        self._textures[key] = held  # most recently used
-        while len(self._textures) > MOST_WORDS:
-            self._textures.pop(next(iter(self._textures)))[0].release()
-        return held
+    def _label(self, key: Hashable, make: Callable[[], tuple[UInt8, Any]]) -> tuple[Any, Any]:
+        """A texture of labels, cached, and what `make` returned with its picture."""
 
-    def _draw_labels(self, words: Any, boxes: Float64) -> None:
-        words.use(0)
-        corners = self._filled("label corners", np.array([0, 0, 1, 0, 0, 1, 1, 1], dtype="f4"))
+        def upload() -> tuple[Any, Any]:
+            picture, more = make()
+            return make_texture(self._gl, picture, smooth=False), more
+
+        return self._labels.get(key, upload)
+
+    def _draw_labels(self, texture: Any, boxes: Float64) -> None:
+        """Draw parts of a texture. boxes: (N, 8), as in extra_label.vert."""
+        texture.use(0)
+        corners = self._fill_buffer("label corners", np.array([0, 0, 1, 0, 0, 1, 1, 1], dtype="f4"))
         content = [
             (corners, "2f", "in_corner"),
-            (self._filled("boxes", boxes.astype("f4")), "4f 4f/i", "in_box", "in_part"),
+            (self._fill_buffer("boxes", boxes.astype("f4")), "4f 4f/i", "in_box", "in_part"),
         ]
         self._render("label", content, len(boxes))

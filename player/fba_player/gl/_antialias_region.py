@@ -10,6 +10,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Floating
 from fba.compiled import is_compiled
 from fba_player.gl._silhouette import Outliner
+from fba_player.view.geometry import turn_partly
 from fba_player.view.view import FaceMesh, View
 
 MARGIN = 0.03
@@ -61,27 +62,29 @@ def bounding_rectangles(view: View, matrix: Float64, size: tuple[int, int]) -> l
             reach = float(round_[:, [3, 7]].max())
             ends = np.concatenate([round_[:, 0:3], round_[:, 4:7]])
             boxes.append(_box(ends.min(axis=0) - reach, ends.max(axis=0) + reach))
-    found: list[Rectangle] = []
+    rectangles: list[Rectangle] = []
     for rectangle in sorted({_rectangle(box, matrix, size) for box in boxes if len(box)}, key=_area):
-        found = [other for other in found if not _within(other, rectangle)]
+        rectangles = [other for other in rectangles if not _within(other, rectangle)]
         if _area(rectangle):
-            found.append(rectangle)
-    return found
+            rectangles.append(rectangle)
+    return rectangles
 
 
 def _face_boxes(face: FaceMesh) -> list[Float64]:
     if not np.any(face.turn):
         return [_corners(face.positions) @ face.matrix[:3, :3].T + face.matrix[:3, 3]]
     still = face.shape.sway < STILL
-    found = []
+    boxes = []
     for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
-        both = np.concatenate([box, _turned(box, face.turn, face.centre)])  # the neck bends between them
-        found.append(both @ face.matrix[:3, :3].T + face.matrix[:3, 3])
-    return found
+        turned = turn_partly(box, np.ones(len(box)), face.turn, face.centre)
+        both = np.concatenate([box, turned])  # the neck bends between them
+        boxes.append(both @ face.matrix[:3, :3].T + face.matrix[:3, 3])
+    return boxes
 
 
-def _rectangle(places: Float64, matrix: Float64, size: tuple[int, int]) -> Rectangle:
-    clip = np.column_stack([places, np.ones(len(places))]) @ matrix.T
+def _rectangle(points: Float64, matrix: Float64, size: tuple[int, int]) -> Rectangle:
+    """The part of a picture with points (N, 3) and a margin; all of it if one is behind the camera."""
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
     if not np.isfinite(clip).all() or (clip[:, 3] < NEAR).any():
         return (0, 0, *size)
     flat = clip[:, :2] / clip[:, 3:]
@@ -110,22 +113,12 @@ def _corners(positions: Float32) -> Float64:
     if not len(positions):
         return np.zeros((0, 3))
     # NumPy finds extremes of long rows faster than of short ones.
-    whole = len(positions) // ROW * ROW
-    rows = positions[:whole].reshape(-1, 3 * ROW) if whole else positions[:1].repeat(ROW, 0).reshape(1, -1)
-    low = np.concatenate([rows.min(axis=0).reshape(-1, 3), positions[whole:]])
-    high = np.concatenate([rows.max(axis=0).reshape(-1, 3), positions[whole:]])
+    inner = len(positions) // ROW * ROW
+    rows = positions[:inner].reshape(-1, 3 * ROW) if inner else positions[:1].repeat(ROW, 0).reshape(1, -1)
+    low = np.concatenate([rows.min(axis=0).reshape(-1, 3), positions[inner:]])
+    high = np.concatenate([rows.max(axis=0).reshape(-1, 3), positions[inner:]])
     return _box(low.min(axis=0), high.max(axis=0))
 
 
 def _box(low: Floating, high: Floating) -> Float64:
     return np.array(list(itertools.product(*zip(low, high, strict=True))), dtype=np.float64)
-
-
-def _turned(places: Float64, turn: Float64, centre: Float64) -> Float64:
-    angle = float(np.linalg.norm(turn))
-    if angle < 1e-9:
-        return places
-    axis, arm = turn / angle, places - centre
-    across = np.cross(axis, arm) * np.sin(angle) + np.outer(arm @ axis, axis) * (1 - np.cos(angle))
-    turned: Float64 = arm * np.cos(angle) + across + centre
-    return turned

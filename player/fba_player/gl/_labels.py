@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from fba.arrays import Float64, Int64, Intp, UInt8
 from fba_player.view.font import label_font
 from fba_player.view.view import Legend
-
-if TYPE_CHECKING:
-    pass
-
 
 TEXT = (240, 242, 245, 255)
 FAINT = (186, 192, 200, 255)
@@ -45,8 +39,8 @@ def legend_picture(legend: Legend, scale: float) -> UInt8:
         fill = tuple(round(255 * float(v)) for v in colour)
         draw.line((pad + column, top, pad + column, top + bar), fill=(*fill, 255))
     for share, anchor in ((0.0, "la"), (0.5, "ma"), (1.0, "ra")):
-        place = (pad + share * (columns - 1), top + bar + 4 * scale)
-        draw.text(place, _number(legend.most * share), font=small, fill=TEXT, anchor=anchor)
+        below = (pad + share * (columns - 1), top + bar + 4 * scale)
+        draw.text(below, _number(legend.most * share), font=small, fill=TEXT, anchor=anchor)
     return np.asarray(picture)
 
 
@@ -67,7 +61,7 @@ def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
     return np.asarray(picture), np.array(boxes, dtype=np.int64).reshape(-1, 4)
 
 
-def placed_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int]) -> tuple[Intp, Float64]:
+def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int]) -> tuple[Intp, Float64]:
     """Indices (M,) of the names for which there is room, and their upper left corners (M, 2), pixels.
 
     dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
@@ -79,7 +73,7 @@ def placed_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, in
         return np.zeros(0, dtype=np.intp), np.zeros((0, 2))
     reach = radius + GAP
     taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in dots[inside]]
-    chosen, corners = [], []
+    shown, corners = [], []
     for number in np.flatnonzero(inside):
         (x, y), (wide, high) = dots[number], sizes[number]
         above = [(min(max(x - wide / 2, 0.0), size[0] - wide), y - high)] if radius == 0 else []
@@ -94,10 +88,10 @@ def placed_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, in
             within = left >= 0 and top >= 0 and box[2] <= size[0] and box[3] <= size[1]
             if within and not any(_meet(box, other) for other in taken):
                 taken.append(box)
-                chosen.append(number)
+                shown.append(number)
                 corners.append((round(left), round(top)))
                 break
-    return np.array(chosen, dtype=np.intp), np.array(corners, dtype=np.float64).reshape(-1, 2)
+    return np.array(shown, dtype=np.intp), np.array(corners, dtype=np.float64).reshape(-1, 2)
 
 
 def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:

@@ -6,10 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Float32, Float64, UInt8
+from fba.arrays import Float64, UInt8
 from fba_player.gl._textures import Pictures, count_halvings
 from fba_player.gl.lod import distance, share_memory
-from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
+from fba_player.gl.resources import (
+    RecentlyUsed,
+    load_program,
+    make_texture,
+    matrix_bytes,
+    set_uniform,
+    write_buffer,
+)
 from fba_player.mesh.textures import RELIEF, skin_relief
 from fba_player.view.view import FaceMesh, FaceShape
 
@@ -25,7 +32,7 @@ class FaceRenderer:
     def __init__(self, context: Any) -> None:
         self._gl = context
         self._programs: dict[tuple[str, ...], Any] = {}
-        self._kept: dict[int, tuple[FaceShape, dict[str, Any]]] = {}
+        self._shapes = RecentlyUsed[dict[str, Any]](MOST_SHAPES, _release)
         self._reliefs: dict[int, Any] = {}
         self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
@@ -37,31 +44,27 @@ class FaceRenderer:
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
         if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
             for program in self._programs.values():
-                self._place(program)
+                self._set_camera(program)
 
     def draw(self, meshes: list[FaceMesh]) -> None:
         """Draw parts, the transparent ones last."""
         gl = self._gl
-        rest = []
         for mesh in meshes:
-            if self._parts(mesh)["see_through"]:
-                rest.append(mesh)
-            else:
+            if not mesh.shape.see_through:
                 self._draw(mesh)
-        if rest:
+        transparent = [mesh for mesh in meshes if mesh.shape.see_through]
+        if transparent:
             gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
             gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
             gl.fbo.depth_mask = False
-            for mesh in rest:
+            for mesh in transparent:
                 self._draw(mesh)
             gl.fbo.depth_mask = True
             gl.enable_only(gl.DEPTH_TEST)
 
     def close(self) -> None:
         """Free all OpenGL objects."""
-        for _, parts in self._kept.values():
-            _release(parts)
-        self._kept.clear()
+        self._shapes.clear()
         for part in (*self._reliefs.values(), *self._programs.values()):
             part.release()
         self._reliefs.clear()
@@ -70,7 +73,7 @@ class FaceRenderer:
     def _program(self, words: tuple[str, ...]) -> Any:
         if words not in self._programs:
             self._programs[words] = load_program(self._gl, "face", *words)
-            self._place(self._programs[words])
+            self._set_camera(self._programs[words])
         return self._programs[words]
 
     def _array(self, parts: dict[str, Any], words: tuple[str, ...]) -> Any:
@@ -91,7 +94,7 @@ class FaceRenderer:
             parts["arrays"][words] = self._gl.vertex_array(program, attributes, index_buffer=triangles)
         return parts["arrays"][words]
 
-    def _place(self, program: Any) -> None:
+    def _set_camera(self, program: Any) -> None:
         eye, matrix, pixel = self._camera
         set_uniform(program, "eye", tuple(float(v) for v in eye))
         if matrix:
@@ -99,7 +102,8 @@ class FaceRenderer:
         set_uniform(program, "pixel", pixel)
 
     def _draw(self, mesh: FaceMesh) -> None:
-        parts, shape = self._parts(mesh), mesh.shape
+        shape = mesh.shape
+        parts = self._shapes.get(shape, lambda: self._upload(mesh))
         _upload_vertices(mesh, parts)
         away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
         wide = self._camera[2] * away
@@ -107,13 +111,13 @@ class FaceRenderer:
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
         words = tuple(
             word
-            for word, there in (
+            for word, used in (
                 ("SMOOTH", shape.smooth),
                 ("HAIRS", shape.across is not None),
                 ("TEXTURED", picture is not None),
                 ("FINE", repeats is not None),
             )
-            if there
+            if used
         )
         program, array = self._program(words), self._array(parts, words)
         _set_shape(program, shape)
@@ -128,18 +132,7 @@ class FaceRenderer:
         if shape.closed:
             self._gl.disable(self._gl.CULL_FACE)
 
-    def _parts(self, mesh: FaceMesh) -> dict[str, Any]:
-        key = id(mesh.shape)
-        if key in self._kept:
-            self._kept[key] = self._kept.pop(key)  # most recently used
-            return self._kept[key][1]
-        while len(self._kept) >= MOST_SHAPES:
-            _release(self._kept.pop(next(iter(self._kept)))[1])
-        parts = self._uploaded(mesh)
-        self._kept[key] = (mesh.shape, parts)
-        return parts
-
-    def _uploaded(self, mesh: FaceMesh) -> dict[str, Any]:
+    def _upload(self, mesh: FaceMesh) -> dict[str, Any]:
         gl, shape, count = self._gl, mesh.shape, len(mesh.positions)
         texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
         still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
@@ -155,7 +148,6 @@ class FaceRenderer:
             parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
         parts["arrays"] = {}
         parts["pictures"] = Pictures(gl, shape, mesh.positions)
-        parts["see_through"] = shape.see_through
         parts["lit"] = None
         return parts
 
@@ -171,24 +163,17 @@ class FaceRenderer:
             from PIL import Image
 
             smaller = np.asarray(Image.fromarray(self._pixels).reduce(2**halvings))
-            texture = self._gl.texture(smaller.shape[1::-1], 3, smaller.tobytes())
-            texture.filter = (self._gl.LINEAR, self._gl.LINEAR)
-            self._reliefs[halvings] = texture
+            self._reliefs[halvings] = make_texture(self._gl, smaller)
         return self._reliefs[halvings]
 
 
 def _upload_vertices(mesh: FaceMesh, parts: dict[str, Any]) -> None:
     """Write positions and normals into a part's buffers, and its light unless that is there already."""
-    _write(parts["positions"], mesh.positions)
-    _write(parts["normals"], mesh.normals)
+    write_buffer(parts["positions"], mesh.positions)
+    write_buffer(parts["normals"], mesh.normals)
     if parts["lit"] is None or not share_memory(parts["lit"], mesh.light):
         parts["lit"] = mesh.light
-        _write(parts["light"], mesh.light)
-
-
-def _write(buffer: Any, array: Float32) -> None:
-    buffer.orphan()
-    buffer.write(np.ascontiguousarray(array, dtype="f4"))
+        write_buffer(parts["light"], mesh.light)
 
 
 def _set_shape(program: Any, shape: FaceShape) -> None:

@@ -5,41 +5,61 @@ Software OpenGL takes as long to search a whole picture for edges as to draw a f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int8, Int32, UInt8
 from fba.compiled import compiled
+from fba_player.gl.resources import RecentlyUsed
 from fba_player.view.view import FaceMesh
 
 TILE = 8
 """Size (pixels) of the tiles that are smoothed if an outline runs through them."""
 BESIDE = 1.5
 """Pixels on each side of an outline that may need smoothing."""
+MOST_SHAPES = 64
+"""Number of shapes whose edges are cached."""
 
 
+@dataclass(eq=False)
 class Edges:
-    """The edges of a triangulation: ends (E, 2), and the triangles on both sides (E, 2), -1 for none."""
+    """The edges of a triangulation, and work space for outlines.
 
-    def __init__(self, triangles: Int32) -> None:
-        corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        owner = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
-        ordered = np.sort(corners, axis=1)
-        order = np.lexsort((ordered[:, 1], ordered[:, 0]))
-        ordered, owner = ordered[order], owner[order]
-        first = np.ones(len(ordered), dtype=bool)
-        first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-        start = np.flatnonzero(first)
-        self.ends = np.ascontiguousarray(ordered[start], dtype=np.int32)
-        self.sides = np.full((len(start), 2), -1, dtype=np.int32)
-        self.sides[:, 0] = owner[start]
-        uses = np.diff(np.append(start, len(ordered)))
-        self.sides[uses == 2, 1] = owner[start[uses == 2] + 1]
-        # Copies: read-only arrays are another type, for which the loops would be compiled again.
-        self.triangles = np.array(triangles, dtype=np.int32, order="C")
-        # Work space.
-        self.seen = np.empty((0, 3), dtype=np.float32)
-        self.facing = np.empty(len(triangles), dtype=np.int8)
-        self.sway: tuple[Float32, Float32] | None = None
+    triangles: (F, 3). ends: (E, 2), vertices. sides: (E, 2), the triangles on both sides, -1 for none. seen:
+    (V, 3), projected vertices. facing: (F,), which way triangles face. sway: that of the shape, and a copy.
+    """
+
+    triangles: Int32
+    ends: Int32
+    sides: Int32
+    facing: Int8
+    seen: Float32
+    sway: tuple[Float32, Float32] | None = None
+
+
+def find_edges(triangles: Int32) -> Edges:
+    """The edges of triangles (F, 3)."""
+    corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    owner = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
+    ordered = np.sort(corners, axis=1)
+    order = np.lexsort((ordered[:, 1], ordered[:, 0]))
+    ordered, owner = ordered[order], owner[order]
+    first = np.ones(len(ordered), dtype=bool)
+    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    start = np.flatnonzero(first)
+    sides = np.full((len(start), 2), -1, dtype=np.int32)
+    sides[:, 0] = owner[start]
+    uses = np.diff(np.append(start, len(ordered)))
+    sides[uses == 2, 1] = owner[start[uses == 2] + 1]
+    return Edges(
+        # A copy: read-only arrays are another type, for which the loops would be compiled again.
+        np.array(triangles, dtype=np.int32, order="C"),
+        np.ascontiguousarray(ordered[start], dtype=np.int32),
+        sides,
+        np.empty(len(triangles), dtype=np.int8),
+        np.empty((0, 3), dtype=np.float32),
+    )
 
 
 class Outliner:
@@ -48,10 +68,8 @@ class Outliner:
     `begin` a picture, `add` meshes, and take its `tiles`.
     """
 
-    MOST_SHAPES = 64
-
     def __init__(self) -> None:
-        self._edges: dict[int, tuple[object, Edges]] = {}
+        self._edges = RecentlyUsed[Edges](MOST_SHAPES, lambda _: None)
         self._size = (1, 1)
         self._marked = np.zeros((1, 1), dtype=np.uint8)
 
@@ -67,15 +85,14 @@ class Outliner:
         """Mark the outlines of a mesh. matrix: (4, 4), world to clip space."""
         if not len(mesh.positions):
             return
-        edges = self._edges_of(mesh)
+        edges = self._edges.get(mesh.shape, lambda: find_edges(mesh.shape.triangles))
         clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
         if edges.sway is None or edges.sway[0] is not mesh.shape.sway:
             edges.sway = (mesh.shape.sway, np.array(mesh.shape.sway, dtype=np.float32, order="C"))
         if len(edges.seen) != len(mesh.positions):
             edges.seen = np.empty((len(mesh.positions), 3), dtype=np.float32)
-        places = np.ascontiguousarray(mesh.positions, dtype=np.float32)
         _add(
-            places,
+            np.ascontiguousarray(mesh.positions, dtype=np.float32),
             edges.sway[1],
             np.asarray(mesh.turn, dtype=np.float64),
             np.asarray(mesh.centre, dtype=np.float64),
@@ -94,16 +111,6 @@ class Outliner:
         corners = np.empty((6 * _runs(self._marked, self._size, np.empty((0, 2), dtype=np.float32)), 2), "f4")
         _runs(self._marked, self._size, corners)
         return corners
-
-    def _edges_of(self, mesh: FaceMesh) -> Edges:
-        key = id(mesh.shape)
-        if key in self._edges:
-            self._edges[key] = self._edges.pop(key)  # most recently used
-        else:
-            while len(self._edges) >= self.MOST_SHAPES:
-                del self._edges[next(iter(self._edges))]
-            self._edges[key] = (mesh.shape, Edges(mesh.shape.triangles))
-        return self._edges[key][1]
 
 
 @compiled

@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 from fba.arrays import Float32
+from fba_player.gl.resources import make_texture
 from fba_player.mesh.textures import texture_breadth
 from fba_player.view.view import FaceShape
 
@@ -38,11 +39,7 @@ class Pictures:
             return None
         halvings = count_halvings(self._breadth / max(self._picture.size), pixel, max(self._picture.size))
         if halvings not in self._sizes:
-            pixels = self._picture.reduced(2**halvings)
-            height, width = pixels.shape[:2]
-            texture = self._gl.texture((width, height), 4, pixels.tobytes())
-            texture.filter = (self._gl.LINEAR, self._gl.LINEAR)
-            self._sizes[halvings] = texture
+            self._sizes[halvings] = make_texture(self._gl, self._picture.reduced(2**halvings))
         return self._sizes[halvings]
 
     def close(self) -> None:

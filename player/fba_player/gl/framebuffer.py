@@ -6,7 +6,6 @@ smooths edges in the finished picture.
 
 from __future__ import annotations
 
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from fba.errors import DisplayError
 from fba_player.gl._antialias_region import Steps
 from fba_player.gl.context import import_moderngl
+from fba_player.gl.resources import load_program, write_buffer
 
 
 class Target:
@@ -45,29 +45,25 @@ class Target:
 
     def _allocate(self, samples: int) -> None:
         gl, size = self._gl, self.size
-        self._result = self._kept(gl.framebuffer([self._kept(gl.renderbuffer(size, 4))]))
-        depth = self._kept(gl.depth_renderbuffer(size, samples=samples))
+        self._result = self._own(gl.framebuffer([self._own(gl.renderbuffer(size, 4))]))
+        depth = self._own(gl.depth_renderbuffer(size, samples=samples))
         self._pass: Any = None
         self._bands: Any = None
         self._along: Any = None
         if samples:
-            colour = self._kept(gl.renderbuffer(size, 4, samples=samples))
+            colour = self._own(gl.renderbuffer(size, 4, samples=samples))
         else:
-            colour = self._kept(gl.texture(size, 4))
+            colour = self._own(gl.texture(size, 4))
             colour.filter = (gl.LINEAR, gl.LINEAR)
             colour.repeat_x = colour.repeat_y = False
-            folder = files(__package__) / "shaders"
-            texts = {
-                f"{stage}_shader": (folder / f"smooth.{suffix}").read_text(encoding="utf-8")
-                for stage, suffix in (("vertex", "vert"), ("fragment", "frag"))
-            }
-            program = self._program = self._kept(gl.program(**texts))
-            corners = self._kept(gl.buffer(np.array([-1, -1, 3, -1, -1, 3], dtype="f4").tobytes()))
-            self._pass = self._kept(gl.vertex_array(program, [(corners, "2f", "in_corner")]))
+            self._program = self._own(load_program(gl, "smooth"))
+            corners = self._own(gl.buffer(np.array([-1, -1, 3, -1, -1, 3], dtype="f4").tobytes()))
+            self._pass = self._own(gl.vertex_array(self._program, [(corners, "2f", "in_corner")]))
         self._colour = colour
-        self._drawn = self._kept(gl.framebuffer([colour], depth))
+        self._drawn = self._own(gl.framebuffer([colour], depth))
 
-    def _kept(self, part: Any) -> Any:
+    def _own(self, part: Any) -> Any:
+        """The OpenGL object, which `close` will release."""
         self._parts.append(part)
         return part
 
@@ -87,29 +83,28 @@ class Target:
             self._gl.copy_framebuffer(self._result, self._drawn)
             return self._result
         result = self._result if into is None else into
-        whole = (0, 0, *self.size)
-        rectangles = [whole] if within is None else within.rectangles
-        if whole not in rectangles:
+        everything = (0, 0, *self.size)
+        rectangles = [everything] if within is None else within.rectangles
+        if everything not in rectangles:
             self._gl.copy_framebuffer(result, self._drawn)
         result.use()
-        self._gl.viewport = whole
+        self._gl.viewport = everything
         self._gl.enable_only(self._gl.NOTHING)
         self._colour.use(0)
         for rectangle in rectangles:
             self._gl.scissor = rectangle
             self._pass.render()
         self._gl.scissor = None
-        if within is not None and len(within.bands) and whole not in rectangles:
+        if within is not None and len(within.bands) and everything not in rectangles:
             self._smooth_bands(within)
         return result
 
     def _smooth_bands(self, within: Steps) -> None:
         data = np.ascontiguousarray(within.bands, dtype="f4")
         if self._bands is None or self._bands.size < data.nbytes:
-            self._bands = self._kept(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
-            self._along = self._kept(self._gl.vertex_array(self._program, [(self._bands, "2f", "in_corner")]))
-        self._bands.orphan()
-        self._bands.write(data)
+            self._bands = self._own(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
+            self._along = self._own(self._gl.vertex_array(self._program, [(self._bands, "2f", "in_corner")]))
+        write_buffer(self._bands, data)
         self._along.render(vertices=len(data))
 
     def close(self) -> None:

@@ -15,10 +15,10 @@ from fba_player.gl._ground_shadow import ShadowCaster
 from fba_player.gl._mesh_renderer import FaceRenderer
 from fba_player.gl._silhouette import Outliner
 from fba_player.gl.lod import Details
-from fba_player.gl.programs import load_program, matrix_bytes, set_uniform
+from fba_player.gl.resources import RecentlyUsed, load_program, matrix_bytes, set_uniform, write_buffer
 from fba_player.mesh.primitives import capsule_mesh, sphere_mesh
 from fba_player.view.camera import Camera
-from fba_player.view.view import CAPSULE_FLOATS, Eye, Mesh, MeshShape, View
+from fba_player.view.view import CAPSULE_FLOATS, Eye, Mesh, View
 
 MOST_BLOBS = 8
 THROUGH = 0.16
@@ -61,9 +61,9 @@ class Renderer:
             self._programs["studio"], [(self._studio_buffer, "2f", "in_corner")]
         )
         self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
-        self._capsule_parts = self._uploaded(*capsule_mesh())
+        self._capsule_parts = self._upload(*capsule_mesh())
         self._capsules = self._capsule_array()
-        self._eye_parts = self._uploaded(*sphere_mesh())
+        self._eye_parts = self._upload(*sphere_mesh())
         self._eye = context.vertex_array(
             self._programs["eye"],
             [(self._eye_parts[0], "3f", "in_position")],
@@ -72,7 +72,7 @@ class Renderer:
         self._outliner = Outliner()
         self._details = Details()
         self._extras = ExtrasRenderer(context)
-        self._shapes: dict[int, tuple[MeshShape, list[Any]]] = {}
+        self._shapes = RecentlyUsed[list[Any]](MOST_SHAPES, _release)
         self._seen: tuple[object, ...] = ()
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
@@ -84,12 +84,12 @@ class Renderer:
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
         seen = camera.view_matrix()
-        matrix, place = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]
+        matrix, eye = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]
         pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
 
         gl.viewport = (0, 0, *size)
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
-        self._see(tuple(place.tolist()), matrix_bytes(matrix), pixel)
+        self._set_camera(tuple(eye.tolist()), matrix_bytes(matrix), pixel)
         self._draw_studio(view, matrix, size, (float(camera.target[0]), float(camera.target[2])))
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
@@ -98,15 +98,15 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        drawn = replace(view, faces=self._details.choose(view.faces, place, pixel))
-        self._faces.begin(place, matrix, pixel)
+        drawn = replace(view, faces=self._details.choose(view.faces, eye, pixel))
+        self._faces.begin(eye, matrix, pixel)
         self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
             drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
         return find_steps(drawn, matrix, size, self._outliner)
 
-    def _see(self, *seen: object) -> None:
+    def _set_camera(self, *seen: object) -> None:
         """Set the camera in all programs: its position, the matrix (4, 4) from world to clip space, and the
         size of a pixel at a distance of 1."""
         if seen == self._seen:
@@ -118,9 +118,6 @@ class Renderer:
 
     def close(self) -> None:
         """Free all OpenGL objects."""
-        for _, parts in self._shapes.values():
-            for part in parts:
-                part.release()
         self._shapes.clear()
         self._faces.close()
         if self._darkness is not None:
@@ -134,7 +131,7 @@ class Renderer:
         ):  # fmt: skip
             part.release()
 
-    def _uploaded(self, vertices: Float32, triangles: Int32) -> tuple[Any, Any]:
+    def _upload(self, vertices: Float32, triangles: Int32) -> tuple[Any, Any]:
         return self._gl.buffer(vertices.tobytes()), self._gl.buffer(triangles.tobytes())
 
     def _capsule_array(self) -> Any:
@@ -162,13 +159,13 @@ class Renderer:
         target = gl.fbo
         key = (size, view.ground, matrix.tobytes(), centre)
         if self._backdrop is None or self._backdrop[0] != key:
-            texture, kept = self._kept_backdrop(size)
-            self._backdrop = (key, texture, kept)
+            buffer, framebuffer = self._backdrop_buffer(size)
+            self._backdrop = (key, buffer, framebuffer)
             program = self._programs["studio"]
             set_uniform(program, "unproject", matrix_bytes(np.linalg.inv(matrix)))
             set_uniform(program, "ground", 1.0 if view.ground else 0.0)
             set_uniform(program, "centre", centre)
-            kept.use()
+            framebuffer.use()
             gl.viewport = (0, 0, *size)
             gl.enable_only(gl.NOTHING)
             self._studio.render()
@@ -204,7 +201,7 @@ class Renderer:
         set_uniform(self._programs["cast"], "high", cast.high)
         self._cast.render(gl.TRIANGLE_STRIP)
 
-    def _kept_backdrop(self, size: tuple[int, int]) -> tuple[Any, Any]:
+    def _backdrop_buffer(self, size: tuple[int, int]) -> tuple[Any, Any]:
         if self._backdrop is not None:
             if self._backdrop[0][0] == size:
                 return self._backdrop[1], self._backdrop[2]
@@ -214,41 +211,27 @@ class Renderer:
         return buffer, self._gl.framebuffer([buffer])
 
     def _draw_mesh(self, mesh: Mesh) -> None:
-        positions, normals, array = self._shape_parts(mesh)
-        positions.orphan()
-        positions.write(np.ascontiguousarray(mesh.positions, dtype="f4"))
-        normals.orphan()
-        normals.write(np.ascontiguousarray(mesh.normals, dtype="f4"))
+        positions, normals, array, *_ = self._shapes.get(mesh.shape, lambda: self._upload_mesh(mesh))
+        write_buffer(positions, mesh.positions)
+        write_buffer(normals, mesh.normals)
         set_uniform(self._programs["mesh"], "world", matrix_bytes(mesh.matrix))
         set_uniform(self._programs["mesh"], "two_sided", 1.0 if mesh.shape.two_sided else 0.0)
         set_uniform(self._programs["mesh"], "raised", mesh.shape.raised)
         array.render()
 
-    def _shape_parts(self, mesh: Mesh) -> tuple[Any, Any, Any]:
-        key = id(mesh.shape)
-        if key in self._shapes:
-            self._shapes[key] = self._shapes.pop(key)  # most recently used
-        else:
-            while len(self._shapes) >= MOST_SHAPES:
-                for part in self._shapes.pop(next(iter(self._shapes)))[1]:
-                    part.release()
-            gl, shape = self._gl, mesh.shape
-            positions = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
-            normals = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
-            colours = gl.buffer(np.ascontiguousarray(shape.colours, dtype="f4").tobytes())
-            triangles = gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes())
-            array = gl.vertex_array(
-                self._programs["mesh"],
-                [
-                    (positions, "3f", "in_position"),
-                    (normals, "3f", "in_normal"),
-                    (colours, "4f", "in_colour"),
-                ],
-                index_buffer=triangles,
-            )
-            self._shapes[key] = (shape, [positions, normals, array, colours, triangles])
-        parts = self._shapes[key][1]
-        return parts[0], parts[1], parts[2]
+    def _upload_mesh(self, mesh: Mesh) -> list[Any]:
+        """Buffers of positions and normals, the vertex array, and what belongs to it."""
+        gl, shape = self._gl, mesh.shape
+        positions = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
+        normals = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
+        colours = gl.buffer(np.ascontiguousarray(shape.colours, dtype="f4").tobytes())
+        triangles = gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes())
+        array = gl.vertex_array(
+            self._programs["mesh"],
+            [(positions, "3f", "in_position"), (normals, "3f", "in_normal"), (colours, "4f", "in_colour")],
+            index_buffer=triangles,
+        )
+        return [positions, normals, array, colours, triangles]
 
     def _draw_capsules(self, capsules: Float32) -> None:
         if not len(capsules):
@@ -295,3 +278,8 @@ class Renderer:
         set_uniform(program, "ball", matrix_bytes(axes))
         set_uniform(program, "tint", ball.tint)
         self._eye.render()
+
+
+def _release(parts: list[Any]) -> None:
+    for part in parts:
+        part.release()

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.arrays import Array, Float32, Float64, Int32, Intp
+from fba.arrays import Array, Float32, Float64, Int32, Int64, Intp
 from fba.face.resolve import FaceSettings, Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT
 from fba.tracks import hold
@@ -89,15 +89,7 @@ class Timeline:
         index = self.animation.index
         if not len(index):
             raise ValueError("the animation has no frames")
-        at = time * self.rate.numerator / self.rate.denominator
-        nearest = round(at)
-        if abs(at - nearest) < FRAME_ROUNDING:
-            at = float(nearest)  # a frame's own time shows that frame, whatever the rounding
-        before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), len(index) - 1)
-        after = min(before + 1, len(index) - 1)
-        gap = int(index[after]) - int(index[before])
-        share = min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
-        return before, after, share
+        return frame_position(index, self.rate, time)
 
     def time_of(self, frame: int) -> Fraction:
         """Time of a frame, by its position in the animation: seconds, exact."""
@@ -213,6 +205,24 @@ class Timeline:
 
     def _rows(self, block: int) -> slice:
         return slice(block * self.block, (block + 1) * self.block)
+
+
+def frame_position(
+    index: Int64, rate: Fraction, time: float, rounding: float = FRAME_ROUNDING
+) -> tuple[int, int, float]:
+    """(frame, next frame, weight of the next) at a time in seconds, as `Timeline.position`.
+
+    index: (T,), ascending numbers of frames at this rate. rounding: frame periods within which a time
+    counts as that of a frame.
+    """
+    at = time * rate.numerator / rate.denominator
+    if abs(at - round(at)) < rounding:
+        at = float(round(at))  # a frame's own time shows that frame, whatever the rounding
+    last = len(index) - 1
+    before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), last)
+    after = min(before + 1, last)
+    gap = int(index[after]) - int(index[before])
+    return before, after, min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
 
 
 def _shorten_turns(way: Float64) -> Float64:

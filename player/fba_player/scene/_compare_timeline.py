@@ -8,18 +8,18 @@ from fractions import Fraction
 
 import numpy as np
 
-from fba.arrays import Float32, Float64, Int64
-from fba_player.playback.timeline import FRAME_ROUNDING, Timeline
+from fba.arrays import Float64, Int64
+from fba_player.playback.timeline import FRAME_ROUNDING, Timeline, frame_position
 
 FINEST = 1_000_000
 """Greatest common frame rate of performances with different rates."""
 
 
 class CompareTimeline:
-    """The frames of all performances at their own times. A `fba_player.view.protocols.Course`.
+    """The frames of all performances at their own times. A `fba_player.view.protocols.Times`.
 
     A performance that does not overlap the first, as with time codes of different hours, is shifted to begin
-    with it. A frame is every moment at which one of them has a frame. rate, faps and baps are the first's.
+    with it. A frame is every moment at which one of them has a frame. The rate is the first's.
     """
 
     def __init__(self, timelines: Sequence[Timeline]) -> None:
@@ -89,22 +89,7 @@ class CompareTimeline:
         if not math.isfinite(time):
             raise ValueError(f"the time must be a finite number of seconds, not {time}")
         rate, index = self._frames()
-        at = time * rate.numerator / rate.denominator
-        if abs(at - round(at)) < FRAME_ROUNDING * float(rate / self.rate):
-            at = float(round(at))
-        last = len(index) - 1
-        before = min(max(int(np.searchsorted(index, at, side="right")) - 1, 0), last)
-        after = min(before + 1, last)
-        gap = int(index[after]) - int(index[before])
-        return before, after, min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
-
-    def faps(self, time: float) -> Float32:
-        """float32 (68,): FAPs of the first performance."""
-        return self.timelines[0].faps(self.own_time(0, time))
-
-    def baps(self, time: float) -> Float64:
-        """float64 (296,): BAPs of the first performance."""
-        return self.timelines[0].baps(self.own_time(0, time))
+        return frame_position(index, rate, time, FRAME_ROUNDING * float(rate / self.rate))
 
     def times(self) -> Float64:
         """float64 (T,): times of all frames, seconds."""
@@ -125,12 +110,12 @@ class CompareTimeline:
             )
             if rate > FINEST:
                 rate = Fraction(FINEST)
-            found = []
+            indices = []
             for one, later in self._shown():
                 step, first = rate / one.rate, later * rate
                 index = one.animation.index * step.numerator // step.denominator
-                found.append(index + first.numerator // first.denominator)
-            self._merged = (arrived, rate, np.unique(np.concatenate(found)))
+                indices.append(index + first.numerator // first.denominator)
+            self._merged = (arrived, rate, np.unique(np.concatenate(indices)))
         return self._merged[1:]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fba_player.playback.transport import Transport
 from fba_player.session.session import Session
 
 SHIFT = 0.02
@@ -25,22 +26,6 @@ def act(session: Session, name: str) -> bool:
     return True
 
 
-def _toggle(session: Session) -> None:
-    session.transport.toggle()
-
-
-def _stop(session: Session) -> None:
-    session.transport.stop()
-
-
-def _first(session: Session) -> None:
-    session.transport.first()
-
-
-def _last(session: Session) -> None:
-    session.transport.last()
-
-
 def _mark_in(session: Session) -> None:
     session.transport.mark_in = session.transport.time
 
@@ -49,43 +34,15 @@ def _mark_out(session: Session) -> None:
     session.transport.mark_out = session.transport.time
 
 
-def _clear_marks(session: Session) -> None:
-    session.transport.clear_marks()
-
-
-def _loop(session: Session) -> None:
-    session.transport.toggle_loop()
-
-
-def _faster(session: Session) -> None:
-    session.transport.faster()
-
-
-def _slower(session: Session) -> None:
-    session.transport.slower()
-
-
-def _normal_speed(session: Session) -> None:
-    session.transport.set_speed(1.0)
-
-
 def _interpolate(session: Session) -> None:
     transport = session.transport
     transport.interpolate = not transport.interpolate
     session.say("smooth between frames" if transport.interpolate else "frame by frame", about="motion")
 
 
-def _reset_view(session: Session) -> None:
-    session.viewpoint.reset()
-
-
 def _follow(session: Session) -> None:
     session.viewpoint.toggle_follow(session.transport.time)
     session.say("the camera follows" if session.viewpoint.follow else "the camera stays", about="camera")
-
-
-def _points(session: Session) -> None:
-    session.toggle_view()
 
 
 def _mute(session: Session) -> None:
@@ -114,12 +71,8 @@ def _bare(session: Session) -> None:
     session.bare = not session.bare
 
 
-def _close(session: Session) -> None:
-    session.leave()
-
-
-def _escape(session: Session) -> None:
-    session.escape()
+def _on_transport(action: Callable[[Transport], None]) -> Callable[[Session], None]:
+    return lambda session: action(session.transport)
 
 
 def _step(frames: int) -> Callable[[Session], None]:
@@ -131,34 +84,34 @@ def _request(what: str) -> Callable[[Session], None]:
 
 
 _ACTIONS: dict[str, Callable[[Session], None]] = {
-    "toggle": _toggle,
-    "stop": _stop,
+    "toggle": _on_transport(Transport.toggle),
+    "stop": _on_transport(Transport.stop),
     "back": _step(-1),
     "on": _step(1),
     "back10": _step(-10),
     "on10": _step(10),
-    "first": _first,
-    "last": _last,
+    "first": _on_transport(Transport.first),
+    "last": _on_transport(Transport.last),
     "mark_in": _mark_in,
     "mark_out": _mark_out,
-    "clear_marks": _clear_marks,
-    "loop": _loop,
-    "faster": _faster,
-    "slower": _slower,
-    "normal_speed": _normal_speed,
+    "clear_marks": _on_transport(Transport.clear_marks),
+    "loop": _on_transport(Transport.toggle_loop),
+    "faster": _on_transport(Transport.faster),
+    "slower": _on_transport(Transport.slower),
+    "normal_speed": lambda session: session.transport.set_speed(1.0),
     "interpolate": _interpolate,
-    "reset_view": _reset_view,
+    "reset_view": lambda session: session.viewpoint.reset(),
     "follow": _follow,
-    "points": _points,
+    "points": Session.toggle_view,
     "mute": _mute,
     "sound_earlier": _shift_sound(-SHIFT),
     "sound_later": _shift_sound(SHIFT),
     "bare": _bare,
-    "close": _close,
-    "escape": _escape,
+    "close": Session.leave,
+    "escape": Session.escape,
     **{name: _request(name) for name in ("screenshot", "transparent", "record", "fullscreen")},
 }
 _ACTIONS_WITH_NAME: dict[str, Callable[[Session, str], None]] = {
     "camera": lambda session, name: session.viewpoint.preset(name),
-    "panel": lambda session, name: session.toggle_panel(name),
+    "panel": Session.toggle_panel,
 }

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fba.animation import Animation
+from fba.arrays import Float32, Float64
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.playback.timeline import Timeline
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
-from fba_player.session.puppet import Baps, Faps, Puppet
+from fba_player.session.puppet import Puppet
 from fba_player.session.takes import TakeRecorder, Takes, take_rate
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
     from fba_player.session.session import Session
 
 NEUTRAL_SECONDS = 10
-WHAT = "the last take"
-"""Name of a take that is not saved, in the question before the window closes."""
+UNSAVED_TAKE = "the last take"
+"""Name of a take that is not saved, in the warning before the window closes."""
 
 
 class Performer:
@@ -77,18 +78,18 @@ class Performer:
         self.session.rolling.discard("take")
         if recorder is not None and len(recorder):
             self.takes.add(recorder.take(f"take {len(self.takes) + 1}"))
-            self.session.unsaved.add(WHAT)
+            self.session.unsaved.add(UNSAVED_TAKE)
 
     def undo(self) -> None:
         """Delete the last take."""
         self.stop()
         self.takes.undo()
-        self.session.unsaved.discard(WHAT)
+        self.session.unsaved.discard(UNSAVED_TAKE)
 
     def save(self, name: str) -> tuple[Path, str]:
         """Write the last take with the BAP steps of the source; returns and raises as `Takes.save`."""
         saved = self.takes.save(name, bap_steps=self.session.source.bap_steps)
-        self.session.unsaved.discard(WHAT)
+        self.session.unsaved.discard(UNSAVED_TAKE)
         return saved
 
     def _begin(self) -> None:
@@ -96,7 +97,7 @@ class Performer:
         self.session.rolling.add("take")
         self.attach()
 
-    def _hook(self, faps: Faps, baps: Baps) -> None:
+    def _hook(self, faps: Float32, baps: Float64) -> None:
         seconds = self.session.clock() - self._begun
         if self._shown is not None:
             if seconds > self._shown.duration:

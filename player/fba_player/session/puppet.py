@@ -17,9 +17,6 @@ from fba.parameters import (
     VISEME_SELECT_MAX,
 )
 
-Faps = Float32
-Baps = Float64
-
 
 @dataclass(frozen=True, slots=True)
 class Viseme:
@@ -69,10 +66,10 @@ class Puppet:
         self._viseme, self._expression = Viseme(), Expression()
         self._spoken = np.zeros(FAP_COUNT, np.float32)
         self._felt = np.zeros(FAP_COUNT, np.float32)
-        self.motion: tuple[Faps, Baps] = (np.zeros(FAP_COUNT, np.float32), np.zeros(BAP_COUNT))
-        self.shown: tuple[Faps, Baps] = (np.zeros(FAP_COUNT, np.float32), np.zeros(BAP_COUNT))
+        self.motion: tuple[Float32, Float64] = (np.zeros(FAP_COUNT, np.float32), np.zeros(BAP_COUNT))
+        self.shown: tuple[Float32, Float64] = (np.zeros(FAP_COUNT, np.float32), np.zeros(BAP_COUNT))
 
-    def __call__(self, faps: Faps, baps: Baps) -> None:
+    def __call__(self, faps: Float32, baps: Float64) -> None:
         """Change FAPs (68,) and BAPs (296,) in place."""
         self.motion = (faps.copy(), baps.copy())
         if self.speaks:

@@ -9,7 +9,7 @@ import math
 import time as wall
 import warnings
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,9 +31,7 @@ from fba_player.view.view import View
 if TYPE_CHECKING:
     from fba_player.sound.player import Audio
 
-Faps = Float32
-Baps = Float64
-Hook = Callable[[Faps, Baps], None]
+Hook = Callable[[Float32, Float64], None]
 
 NOTICE_SECONDS = 4.0
 LEAVING = 6.0
@@ -58,26 +56,26 @@ class Notice:
 
 @dataclass
 class Selection:
-    """The FAPs and BAPs that the user has chosen, by number, in the order of their choice."""
+    """The FAPs and BAPs that the user has selected, by number, in the order of selection."""
 
     faps: list[int] = field(default_factory=list)
     baps: list[int] = field(default_factory=list)
 
     def toggle(self, kind: str, number: int) -> None:
         """Add a parameter to the selection, or remove it. kind: "fap" or "bap"."""
-        chosen = self.faps if kind == "fap" else self.baps
-        if number in chosen:
-            chosen.remove(number)
+        selected = self.faps if kind == "fap" else self.baps
+        if number in selected:
+            selected.remove(number)
         else:
-            chosen.append(number)
+            selected.append(number)
 
 
 class Session:
     """The state that the window and its panels share.
 
     scene, transport, viewpoint: what is shown, its current time, and the camera. source: the file behind it.
-    selection: chosen FAPs and BAPs. open: names of the open panels. bare: whether everything but the picture
-    is hidden. size: of the picture in pixels. scale: pixels per point of the display.
+    selection: FAPs and BAPs. open: names of the open panels. bare: whether everything but the picture is
+    hidden. size: of the picture in pixels. scale: pixels per point of the display.
 
     before_frame: functions called as hook(faps, baps) before each picture; they may change the values that
     will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
@@ -122,7 +120,7 @@ class Session:
         self.audio: Audio | None = None
         self.sound: PathLike | None = None
         self.sound_offset = 0.0
-        self.values: tuple[Faps, Baps] = (np.zeros(68, np.float32), np.zeros(296))
+        self.values: tuple[Float32, Float64] = (np.zeros(68, np.float32), np.zeros(296))
         self.clock = clock
         self.last_input = clock()
         self._notices: list[Notice] = []
@@ -202,11 +200,14 @@ class Session:
     @property
     def restless(self) -> bool:
         """Whether the picture changes without input of the user."""
-        going = self.clock() + NOTICE_FADES
-        leaving = any(notice.until < going for notice in self._notices)
-        filming = self.recording is not None
-        moving = self.transport.playing or self.viewpoint.gliding
-        return moving or bool(self.rolling) or filming or leaving
+        fades_from = self.clock() + NOTICE_FADES
+        return (
+            self.transport.playing
+            or self.viewpoint.gliding
+            or bool(self.rolling)
+            or self.recording is not None
+            or any(notice.until < fades_from for notice in self._notices)
+        )
 
     def shift_sound(self, seconds: float) -> None:
         """Let the sound begin so many seconds later than now; earlier if negative."""
@@ -230,22 +231,17 @@ class Session:
         if isinstance(self.scene, Scene):
             self.scene.view = "figure" if self.scene.view == "points" else "points"
 
-    def switch_table(self) -> Mapping[str, Switch]:
-        """The scene's switches by name."""
-        return SWITCHES
-
     def switch_key(self, switch: Switch) -> str:
         """The key of a switch; "" if it has none, or the window uses that key for something else."""
         return "" if switch.key.lower() in by_name() else switch.key
 
     def switch_keys(self) -> list[tuple[str, str]]:
         """(key, label) of all switches that have a key."""
-        table = self.switch_table().values()
-        return [(self.switch_key(one), one.label) for one in table if self.switch_key(one)]
+        return [(self.switch_key(one), one.label) for one in SWITCHES.values() if self.switch_key(one)]
 
     def press_switch(self, key: str) -> bool:
         """Turn the switch with this key to its next value; returns False if there is none."""
-        for name, switch in self.switch_table().items():
+        for name, switch in SWITCHES.items():
             if self.switch_key(switch).lower() == key:
                 self.touched()
                 self.scene.switches.press(name)

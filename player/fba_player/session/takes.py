@@ -14,9 +14,6 @@ from fba.errors import FormatError, RangeError
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP
 from fba.tracks import BodyTrack, FaceTrack
 
-Faps = Float32
-Baps = Float64
-
 RATE = Fraction(25)
 """Frames per second of a take where the rate of the animation is outside of `RATES`."""
 RATES = (5, 120)
@@ -47,14 +44,14 @@ class TakeRecorder:
         self.seconds = 0.0
         self.full = False
         self._face, self._body = face, body
-        self._faps: list[Faps] = []
-        self._baps: list[Baps] = []
-        self._last: tuple[float, Faps, Baps] | None = None
+        self._faps: list[Float32] = []
+        self._baps: list[Float64] = []
+        self._last: tuple[float, Float32, Float64] | None = None
 
     def __len__(self) -> int:
         return len(self._faps)
 
-    def add(self, seconds: float, faps: Faps, baps: Baps) -> None:
+    def add(self, seconds: float, faps: Float32, baps: Float64) -> None:
         """Add FAPs (68,) and BAPs (296,) shown `seconds` after the take began.
 
         After `LONGEST` nothing more is added, and `full` is set. Raises ValueError if times go back.
@@ -130,10 +127,10 @@ class Takes:
 
     def free_name(self, name: str = "take") -> str:
         """`name`, or `name-2` and so on: the first that no file has yet."""
-        number, found = 2, name
-        while self.path(found).exists():
-            found, number = f"{name}-{number}", number + 1
-        return found
+        number, free = 2, name
+        while self.path(free).exists():
+            free, number = f"{name}-{number}", number + 1
+        return free
 
     def save(self, name: str, *, bap_steps: str = "iso") -> tuple[Path, str]:
         """Write the last take; returns its path, and the table of BAP steps that readers need.

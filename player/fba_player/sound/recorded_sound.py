@@ -16,7 +16,7 @@ from fba_player.playback.transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.pyav import import_av
-from fba_player.sound.soundtrack import AAC_RATES, BLOCK
+from fba_player.sound.soundtrack import AAC_RATES, BLOCK, make_frame
 
 PIECE = 1.0
 """Most seconds mixed at once."""
@@ -85,9 +85,7 @@ class FilmSound:
                 part = part[: min(samples, BLOCK)]
             samples -= len(part)
             block = np.ascontiguousarray(part.T, dtype=np.float32) / np.float32(32768)
-            frame = self._av.AudioFrame.from_ndarray(block, format="fltp", layout=self.layout)
-            frame.sample_rate = self.rate
-            yield frame
+            yield make_frame(self._av, block, self.layout, self.rate)
 
     def close(self) -> None:
         """Close the file; safe to call twice."""
@@ -97,6 +95,6 @@ class FilmSound:
         """Samples int16 (count, 2) of the file; zeros outside."""
         taken = np.zeros((count, CHANNELS), dtype=np.int16)
         first = min(max(-start, 0), count)
-        found = self._file.read(start + first, count - first)
-        taken[first : first + len(found)] = found
+        samples = self._file.read(start + first, count - first)
+        taken[first : first + len(samples)] = samples
         return taken

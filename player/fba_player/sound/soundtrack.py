@@ -74,10 +74,7 @@ class Soundtrack:
     def frames(self, samples: int) -> Iterator[Any]:
         """The next samples as `av.AudioFrame`s ("fltp") of at most `BLOCK` samples, without times."""
         for start in range(0, samples, BLOCK):
-            block = self.take(min(BLOCK, samples - start))
-            frame = self._av.AudioFrame.from_ndarray(block, format="fltp", layout=self.layout)
-            frame.sample_rate = self.rate
-            yield frame
+            yield make_frame(self._av, self.take(min(BLOCK, samples - start)), self.layout, self.rate)
 
     def take(self, samples: int) -> Float32:
         """The next samples, float32 (channels, samples), -1..1; zeros after the end of the file."""
@@ -111,6 +108,13 @@ class Soundtrack:
             yield from resampler.resample(None)
         except (self._av.error.FFmpegError, ValueError) as error:  # or its format changes on the way
             raise FormatError(f"the sound is damaged: {error}", path=self._path) from error
+
+
+def make_frame(av: Any, samples: Float32, layout: str, rate: int) -> Any:
+    """An `av.AudioFrame` ("fltp") of samples, float32 (channels, samples), without a time."""
+    frame = av.AudioFrame.from_ndarray(samples, format="fltp", layout=layout)
+    frame.sample_rate = rate
+    return frame
 
 
 def check_sound(path: PathLike) -> None:

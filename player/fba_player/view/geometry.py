@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float32, Float64
+from fba.arrays import Float32, Float64, Floating
 from fba_player.view.view import FaceMesh
 
 
@@ -24,7 +24,7 @@ def world_normals(mesh: FaceMesh) -> Float32:
     return unit
 
 
-def turn_partly(positions: Float32, sway: Float32, turn: Float64, centre: Float64) -> Float64:
+def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Float64) -> Float64:
     """float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of a rotation.
 
     turn: (3,), the rotation's axis times its angle.

@@ -8,7 +8,6 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Generic, Protocol, TypeVar
 
-from fba.arrays import Float32, Float64
 from fba_player.view.camera import Camera
 from fba_player.view.switches import Switches
 from fba_player.view.view import View
@@ -53,16 +52,6 @@ class Times(Protocol):
 
     def position(self, time: float) -> tuple[int, int, float]:
         """(frame, next frame, weight of the next) at a time."""
-
-
-class Course(Times, Protocol):
-    """FAPs and BAPs of a performance at any time."""
-
-    def faps(self, time: float) -> Float32:
-        """float32 (68,) as `fba.face.resolve` gives them; zeros without a face."""
-
-    def baps(self, time: float) -> Float64:
-        """float64 (296,); zeros without a body."""
 
 
 Own = TypeVar("Own", bound=Times)

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from fba_player.session.controls import Controls
+from fba_player.session.keys import by_name
 from fba_player.session.session import Session
+from fba_player.window.display import decode
 
 CURSORS = {
     "text_input": "IBEAM_CURSOR",
@@ -84,7 +86,7 @@ class GlfwInput:
 
     def on_drop(self, window: Any, paths: list[str]) -> None:
         """Handle files that were dropped onto the window; see `Session.drop`."""
-        self._session.drop(tuple(Path(_decode(path)) for path in paths))
+        self._session.drop(tuple(Path(decode(path)) for path in paths))
         self._on_input()
 
     def on_character(self, window: Any, character: int) -> None:
@@ -159,7 +161,7 @@ class GlfwInput:
         word = self._key_names.get(key)
         if word is None:
             text = glfw.get_key_name(key, code)  # what the user's own keyboard layout has there
-            word = _decode(text).lower() if text else None
+            word = decode(text).lower() if text else None
             if word is None or (key in self._us_layout and not self._has_meaning(word)):
                 word = self._us_layout.get(key, word)
         if word is None:
@@ -175,11 +177,7 @@ class GlfwInput:
         return x * size[0] / max(wide, 1), y * size[1] / max(high, 1)
 
     def _has_meaning(self, word: str) -> bool:
-        from fba_player.session.keys import by_name
-
-        return word in by_name() or any(
-            self._session.switch_key(one).lower() == word for one in self._session.switch_table().values()
-        )
+        return word in by_name() or any(key.lower() == word for key, _ in self._session.switch_keys())
 
     def _send_key_to_imgui(self, key: int, action: int, modifiers: int) -> None:
         from imgui_bundle import imgui
@@ -209,7 +207,3 @@ def _imgui_keys(glfw: Any) -> dict[int, Any]:
         **{letter: letter.lower() for letter in "ACVXYZ"},
     }  # fmt: skip
     return {getattr(glfw, f"KEY_{name}"): getattr(imgui.Key, word) for name, word in words.items()}
-
-
-def _decode(value: bytes | str) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fba_player.gl.programs import load_program
+from fba_player.gl.resources import load_program
 from fba_player.session.controls import BAR_HEIGHT, Controls
 from fba_player.session.keys import keys
+from fba_player.view.font import label_font
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-    from PIL.ImageFont import FreeTypeFont, ImageFont
 
 TEXT = (236, 239, 243, 255)
 FAINT = (176, 183, 192, 255)
@@ -33,7 +33,8 @@ class Overlay:
         self._program = load_program(context, "overlay")
         self._square = context.buffer(reserve=4 * 4 * 4, dynamic=True)
         self._array = context.vertex_array(self._program, [(self._square, "2f 2f", "in_place", "in_texture")])
-        self._textures: dict[str, tuple[object, Any]] = {}
+        self._textures: dict[str, Any] = {}
+        self._help: tuple[float, Image] | None = None
 
     def draw(self, controls: Controls) -> None:
         """Draw the timeline and status, and the help if it is open."""
@@ -42,37 +43,29 @@ class Overlay:
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA
         bar = bar_picture(controls)
-        self._show("bar", None, bar, 0, height - bar.height, session.size)
+        self._show("bar", bar, 0, height - bar.height, session.size)
         if "help" in session.open:
-            key = (session.scale,)
-            cached = self._textures.get("help")
-            panel = None if cached is not None and cached[0] == key else help_picture(session.scale)
-            wide, high = panel.size if panel is not None else cached[1].size  # type: ignore[index]
-            self._show(
-                "help", key, panel, max((width - wide) // 2, 0), max((height - high) // 2, 0), session.size
-            )
+            if self._help is None or self._help[0] != session.scale:
+                self._help = (session.scale, help_picture(session.scale))
+            panel = self._help[1]
+            left, top = max((width - panel.width) // 2, 0), max((height - panel.height) // 2, 0)
+            self._show("help", panel, left, top, session.size)
 
     def close(self) -> None:
         """Release its resources."""
-        for _, texture in self._textures.values():
-            texture.release()
-        self._textures.clear()
-        for part in (self._array, self._square, self._program):
+        for part in (*self._textures.values(), self._array, self._square, self._program):
             part.release()
+        self._textures.clear()
 
-    def _show(
-        self, name: str, key: object, picture: Image | None, x: int, y: int, size: tuple[int, int]
-    ) -> None:
-        texture = self._textures[name][1] if name in self._textures else None
-        if picture is not None:
-            if texture is None or texture.size != picture.size:
-                if texture is not None:
-                    texture.release()
-                texture = self._gl.texture(picture.size, 4)
-                texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
-            texture.write(picture.tobytes())
-            self._textures[name] = (key, texture)
-        assert texture is not None
+    def _show(self, name: str, picture: Image, x: int, y: int, size: tuple[int, int]) -> None:
+        """Draw a picture with its upper left corner at x, y in a framebuffer of this size."""
+        texture = self._textures.get(name)
+        if texture is None or texture.size != picture.size:
+            if texture is not None:
+                texture.release()
+            texture = self._textures[name] = self._gl.texture(picture.size, 4)
+            texture.filter = (self._gl.NEAREST, self._gl.NEAREST)
+        texture.write(picture.tobytes())
         wide, high = texture.size
         corners = [(x, y, 0, 0), (x + wide, y, 1, 0), (x, y + high, 0, 1), (x + wide, y + high, 1, 1)]
         self._square.write(np.array(corners, dtype="f4").tobytes())
@@ -129,16 +122,3 @@ def help_picture(scale: float) -> Image:
         draw.text((x, y), row.shown, font=font, fill=TEXT)
         draw.text((x + 136 * scale, y), row.does, font=font, fill=FAINT)
     return picture
-
-
-_FONTS: dict[int, FreeTypeFont | ImageFont] = {}
-
-
-def label_font(size: float) -> FreeTypeFont | ImageFont:
-    """Pillow's built-in font, which is the same on every machine. size: pixels."""
-    from PIL import ImageFont
-
-    pixels = max(round(size), 6)
-    if pixels not in _FONTS:
-        _FONTS[pixels] = ImageFont.load_default(pixels)
-    return _FONTS[pixels]

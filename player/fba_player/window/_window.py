@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time as wall
 import warnings
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from fba.atomic import PathLike
@@ -170,9 +169,7 @@ class Window:
     def __enter__(self) -> Window:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _open(self, size: tuple[int, int]) -> None:

@@ -30,15 +30,16 @@ def start_glfw(problems: list[str]) -> Any:
             f"the window needs the Python package glfw, which cannot be used: {error}. "
             f"{cure(error, 'glfw')}. {HOW_WITHOUT}"
         ) from error
-    glfw.set_error_callback(lambda code, text: problems.append(_decode(text)))
+    glfw.set_error_callback(lambda code, text: problems.append(decode(text)))
     if not glfw.init():
         reason = problems[-1] if problems else "there is no display"
         raise DisplayError(f"no window can be opened: {reason}. {HOW_WITHOUT}")
     return glfw
 
 
-def _decode(value: bytes | str) -> str:
-    return value.decode(errors="replace") if isinstance(value, bytes) else value
+def decode(value: bytes | str) -> str:
+    """Text from glfw, which may be bytes in UTF-8."""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
 
 
 class FullScreen:

@@ -11,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.player import to_pyrender
 from fba_player.export import pyrender_bridge
-from fba_player.export.pyrender_bridge import _numpy_1_names, sway_with_head
+from fba_player.export.pyrender_bridge import _numpy_1_names
 
 BOTH = """
 import json, sys
@@ -105,19 +104,3 @@ def test_what_numpy_has_dropped_is_lent_and_taken_back() -> None:
     with pytest.raises(KeyError), _numpy_1_names():
         raise KeyError
     assert not hasattr(np, "infty")
-
-
-def test_the_neck_bends_between_shoulders_and_head() -> None:
-    random = np.random.default_rng(3)
-    places, centre = random.normal(size=(20, 3)), np.array([0.1, -0.4, 0.2])
-    turn, sway = np.array([0.5, -0.8, 0.3]), np.linspace(0, 1, 20)
-    wanted = [
-        centre + Rotation.from_rotvec(turn * share).apply(place - centre)
-        for place, share in zip(places, sway, strict=True)
-    ]
-    np.testing.assert_allclose(
-        sway_with_head(places, sway.astype(np.float32), turn, centre), wanted, atol=1e-6
-    )
-    np.testing.assert_array_equal(
-        sway_with_head(places, sway.astype(np.float32), np.zeros(3), centre), places
-    )

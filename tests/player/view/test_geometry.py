@@ -16,7 +16,7 @@ from fba_player.gl._antialias_region import bounding_rectangles
 from fba_player.gl._silhouette import TILE, Outliner
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.view.camera import Camera
-from fba_player.view.geometry import rotation_vector
+from fba_player.view.geometry import rotation_vector, turn_partly
 from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, View
 
 
@@ -141,3 +141,15 @@ def test_the_outline_of_a_ball_is_a_circle() -> None:
     assert ((high - low).prod(axis=1)).sum() < 2 * np.pi * radius * TILE * 2
     outliner.begin(size)
     assert len(outliner.tiles()) == 0
+
+
+def test_the_neck_bends_between_shoulders_and_head() -> None:
+    random = np.random.default_rng(3)
+    places, centre = random.normal(size=(20, 3)), np.array([0.1, -0.4, 0.2])
+    turn, sway = np.array([0.5, -0.8, 0.3]), np.linspace(0, 1, 20)
+    wanted = [
+        centre + Rotation.from_rotvec(turn * share).apply(place - centre)
+        for place, share in zip(places, sway, strict=True)
+    ]
+    np.testing.assert_allclose(turn_partly(places, sway.astype(np.float32), turn, centre), wanted, atol=1e-6)
+    np.testing.assert_array_equal(turn_partly(places, sway.astype(np.float32), np.zeros(3), centre), places)

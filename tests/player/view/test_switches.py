@@ -16,7 +16,7 @@ from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, point_row
 from fba.player import Camera, Offscreen, Scene
 from fba_player.figure.face import FaceFigure, build_figure
-from fba_player.gl._labels import placed_names
+from fba_player.gl._labels import place_names
 from fba_player.scene._fap_heatmap import FapHeatmap
 from fba_player.scene._wireframe import unique_edges
 from fba_player.scene.scene import SWITCHES
@@ -276,7 +276,7 @@ class TestNames:
     def test_each_finds_room_beside_its_dot(self) -> None:
         dots = np.array([[50.0, 50.0], [56.0, 50.0], [150.0, 80.0], [np.nan, np.nan], [198.0, 20.0]])
         sizes = np.full((5, 2), (30, 12))
-        chosen, corners = placed_names(dots, sizes, 3.0, (200, 100))
+        chosen, corners = place_names(dots, sizes, 3.0, (200, 100))
         assert 3 not in chosen
         assert {2, 4} <= set(chosen.tolist())
         boxes = np.concatenate([corners, corners + np.array([30, 12])], axis=1)
@@ -289,12 +289,12 @@ class TestNames:
     def test_without_a_dot_it_stands_above_its_place(self) -> None:
         sizes = np.array([[30, 12]])
         for x, left in ((100.0, 85.0), (4.0, 0.0), (197.0, 170.0)):  # the last two would leave the picture
-            _, corners = placed_names(np.array([[x, 50.0]]), sizes, 0.0, (200, 100))
+            _, corners = place_names(np.array([[x, 50.0]]), sizes, 0.0, (200, 100))
             assert corners.tolist() == [[left, 38.0]]
 
     def test_where_many_are_in_view_none_is_named(self) -> None:
         dots = np.stack(np.meshgrid(np.arange(10) * 40.0, np.arange(10) * 40.0), axis=-1).reshape(-1, 2)
-        assert len(placed_names(dots, np.full((100, 2), 10), 3.0, (400, 400))[0]) == 0
+        assert len(place_names(dots, np.full((100, 2), 10), 3.0, (400, 400))[0]) == 0
 
 
 def pictures(subject: Animation, *switches: dict[str, Any], **more: Any) -> list[npt.NDArray[np.int64]]:

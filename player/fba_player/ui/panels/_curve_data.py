@@ -10,6 +10,7 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64
 from fba.face.resolve import FaceSettings, Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
+from fba_player.ui.panels._puppet_rows import reach
 
 BLOCK = 512
 """Frames of a face resolved at once: about two milliseconds."""
@@ -114,7 +115,7 @@ class Courses:
             span = shown.max(axis=0) - shown.min(axis=0)
             weight = np.where(animation.face.mask[: self._done].any(axis=0), 1.0, FILLED_IN_WEIGHT)
             found += [
-                (float(span[number - 1] * weight[number - 1]) / fap_reach(number), "fap", number)
+                (float(span[number - 1] * weight[number - 1]) / reach(number), "fap", number)
                 for number in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1)
             ]
         if animation.body is not None and frames:
@@ -161,13 +162,6 @@ def amount(kind: str, number: int, value: float) -> tuple[str, str]:
     if row.unit in ("AU", "1e-5 rad"):
         return f"{np.degrees(value * 1e-5):.1f}", "deg"
     return f"{value:.0f}", "" if row.unit == "user defined" else row.unit
-
-
-def fap_reach(number: int) -> float:
-    """Typical strong motion of a FAP, in its unit: that of the gallery."""
-    from fba_player.ui.panels._puppet_rows import reach
-
-    return reach(number)
 
 
 def bap_reach(number: int) -> float:

@@ -8,7 +8,7 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.ui.panels.panel import Panel, heading, tooltip
-from fba_player.view.switches import Switch, Switches
+from fba_player.view.switches import SWITCHES, Switch, Switches
 
 
 class ViewPanel(Panel):
@@ -26,12 +26,9 @@ class ViewPanel(Panel):
                     imgui.same_line()
                 if imgui.radio_button(text, scene.view == name):
                     scene.view = name
-        table = session.switch_table()
-        if not table:
-            return
         heading("Switches")
         switches = scene.switches
-        for switch in table.values():
+        for switch in SWITCHES.values():
             if switch.kind == "flag":
                 changed, on = imgui.checkbox(switch.label, bool(switches[switch.name]))
                 if changed:
@@ -43,7 +40,7 @@ class ViewPanel(Panel):
             tooltip(switch.description, session.switch_key(switch))
         if switches.changed and imgui.button("As at the beginning", (-1, 0)):
             for name in switches.changed:
-                scene.show(name, table[name].default)
+                scene.show(name, SWITCHES[name].default)
 
 
 def _choice(switch: Switch, switches: Switches) -> None:

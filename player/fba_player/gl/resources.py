@@ -1,0 +1,89 @@
+"""Shader programs and their uniforms, buffers, textures, and a cache of such OpenGL objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from importlib.resources import files
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from fba.arrays import Array, UInt8
+
+Value = TypeVar("Value")
+
+
+def load_program(context: Any, name: str, *defined: str) -> Any:
+    """The program of shaders/NAME.vert and NAME.frag on a moderngl context. defined: names to
+    define for the preprocessor."""
+    folder = files(__package__) / "shaders"
+    lighting = (folder / "lighting.glsl").read_text(encoding="utf-8")
+    sources = {
+        stage: (folder / f"{name}.{suffix}")
+        .read_text(encoding="utf-8")
+        .replace("//include lighting.glsl", "".join(f"#define {word}\n" for word in defined) + lighting)
+        for stage, suffix in (("vertex_shader", "vert"), ("fragment_shader", "frag"))
+    }
+    return context.program(**sources)
+
+
+def set_uniform(program: Any, name: str, value: Any) -> None:
+    """Set a uniform of a program; bytes are written as they are, unknown names are ignored.
+
+    Setting the same value again costs nothing.
+    """
+    if program.extra is None:
+        program.extra = {}
+    if program.extra.get(name) == value:
+        return
+    program.extra[name] = value
+    member = program.get(name, None)
+    if member is None:
+        return
+    if isinstance(value, bytes):
+        member.write(value)
+    else:
+        member.value = value
+
+
+def matrix_bytes(matrix: Array) -> bytes:
+    """A matrix as OpenGL stores it: float32, column by column."""
+    return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()
+
+
+def write_buffer(buffer: Any, array: Array) -> None:
+    """Write an array as float32 into a buffer, orphaned first: what draws from it need not be waited for."""
+    buffer.orphan()
+    buffer.write(np.ascontiguousarray(array, dtype="f4"))
+
+
+def make_texture(context: Any, pixels: UInt8, *, smooth: bool = True) -> Any:
+    """A texture of pixels, uint8 (H, W, components). smooth: whether to interpolate between them."""
+    height, width, components = pixels.shape
+    texture = context.texture((width, height), components, np.ascontiguousarray(pixels).tobytes())
+    nearest_or_linear = context.LINEAR if smooth else context.NEAREST
+    texture.filter = (nearest_or_linear, nearest_or_linear)
+    return texture
+
+
+class RecentlyUsed(Generic[Value]):
+    """A cache of the values that were used last. most: their number. release: frees a value that goes."""
+
+    def __init__(self, most: int, release: Callable[[Value], object]) -> None:
+        self._most = most
+        self._release = release
+        self._values: dict[Hashable, Value] = {}
+
+    def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """The value of a key, made if it is not in the cache."""
+        value = self._values.pop(key) if key in self._values else make()
+        self._values[key] = value  # the least recently used stands first
+        while len(self._values) > self._most:
+            self._release(self._values.pop(next(iter(self._values))))
+        return value
+
+    def clear(self) -> None:
+        """Release all values."""
+        for value in self._values.values():
+            self._release(value)
+        self._values.clear()
