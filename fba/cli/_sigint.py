@@ -1,9 +1,9 @@
-"""Ctrl-C, kept from the moments at which Python cannot take it.
+"""Delay Ctrl-C at moments when Python cannot handle it.
 
 Compiled loops are loaded by LLVM, which calls Python back while it does so. An error raised in there is
 printed ("Exception ignored in") and lost, or leaves LLVM with half a function: the program then crashes.
 moderngl's C code crashes, too, where what it calls back fails. In such a moment, and in any other callback or
-finalizer, an interruption waits, and comes again soon.
+finalizer, an interruption waits, and is raised again soon.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import Any, Protocol
 
 from fba.cli.startup import leave
 
-AGAIN_AFTER = 0.05
-"""Seconds until it comes again."""
-TOUCHY = (
+RETRY_AFTER = 0.05
+"""Seconds until a delayed interruption comes again."""
+FRAGILE = (
     "llvmlite.",
     "numba.core.caching",
     "numba.core.codegen",
@@ -28,7 +28,7 @@ TOUCHY = (
     "moderngl",
     "_moderngl",
 )
-"""Beginnings of the names of modules that must not be left halfway; none of their calls takes long."""
+"""Beginnings of names of modules that must not be interrupted; none of their calls takes long."""
 
 
 class _Unraisable(Protocol):
@@ -40,7 +40,7 @@ class _Unraisable(Protocol):
 
 
 class Interruptions:
-    """While it lasts, Ctrl-C is neither lost nor harmful; for the main thread, which alone gets signals."""
+    """Makes Ctrl-C safe while the `with` statement lasts; for the main thread, which alone gets signals."""
 
     def __init__(self) -> None:
         self._lost = False
@@ -59,8 +59,8 @@ class Interruptions:
         if self._handler is not None:
             signal.signal(signal.SIGINT, self._handler)
 
-    def made(self, error: BaseException) -> bool:
-        """Whether it is for an interruption that there is this error: by its causes, or by what was lost."""
+    def caused(self, error: BaseException) -> bool:
+        """Whether Ctrl-C caused an error: by the error's own causes, or because an interruption was lost."""
         cause: BaseException | None = error
         while cause is not None:
             if isinstance(cause, KeyboardInterrupt):
@@ -70,8 +70,8 @@ class Interruptions:
 
     def _interrupt(self, _number: int, frame: FrameType | None) -> None:
         while frame is not None:
-            if str(frame.f_globals.get("__name__", "")).startswith(TOUCHY):
-                _thread.start_new_thread(_again, ())
+            if str(frame.f_globals.get("__name__", "")).startswith(FRAGILE):
+                _thread.start_new_thread(_interrupt_later, ())
                 return
             frame = frame.f_back
         raise KeyboardInterrupt
@@ -81,9 +81,9 @@ class Interruptions:
             self._hook(unraisable)
             return
         self._lost = True
-        _thread.start_new_thread(_again, ())
+        _thread.start_new_thread(_interrupt_later, ())
 
 
-def _again() -> None:
-    time.sleep(AGAIN_AFTER)
+def _interrupt_later() -> None:
+    time.sleep(RETRY_AFTER)
     _thread.interrupt_main()

@@ -1,4 +1,4 @@
-"""What `fba encode` says of motion capture: how close bones come, and where joints leave human limits."""
+"""Reports of `fba encode` on motion capture: errors of bones, and joints beyond human limits."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ NAME_WIDTH = 32
 MOST_NAMES = 12
 
 
-def limited(animation: Animation, limits: str) -> tuple[Animation, dict[str, Any]]:
-    """The animation, within the limits of human motion with "clamp", and where it left them."""
+def apply_limits(animation: Animation, limits: str) -> tuple[Animation, dict[str, Any]]:
+    """Return the animation, clamped to the limits of human motion if limits is "clamp"; and a report."""
     if limits == "off" or animation.body is None:
         return animation, {}
     from fba.body import Limits
 
     human = Limits.human()
-    found = human.check(animation.body.values)
-    said = [
+    excesses = human.check(animation.body.values)
+    rows = [
         {
             "limit": excess.limit.name, "low": excess.limit.low, "high": excess.limit.high,
             "frames": excess.frames, "first": excess.first, "worst": round(excess.worst, 3),
         }
-        for excess in found
+        for excess in excesses
     ]  # fmt: skip
-    if limits == "clamp" and found:
+    if limits == "clamp" and excesses:
         body = replace(animation.body, values=human.clamp(animation.body.values))
         animation = replace(animation, body=body)
-    return animation, {"limits": said, "limits_clamped": limits == "clamp"}
+    return animation, {"limits": rows, "limits_clamped": limits == "clamp"}
 
 
-def compared(captures: Sequence[Path], animation: Animation, format: str | None = None) -> dict[str, Any]:
-    """The angle between every bone of a capture and the body's, before it is coded."""
+def compare(captures: Sequence[Path], animation: Animation, format: str | None = None) -> dict[str, Any]:
+    """Return a report of the angles between the bones of captures and of the body, before coding."""
     from fba.capture import retarget_report
     from fba.formats import format_of
 
@@ -49,10 +49,10 @@ def compared(captures: Sequence[Path], animation: Animation, format: str | None 
     return {"captures": reports}
 
 
-def lines(said: dict[str, Any]) -> list[str]:
-    """The same as text."""
+def report_lines(report: dict[str, Any]) -> list[str]:
+    """Return reports as lines of text."""
     result = []
-    for capture in said.get("captures", ()):
+    for capture in report.get("captures", ()):
         result.append(f"{capture['input']}: bones against the source's, degrees ({capture['frames']} frames)")
         result.append(f"  {'bone':{NAME_WIDTH}}{'mean':>8}{'worst':>8}  frame")
         for bone in capture["bones"]:
@@ -70,13 +70,13 @@ def lines(said: dict[str, Any]) -> list[str]:
             if names:
                 more = f", and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
                 result.append(f"  {what}: {', '.join(names[:MOST_NAMES])}{more}")
-    if "limits" in said:
-        verb = "held within" if said["limits_clamped"] else "beyond"
-        if not said["limits"]:
+    if "limits" in report:
+        verb = "held within" if report["limits_clamped"] else "beyond"
+        if not report["limits"]:
             result.append("all joints keep within the limits of human motion")
         result += [
             f"{excess['limit']}: {verb} {excess['low']:g}..{excess['high']:g} degrees in "
             f"{excess['frames']} frames, {excess['worst']:.1f} too much at worst"
-            for excess in said["limits"]
+            for excess in report["limits"]
         ]
     return result

@@ -99,7 +99,7 @@ def read_input(
     name: str | None = None,
     salvage: bool = False,
     capture: Mapping[str, object] | None = None,
-    said: list[str] | None = None,
+    doubts: list[str] | None = None,
     format: str | None = None,
 ) -> Animation:
     """Return the animation of a file of any format, or of the one that `format` names.
@@ -107,8 +107,8 @@ def read_input(
     Warns if the BAPs of a stream look wrong with these steps.
 
     fps resamples the animation, and motion capture before it is retargeted. It, or header_fps, and name
-    replace a header that a file lacks. capture: options for the readers of motion capture. said: that warning
-    is appended to it.
+    replace a header that a file lacks. capture: options for the readers of motion capture. doubts: that
+    warning is appended to it.
     """
     from fba.formats import read
 
@@ -118,7 +118,7 @@ def read_input(
         reader = _find_format(file, format)
         animation = read(file, format=reader.name, **_taken(reader, options))
     if reader.name == "fba" and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
-        (said if said is not None else []).append(doubt)
+        (doubts if doubts is not None else []).append(doubt)
     if fps is not None and animation.rate != fps:
         animation = animation.resample(fps)
     return animation

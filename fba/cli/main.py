@@ -61,19 +61,19 @@ class CompileNotice:
             click.echo(f"fba: compiling, once (up to about {self._seconds} s)", err=True)
 
 
-class _ReaderGoneError(Exception):
-    """Whoever read our output has seen enough. Not BrokenPipeError, for which click exits with 1."""
+class _OutputClosedError(Exception):
+    """The reader of our output has closed it. Not BrokenPipeError, for which click exits with 1."""
 
 
 @contextmanager
-def _reader_gone() -> Iterator[None]:
+def _closed_output() -> Iterator[None]:
     try:
         yield
     except BrokenPipeError as error:
-        raise _ReaderGoneError from error
+        raise _OutputClosedError from error
     except FbaError as error:
         if isinstance(error.__cause__, BrokenPipeError):
-            raise _ReaderGoneError from error
+            raise _OutputClosedError from error
         raise
 
 
@@ -81,11 +81,11 @@ class _Commands(Group):
     """Lists subcommands without importing them."""
 
     def make_context(self, *arguments: Any, **extra: Any) -> click.Context:
-        with _reader_gone():
+        with _closed_output():
             return super().make_context(*arguments, **extra)
 
     def invoke(self, ctx: click.Context) -> Any:
-        with _reader_gone():
+        with _closed_output():
             return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -149,8 +149,8 @@ def main(arguments: list[str] | None = None) -> None:
         error.show()
         sys.exit(BAD_USAGE)
     except (KeyboardInterrupt, click.Abort):
-        _say_interrupted()
-    except _ReaderGoneError:
+        _exit_interrupted()
+    except _OutputClosedError:
         # Python would complain once more while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
@@ -162,8 +162,8 @@ def main(arguments: list[str] | None = None) -> None:
     except Exception as error:
         if debug:
             raise
-        if interruptions.made(error):
-            _say_interrupted()
+        if interruptions.caused(error):
+            _exit_interrupted()
         click.echo(
             f"fba: internal error: {type(error).__name__}: {_one_line(error)}; this is a defect of fba: "
             "please report it with what --debug prints",
@@ -173,7 +173,7 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(result if isinstance(result, int) else 0)
 
 
-def _say_interrupted() -> NoReturn:
+def _exit_interrupted() -> NoReturn:
     click.echo(TEXT, err=True)
     sys.exit(INTERRUPTED)
 

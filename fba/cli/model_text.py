@@ -1,4 +1,4 @@
-"""Face models and what checks found, as text and as JSON."""
+"""Face models and findings of checks, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UNITS = {
 
 
 def summary(model: FaceModel) -> str:
-    """One line: vertices, feature points, FAPs."""
+    """Return a line: vertices, feature points, FAPs."""
     from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
     every = FAP_COUNT - FIRST_LOW_LEVEL_FAP + 1
@@ -33,8 +33,8 @@ def summary(model: FaceModel) -> str:
     )
 
 
-def lost(model: FaceModel) -> list[str]:
-    """FAPs that do nothing, and why, those with the same reason on one line."""
+def lost_lines(model: FaceModel) -> list[str]:
+    """Return lines of FAPs without effect, one line for each reason."""
     from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 
     reasons = defaultdict(list)
@@ -44,8 +44,8 @@ def lost(model: FaceModel) -> list[str]:
     return [f"lost     FAP {', '.join(numbers)}: {reason}" for reason, numbers in reasons.items()]
 
 
-def described(model: FaceModel) -> dict[str, Any]:
-    """Everything of interest, for programs; lengths in metres."""
+def model_as_json(model: FaceModel) -> dict[str, Any]:
+    """Return a model's properties for programs; lengths in metres."""
     from fba.face.feature_points import names
 
     low, high = model.vertices.min(axis=0), model.vertices.max(axis=0)
@@ -80,7 +80,7 @@ def described(model: FaceModel) -> dict[str, Any]:
 
 
 def print_model(model: FaceModel) -> None:
-    """The same, for people; lengths in millimetres."""
+    """Print a model's properties; lengths in millimetres."""
     from rich.console import Console
     from rich.table import Table
 
@@ -100,7 +100,7 @@ def print_model(model: FaceModel) -> None:
     )
     if model.missing:
         click.echo(f"  missing  {', '.join(model.missing)}")
-    for line in lost(model):
+    for line in lost_lines(model):
         click.echo(f"  {line}")
     parts = Table("part", "kind", box=None, pad_edge=False, padding=(0, 3, 0, 0))
     for heading in ("vertices", "triangles"):
@@ -123,7 +123,7 @@ def print_model(model: FaceModel) -> None:
 
 
 def findings_as_json(findings: Sequence[Finding]) -> dict[str, Any]:
-    """Counts, and every finding."""
+    """Return counts of findings, and every finding."""
     errors = sum(finding.severity == "error" for finding in findings)
     return {
         "errors": errors,
@@ -142,7 +142,7 @@ def findings_as_json(findings: Sequence[Finding]) -> dict[str, Any]:
 
 
 def print_findings(name: str, findings: Sequence[Finding]) -> None:
-    """A table, errors first, and a line that counts them."""
+    """Print a table of findings, errors first, and a line that counts them."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

@@ -87,17 +87,23 @@ to_option = click.option(
     "--to", metavar="FORMAT", help="Output format, if OUT is - or its suffix does not show it."
 )
 no_clobber_option = click.option("--no-clobber", is_flag=True, help="Fail if an output file already exists.")
-bap_steps_option = click.option(
-    "--bap-steps",
-    type=click.Choice(["iso", "visage"]),
-    default="iso",
-    show_default=True,
-    help="Table of BAP quantiser steps: the standard's, or one vendor's. Streams do not say which.",
-)
 salvage_option = click.option(
     "--salvage", is_flag=True, help="Read the undamaged parts of damaged input, and list what was lost."
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
+
+
+def choice_option(flag: str, text: str, *choices: str) -> Callable[[Decorated], Decorated]:
+    """Return an option with choices, of which the first is the default. text: its help."""
+    return click.option(flag, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
+
+
+bap_steps_option = choice_option(
+    "--bap-steps",
+    "Table of BAP quantiser steps: the standard's, or one vendor's. Streams do not say which.",
+    "iso",
+    "visage",
+)
 
 
 def fps_option(text: str) -> Callable[[Decorated], Decorated]:

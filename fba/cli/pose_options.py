@@ -1,4 +1,4 @@
-"""What `fba render` takes instead of a file: FAPs, visemes and expressions as words of a command line."""
+"""FAPs, visemes and expressions on the command line, which `fba render` takes instead of a file."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ MOST = 2
 LARGEST = 2**31 - 1
 
 
-def still(faps: tuple[str, ...], visemes: tuple[str, ...], expressions: tuple[str, ...]) -> Animation:
-    """An animation of one frame that sends these FAPs, visemes and expressions and nothing else.
+def still_animation(
+    faps: tuple[str, ...], visemes: tuple[str, ...], expressions: tuple[str, ...]
+) -> Animation:
+    """Return an animation of one frame that sends these FAPs, visemes and expressions and nothing else.
 
     faps: NAME=VALUE. visemes: NAME or NAME=BLEND. expressions: NAME or NAME=INTENSITY. A name may be a
-    number. Raises click.UsageError saying what is wrong and which names come near.
+    number. Raises click.UsageError, which suggests similar names.
     """
     import numpy as np
 
@@ -31,25 +33,25 @@ def still(faps: tuple[str, ...], visemes: tuple[str, ...], expressions: tuple[st
     values = np.zeros((1, FAP_COUNT), dtype=np.int32)
     mask = np.zeros((1, FAP_COUNT), dtype=bool)
     for text in faps:
-        number, value = _fap(text)
+        number, value = _parse_fap(text)
         if mask[0, number - 1]:
             raise click.UsageError(f"--fap {text}: FAP {number} is given twice")
         values[0, number - 1], mask[0, number - 1] = value, True
     viseme, expression = np.zeros((1, 4), dtype=np.int16), np.zeros((1, 6), dtype=np.int16)
     if visemes:
-        chosen = _chosen("viseme", visemes)
-        viseme[0, : len(chosen)] = [select for select, _ in chosen]
-        viseme[0, 2] = _blend([share for _, share in chosen])
+        pairs = _parse_selects("viseme", visemes)
+        viseme[0, : len(pairs)] = [select for select, _ in pairs]
+        viseme[0, 2] = _blend([share for _, share in pairs])
         mask[0, 0] = True
     if expressions:
-        for place, (select, intensity) in enumerate(_chosen("expression", expressions)):
-            expression[0, 2 * place] = select
-            expression[0, 2 * place + 1] = INTENSITY_MAX if intensity is None else intensity
+        for number, (select, intensity) in enumerate(_parse_selects("expression", expressions)):
+            expression[0, 2 * number] = select
+            expression[0, 2 * number + 1] = INTENSITY_MAX if intensity is None else intensity
         mask[0, 1] = True
     return Animation(Fraction(25), np.arange(1), FaceTrack(values, mask, viseme, expression), name="still")
 
 
-def _fap(text: str) -> tuple[int, int]:
+def _parse_fap(text: str) -> tuple[int, int]:
     from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
     name, equals, amount = text.partition("=")
@@ -64,7 +66,7 @@ def _fap(text: str) -> tuple[int, int]:
         number = numbers[name]
     else:
         raise click.UsageError(
-            f"--fap {text}: there is no FAP {name!r}{_near(name, list(numbers))}; "
+            f"--fap {text}: there is no FAP {name!r}{_suggestion(name, list(numbers))}; "
             f"give a name or a number {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}"
         )
     try:
@@ -78,33 +80,33 @@ def _fap(text: str) -> tuple[int, int]:
     return number, value
 
 
-def _chosen(kind: str, texts: tuple[str, ...]) -> list[tuple[int, int | None]]:
-    """(select, amount or None) of each."""
+def _parse_selects(kind: str, texts: tuple[str, ...]) -> list[tuple[int, int | None]]:
+    """Return (select, amount or None) of each viseme or expression."""
     from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
 
     names = VISEMES if kind == "viseme" else EXPRESSIONS
     if len(texts) > MOST:
         raise click.UsageError(f"--{kind}: a frame holds at most {MOST}, not {len(texts)}")
-    found = []
+    pairs = []
     for text in texts:
         name, equals, amount = text.partition("=")
         select = _select(name.strip(), names)
         if select is None:
             words = [*names[1:], *(word for each in names[1:] for word in each.split())]
             raise click.UsageError(
-                f"--{kind} {text}: there is no {kind} {name!r}{_near(name, words)}; "
+                f"--{kind} {text}: there is no {kind} {name!r}{_suggestion(name, words)}; "
                 f"they are {', '.join(f'{n} {each}' for n, each in enumerate(names) if n)}"
             )
         if equals and not (amount.strip().isdecimal() and int(amount.strip()[:9]) <= INTENSITY_MAX):
             raise click.UsageError(
                 f"--{kind} {text}: {amount!r} is no whole number from 0 to {INTENSITY_MAX}"
             )
-        found.append((select, int(amount) if equals else None))
-    return found
+        pairs.append((select, int(amount) if equals else None))
+    return pairs
 
 
 def _select(name: str, names: tuple[str, ...]) -> int | None:
-    """A number, a name, or one of the sounds that a viseme stands for."""
+    """Return the number for a name, a viseme's sound, or a number as text; None if there is none."""
     if name.isdecimal():
         number = int(name[:9])
         return number if 0 < number < len(names) else None
@@ -115,7 +117,7 @@ def _select(name: str, names: tuple[str, ...]) -> int | None:
 
 
 def _blend(shares: list[int | None]) -> int:
-    """viseme_blend: the share of the first of one or two visemes, in 63rds."""
+    """Return viseme_blend: the share of the first of one or two visemes, in 63rds."""
     from fba.parameters import INTENSITY_MAX
 
     if len(shares) == 1:
@@ -131,6 +133,6 @@ def _blend(shares: list[int | None]) -> int:
     return (INTENSITY_MAX + 1) // 2 if second is None else INTENSITY_MAX - second
 
 
-def _near(name: str, names: list[str]) -> str:
-    near = get_close_matches(name, names, n=3)
-    return f" (near: {', '.join(dict.fromkeys(near))})" if near else ""
+def _suggestion(name: str, names: list[str]) -> str:
+    similar = get_close_matches(name, names, n=3)
+    return f" (near: {', '.join(dict.fromkeys(similar))})" if similar else ""

@@ -1,4 +1,4 @@
-"""What the user types to start this program, for usage lines and for hints that show a command."""
+"""The words with which the user starts this program, for usage lines and hints."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DEV = "FBA_DEV"
 
 
 def program_words() -> str:
-    """The words that start this process's program again from where the user stands.
+    """Return the words that start this program again from the user's folder.
 
     "fba" where that is on the PATH, else as it was started: ".venv/bin/fba", "python3 -m fba", "./dev fba".
     Quoted for a shell.
@@ -31,7 +31,7 @@ def program_words() -> str:
 
 
 def with_program(text: str, program: str, commands: Iterable[str]) -> str:
-    """The text with every command that it shows, as in `fba info FILE`, starting with the words of `program`.
+    """Return a text in which every command, such as `fba info FILE`, starts with the words of `program`.
 
     commands: the names of the subcommands; "fba" before another word stays.
     """
@@ -42,19 +42,19 @@ def with_program(text: str, program: str, commands: Iterable[str]) -> str:
 
 
 def as_typed(text: str, context: click.Context | None = None) -> str:
-    """The text with its commands as the user types them here, e.g. `./dev fba info` for `fba info`."""
+    """Return a text with its commands as the user types them, such as `./dev fba info` for `fba info`."""
     root = (context or click.get_current_context()).find_root()
     assert isinstance(root.command, click.Group)
     return with_program(text, root.info_name or NAME, root.command.list_commands(root))
 
 
 def _typed(path: str) -> str:
-    """The name alone where the PATH leads to this very file, else the path."""
+    """Return the name alone if the PATH leads to this very file, else the path."""
     folder, name = os.path.split(path)
     if os.name == "nt":
         name = name.removesuffix(".exe")
-    # What was typed is not known: an installed script is given its whole path. Links are not followed: the
-    # Python of a virtual environment is a link to another.
-    found = shutil.which(name)
-    on_path = found is not None and os.path.abspath(os.path.dirname(found)) == os.path.abspath(folder)
+    # An installed script is given its whole path, whatever was typed. Links are not followed: the Python of a
+    # virtual environment is a link to another.
+    first = shutil.which(name)
+    on_path = first is not None and os.path.abspath(os.path.dirname(first)) == os.path.abspath(folder)
     return name if on_path or not folder else shlex.quote(path)

@@ -1,4 +1,4 @@
-"""What `fba play` and `fba render` show: files, and streams that are still arriving."""
+"""Load the scenes of `fba play` and `fba render` from files, and from streams that are still arriving."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ STREAMS = (b"\0\0\1\xba", b"\0\0\1\x01", b"\0\0\1\xb0", b"\0\0\1\xb5")
 """How an FBA stream begins: the object, or the layers around it."""
 
 
-Shown = tuple["Animation | LiveAnimation", bool]
-"""What a file holds, and whether it is a stream that grows."""
+Opened = tuple["Animation | LiveAnimation", bool]
+"""The animation of a file, and whether it is a stream that grows."""
 
 
-def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Shown:
-    """A file's animation; of an FBA stream on standard input or in a FIFO, one that grows. And whether it is.
+def open_file(file: Path, how: SceneOptions, doubts: list[str] | None = None) -> Opened:
+    """Return a file's animation, and whether it grows: that of an FBA stream on standard input or in a FIFO.
 
-    What arrives in another format is read to its end first. said: see `inputs.read_input`.
-    Raises click.UsageError where standard input is a
-    terminal, what `inputs.read_input` raises, and what `LiveAnimation.wait` raises.
+    Other formats are read to their end first. doubts: see `inputs.read_input`.
+    Raises click.UsageError if standard input is a terminal, and what `inputs.read_input` and
+    `LiveAnimation.wait` raise.
     """
     bap_steps, fps, salvage = how.bap_steps, how.fps, how.salvage
     name = "standard input" if str(file) == "-" else file.name
@@ -45,7 +45,7 @@ def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Show
         raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
         animation = inputs.read_input(
-            file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, said=said, format=how.format
+            file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, doubts=doubts, format=how.format
         )
         return animation, False
     with contextlib.ExitStack() as stack:
@@ -66,7 +66,7 @@ def opened(file: Path, how: SceneOptions, said: list[str] | None = None) -> Show
 
 
 def is_pipe(file: Path) -> bool:
-    """Whether it is a FIFO, or a device that is read once, such as /dev/stdin."""
+    """Whether a file is a FIFO, or a device that can be read only once, such as /dev/stdin."""
     try:
         mode = os.stat(file).st_mode
     except OSError:
@@ -74,22 +74,22 @@ def is_pipe(file: Path) -> bool:
     return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
 
 
-def scene(shown: list[Shown], names: list[str], how: SceneOptions, *, over: bool = False) -> Any:
-    """One scene of what `opened` gave, or several in one. over: over each other, but for `--arrange`."""
+def build_scene(opened: list[Opened], names: list[str], how: SceneOptions, *, over: bool = False) -> Any:
+    """Return one scene of opened files. over: draws them over each other unless `--arrange` is given."""
     face, figure = inputs.read_model(how.model), inputs.read_body(how.body)
-    scenes = [_scene_of(animation, growing, face, figure, how) for animation, growing in shown]
-    found: Any = scenes[0]
+    scenes = [_build_one(animation, growing, face, figure, how) for animation, growing in opened]
+    result: Any = scenes[0]
     if len(scenes) > 1:
         from fba_player.scene.compare import CompareScene
 
-        found = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
+        result = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
     for switch, state in how.shows:
-        found.show(switch, state)
-    return found
+        result.show(switch, state)
+    return result
 
 
-def names_of(files: tuple[Path, ...]) -> list[str]:
-    """What files are called where they are shown together: with their folder, where that tells them apart."""
+def display_names(files: tuple[Path, ...]) -> list[str]:
+    """Return the names under which files are shown together, with their folders if names are the same."""
     given = [file.name for file in files]
     return [
         f"{file.absolute().parent.name}/{name}" if given.count(name) > 1 and name != "-" else name
@@ -97,19 +97,19 @@ def names_of(files: tuple[Path, ...]) -> list[str]:
     ]
 
 
-def voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
-    """The sound that is asked for, or that lies beside the first of the files that has one which can be read.
+def find_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+    """Return the given sound, or a readable one beside the first file that has one.
 
-    without: what is said of those that cannot. Raises FormatError where what was asked for cannot be read,
-    click.UsageError for an offset of no sound.
+    without: begins the warning of sounds that cannot be read. Raises FormatError if the given sound cannot be
+    read, click.UsageError for an offset without a sound.
     """
-    found = _voice(files, sound, without)
-    if found is None and sound.audio_offset:
+    path = _choose_sound(files, sound, without)
+    if path is None and sound.audio_offset:
         raise click.UsageError("--audio-offset needs a sound: give one with --audio")
-    return found
+    return path
 
 
-def _voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
+def _choose_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
     from fba_player.sound.soundtrack import check_sound, find_sound_beside
 
     if sound.audio is not None:
@@ -118,19 +118,19 @@ def _voice(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path |
     if sound.no_audio:
         return None
     for file in files:
-        found = None if str(file) == "-" or is_pipe(file) else find_sound_beside(file)
-        if found is None:
+        path = None if str(file) == "-" or is_pipe(file) else find_sound_beside(file)
+        if path is None:
             continue
         try:
-            check_sound(found)
+            check_sound(path)
         except FormatError as error:
             warnings.warn(f"{without}: {error}", FbaWarning, stacklevel=3)
             continue
-        return found
+        return path
     return None
 
 
-def _scene_of(
+def _build_one(
     animation: Animation | LiveAnimation,
     growing: bool,
     model: FaceModel | None,

@@ -90,12 +90,11 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
             type=click.Choice(["front", "three-quarter", "profile", "body"]),
             help="Default: one that suits the content.",
         ),
-        click.option(
+        options.choice_option(
             "--view",
-            type=click.Choice(["figure", "points"]),
-            default="figure",
-            show_default=True,
-            help="A person, or the face as its feature points and the body as its bones.",
+            "A person, or the face as its feature points and the body as its bones.",
+            "figure",
+            "points",
         ),
         click.option(
             "--show",
@@ -103,15 +102,11 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
             type=ShowType(),
             multiple=True,
             metavar="SWITCH[=VALUE]",
-            help="Repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, normals; shadows=off, "
-            "eyes=off, teeth=off, hair=off; background=grey or transparent.",
+            help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
+            "normals; shadows=off, eyes=off, teeth=off, hair=off; background=grey or transparent.",
         ),
-        click.option(
-            "--axes",
-            type=click.Choice(["iso", "vreng"]),
-            default="iso",
-            show_default=True,
-            help="Which way BAPs turn: as the standard says, or as in some old files.",
+        options.choice_option(
+            "--axes", "Which way BAPs turn: as the standard says, or as in some old files.", "iso", "vreng"
         ),
         options.bap_steps_option,
         options.salvage_option,

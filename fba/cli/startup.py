@@ -1,4 +1,4 @@
-"""What the `fba` command does before its imports: Ctrl-C without a traceback, fewer garbage collections.
+"""Setup of the `fba` command before its imports: Ctrl-C without a traceback, fewer garbage collections.
 
 Imports next to nothing itself, since Ctrl-C is not handled until this module is loaded.
 """

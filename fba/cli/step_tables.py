@@ -1,4 +1,4 @@
-"""What commands say about the table of BAP steps: streams do not name theirs, so the user has to."""
+"""Hints and warnings about the table of BAP steps, which streams do not name."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from fba.codec.block import Block
 
 DEFAULT = BAP_STEP_TABLES[0]
-LOOKED_AT = 2048
-"""Frames of a stream that are decoded a second time, where a command keeps no values."""
+FRAMES_CHECKED = 2048
+"""Frames of a stream that are decoded for the check, if a command does not decode it anyway."""
 _CHUNK = 1 << 14
 
 
 def remind(output: Path, animation: Animation, table: str, quant: int = 1) -> None:
-    """Say which option later commands need to read a stream that was just written, if they need one.
+    """Print the option that later commands need to read a stream that was just written, if any.
 
     Unquantised BAPs (quant 0) are the same under every table.
     """
@@ -36,7 +36,7 @@ def remind(output: Path, animation: Animation, table: str, quant: int = 1) -> No
 
 
 def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, captured: bool = False) -> None:
-    """Warn where a body is about to be coded with the standard's steps and its root moves in between them.
+    """Warn if a body is about to be coded with the standard's steps and its root moves by less than them.
 
     captured: the body is motion capture, whose angles these steps may cut as well.
     """
@@ -54,7 +54,7 @@ def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, ca
 
 
 def warn_of_doubt(name: str | Path, animation: Animation, table: str) -> str | None:
-    """Warn where a decoded body looks wrong under the table, and right under the other; what was said."""
+    """Warn if a decoded body looks wrong under the table and right under the other; return the warning."""
     from fba.body.plausibility import find_doubt
 
     if animation.body is None:
@@ -68,7 +68,7 @@ def warn_of_doubt(name: str | Path, animation: Animation, table: str) -> str | N
 
 
 def warn_of_doubtful_stream(name: str | Path, data: bytes, table: str) -> None:
-    """The same for a stream in memory, of which only the first `LOOKED_AT` frames with a body are decoded."""
+    """Do the same for a stream, whose first `FRAMES_CHECKED` frames with a body are decoded."""
     from fba.animation import Animation, BodyTrack
 
     blocks: list[Block] = []
@@ -78,7 +78,7 @@ def warn_of_doubtful_stream(name: str | Path, data: bytes, table: str) -> None:
             continue
         blocks.append(block)
         count += len(block.index)
-        if count >= LOOKED_AT:
+        if count >= FRAMES_CHECKED:
             break
     tracks = [block.body for block in blocks if block.body is not None]
     if not tracks:

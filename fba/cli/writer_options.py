@@ -1,4 +1,4 @@
-"""Options of formats that are written, for every subcommand that writes files of other formats than FBA."""
+"""Options of the writers of other formats than FBA."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ FLAGS = {
     "body": "--body",
     "axes": "--axes",
 }
-"""How the writers' keywords are given on the command line."""
+"""The options for the writers' keywords."""
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 def writer_options(command: Decorated) -> Decorated:
-    """Adds the options; the command takes them as keywords and hands them to `settings`."""
+    """Add the options; the command takes them as keywords and passes them to `settings`."""
     for option in reversed(
         (
             click.option(
@@ -67,19 +67,19 @@ def writer_options(command: Decorated) -> Decorated:
 
 
 def settings(target: Path, writing: Format, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keywords for the writer of a format. given: what the command line says, None where it says nothing.
+    """Return keywords for the writer of a format. given: values of the options, None if not given.
 
     Raises click.UsageError for an option that the format does not have, ModelError or FormatError for a
     model that cannot be read.
     """
-    said = {name: value for name, value in given.items() if value is not None}
-    for name in said:
+    given = {name: value for name, value in given.items() if value is not None}
+    for name in given:
         if name not in writing.write_options:
-            raise click.UsageError(_misplaced(name, target, writing))
-    return {name: _MADE[name](value) if name in _MADE else value for name, value in said.items()}
+            raise click.UsageError(_misplaced_text(name, target, writing))
+    return {name: _CONVERTERS[name](value) if name in _CONVERTERS else value for name, value in given.items()}
 
 
-def _misplaced(name: str, target: Path, writing: Format) -> str:
+def _misplaced_text(name: str, target: Path, writing: Format) -> str:
     from fba.formats import formats
 
     takers = [entry.name.upper() for entry in formats() if name in entry.write_options]
@@ -90,7 +90,7 @@ def _misplaced(name: str, target: Path, writing: Format) -> str:
     )
 
 
-_MADE: dict[str, Callable[[Any], Any]] = {
+_CONVERTERS: dict[str, Callable[[Any], Any]] = {
     "unit": UNITS.__getitem__,
     "model": read_model,
     "body": read_body,

@@ -186,4 +186,4 @@ def test_only_the_beginning_is_decoded_twice(
 
     monkeypatch.setattr(step_tables, "warn_of_doubt", counting)
     assert WARNED in run("info", path).err
-    assert step_tables.LOOKED_AT <= looked[0] < 4000
+    assert step_tables.FRAMES_CHECKED <= looked[0] < 4000

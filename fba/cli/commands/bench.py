@@ -1,4 +1,4 @@
-"""`fba bench`: how fast this codec is on a stream."""
+"""`fba bench`: measures the speed of this codec on a stream."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool)
     results = []
     for path in files:
         with each.file(path):
-            results.append(_measured(path, rounds, bap_steps))
+            results.append(_measure(path, rounds, bap_steps))
             if not as_json:
                 _print(results[-1])
     if as_json:
@@ -40,8 +40,8 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool)
     each.finish()
 
 
-def _measured(file: Path, rounds: int, bap_steps: str) -> dict[str, Any]:
-    """Symbols of a stream, and seconds and symbols a second of each way to code it."""
+def _measure(file: Path, rounds: int, bap_steps: str) -> dict[str, Any]:
+    """Return the symbols of a stream, and seconds and symbols per second of decoding and encoding it."""
     from fba.codec import Decoder, EncoderOptions, decode, encode
     from fba.compiled import is_compiled
 

@@ -1,4 +1,4 @@
-"""`fba conformance`: this codec against test vectors."""
+"""`fba conformance`: checks this codec against test vectors."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from fba.cli.printing import Progress, print_json
 def command(folder: Path | None, verbose: bool, as_json: bool) -> None:
     """Check this codec against test vectors: decoded values and encoded bytes, both exact.
 
-    Exits with 1 where a vector fails.
+    Exits with 1 if a vector fails.
     """
     from fba_conformance.runner import check, vectors
 
-    chosen = vectors(folder)
+    checked = vectors(folder)
     results = []
-    with Progress("checking", len(chosen)) as step:
-        for vector in chosen:
+    with Progress("checking", len(checked)) as step:
+        for vector in checked:
             results.append(check(vector))
             step.advance()
     failed = [result for result in results if not result.passed]

@@ -54,14 +54,17 @@ _FOLDER_OR_FILE = OutputType(folders=True)
 )
 @click.option("--bap", type=_FOLDER_OR_FILE, metavar="OUT.bap", help="File for the BAPs; likewise.")
 @click.option(
-    "--epf", type=_FOLDER_OR_FILE, metavar="OUT.epf", help="How it was coded, for fba encode --epf; likewise."
+    "--epf",
+    type=_FOLDER_OR_FILE,
+    metavar="OUT.epf",
+    help="Settings of the planes, for fba encode --epf; likewise.",
 )
 @click.option(
     "-o",
     "--output",
     type=_FOLDER_OR_FILE,
     metavar="OUT.bvh|OUT.glb",
-    help="File for other programs, format by suffix; likewise.",
+    help="File for other programs; its suffix is the format; likewise.",
 )
 @options.to_option
 @options.no_clobber_option
@@ -82,8 +85,8 @@ def command(
     as_json: bool,
     **given: Any,
 ) -> None:
-    """Decode FBA streams: to ASCII FAP and BAP files, to EPF files that say how they were coded, and to BVH
-    and glTF for other programs.
+    """Decode FBA streams: to ASCII FAP and BAP files, to EPF files with the settings of their planes, and to
+    BVH and glTF for other programs.
 
     One of the files can be -, standard output.
     """
@@ -123,7 +126,7 @@ def command(
 
 @dataclass(frozen=True)
 class _Target:
-    """flag: as given. place: a file, or a folder. suffix: of files in a folder. writing: None for EPF."""
+    """A file or a folder to write to. suffix: of files in a folder. writing: None for EPF."""
 
     flag: str
     place: Path
@@ -132,15 +135,15 @@ class _Target:
 
     @property
     def folder(self) -> bool:
-        """Whether each stream becomes a file in the place."""
+        """Whether each stream becomes a file in a folder."""
         return self.place != STANDARD and self.place.is_dir()
 
     def file(self, source: Path) -> Path:
-        """Where the content of a stream goes."""
+        """Return the file that the content of a stream is written to."""
         return self.place / f"{_name(source)}{self.suffix}" if self.folder else self.place
 
     def output(self, source: Path) -> Output:
-        """The same, to be checked."""
+        """Return that file, to be checked."""
         text = self.writing is None or self.writing.name in TEXT_FORMATS
         return Output(self.flag, self.file(source), text, source if self.folder else None)
 
@@ -148,7 +151,7 @@ class _Target:
 def _targets(
     by_flag: dict[str, Path | None], output: Path | None, to: str | None, given: dict[str, Any]
 ) -> list[_Target]:
-    """All files to write; click.UsageError where there are none, or options that fit none."""
+    """Return all files to write; click.UsageError if there are none, or options that fit none."""
     targets = []
     for flag, place in by_flag.items():
         if place is not None:
@@ -173,7 +176,7 @@ def _targets(
 
 
 def _name(source: Path) -> str:
-    """What the content of a stream is called."""
+    """Return the name of the content of a stream."""
     return "stdin" if source == STANDARD else source.stem
 
 
@@ -186,7 +189,7 @@ def _decode(
     bap_steps: str,
     salvage: bool,
 ) -> dict[str, Any]:
-    """settings: for the writer of `--output`."""
+    """Decode a stream to its files; return a report. settings: for the writer of `--output`."""
     from fba.formats import write
     from fba.formats.epf.epf import write_epf
 
@@ -207,10 +210,10 @@ def _decode(
             if target.writing is None:
                 write_epf(file, planes)
             else:
-                # --fap and --bap name what they want of the stream; only --output may lose something unawares
-                free = target.flag == "--output"
-                wanted = animation if free else _only(animation, target.writing.carries)
-                write(file, wanted, format=target.writing.name, **(settings if free else {}))
+                # --fap and --bap name a part of the stream: only --output may lose one without being told to
+                whole = target.flag == "--output"
+                part = animation if whole else _only(animation, target.writing.carries)
+                write(file, part, format=target.writing.name, **(settings if whole else {}))
         written.append(str(place))
     return {"input": str(path), "frames": len(animation), "rate": str(animation.rate), "written": written}
 
@@ -223,7 +226,7 @@ def _only(animation: Animation, parts: tuple[str, ...]) -> Animation:
 def _read(
     data: bytes, name: str, with_settings: bool, bap_steps: str, salvage: bool
 ) -> tuple[Animation, list[PlaneSettings]]:
-    """The animation, and where wanted how each plane was coded."""
+    """Return the animation, and if with_settings, how each plane was coded."""
     from fba.codec import Decoder, decode
 
     on_error: Literal["raise", "salvage"] = "salvage" if salvage else "raise"

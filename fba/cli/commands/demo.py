@@ -1,4 +1,4 @@
-"""`fba demo`: the main job, from BVH and FAP files to a picture, on the samples that come with fba.
+"""`fba demo`: goes from BVH and FAP files to a stream and a picture, with the samples that come with fba.
 
 A script made the samples (tools/make_samples.py); nobody was captured for them.
 """
@@ -22,11 +22,11 @@ from fba.cli.program import as_typed
 from fba.errors import DisplayError
 
 BAP_STEPS = "visage"
-"""The standard's own table moves a root in steps of 64 mm, which shows."""
+"""The standard's own table moves the root in steps of 64 mm, which is visible."""
 SAMPLES = ("hello.bvh", "hello.fap")
 """A body and a face, which come with fba."""
-PATIENCE = 4.0
-"""Seconds after which it says why nothing is to be seen yet."""
+SECONDS_BEFORE_NOTICE = 4.0
+"""Seconds after which a line explains the wait."""
 COMPILING = "compiling for this machine, on the first run only: about a minute in all"
 
 
@@ -34,7 +34,7 @@ COMPILING = "compiling for this machine, on the first run only: about a minute i
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the samples and what is made of them; default: a new temporary one.",
+    help="Folder for the samples and the files made from them; default: a new temporary one.",
 )
 @options.no_clobber_option
 @click.option("--play/--no-play", default=None, help="Open a window; default: where there is a display.")
@@ -42,7 +42,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     """Encode the sample animation, print its size, and play it.
 
     A script made the sample; it is not motion capture. Without a display, a film and a picture are made
-    instead. The sample files hello.bvh and hello.fap are put into the folder as well.
+    instead. The sample files hello.bvh and hello.fap are copied into the folder.
     """
     from fba import player
     from fba.codec import EncoderOptions, encode, probe_stream
@@ -55,7 +55,7 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     outputs = Outputs(
         [Output("--out", path) for path in (*sources, stream, video, picture)], no_clobber=no_clobber
     )
-    compiling = Timer(PATIENCE, click.echo, [COMPILING], {"err": True})
+    compiling = Timer(SECONDS_BEFORE_NOTICE, click.echo, [COMPILING], {"err": True})
     compiling.daemon = True
     compiling.start()
     for source in sources:
@@ -80,12 +80,12 @@ def command(out: Path | None, no_clobber: bool, play: bool | None) -> None:
     click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
     again = as_typed(f"fba play --bap-steps {BAP_STEPS} {shlex.quote(str(stream))}")
     click.echo(f"to see it again: {again}")
-    if play is not False and _played(player, decoded, asked=play is True):
+    if play is not False and _play(player, decoded, asked=play is True):
         return
     _render(player, decoded, video, picture)
 
 
-def _played(player: object, animation: Animation, *, asked: bool) -> bool:
+def _play(player: object, animation: Animation, *, asked: bool) -> bool:
     try:
         player.check_display()  # type: ignore[attr-defined]
         click.echo("opening a window; Esc closes it")

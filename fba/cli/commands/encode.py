@@ -33,7 +33,12 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 )
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=EXISTING)
 @click.option(
-    "-o", "--output", metavar="OUT.fba", required=True, type=OutputType(), help="- for standard output."
+    "-o",
+    "--output",
+    metavar="OUT.fba",
+    required=True,
+    type=OutputType(),
+    help="Stream to write; - for standard output.",
 )
 @options.no_clobber_option
 @options.fps_option("Resample to this frame rate (25, 29.97, 30000/1001); default: the input's own.")
@@ -45,10 +50,14 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     type=click.IntRange(0, 31),
     default=1,
     show_default=True,
-    help="fap_quant; 0: unquantised.",
+    help="Quantiser of FAPs (fap_quant); 0: unquantised.",
 )
 @click.option(
-    "--bap-quant", type=click.IntRange(0, 31), default=1, show_default=True, help="bap_quant; 0: unquantised."
+    "--bap-quant",
+    type=click.IntRange(0, 31),
+    default=1,
+    show_default=True,
+    help="Quantiser of BAPs (bap_quant); 0: unquantised.",
 )
 @click.option(
     "--intra-period",
@@ -62,21 +71,17 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     help="Write start codes before I planes, where a decoder can seek to or resume.",
 )
 @options.bap_steps_option
-@click.option("--preset", type=click.Choice(["reference"]), default="reference", show_default=True)
-@click.option(
-    "--unsent",
-    type=click.Choice(["keep", "interpolate"]),
-    default="keep",
-    show_default=True,
-    help="What a player shows for FAPs that are not sent.",
+@options.choice_option(
+    "--preset", "Ranges of the arithmetic coder: the reference encoder's, which fit the data.", "reference"
 )
+@options.choice_option("--unsent", "What a player shows for FAPs that are not sent.", "keep", "interpolate")
 @click.option(
     "--gender",
     type=click.Choice(["female", "male"]),
     default="female",
     show_default=True,
     callback=lambda _, __, gender: int(gender == "male"),
-    help="suggested_gender.",
+    help="Gender of the figure that the stream suggests (suggested_gender).",
 )
 @click.option(
     "--clamp/--no-clamp",
@@ -84,39 +89,31 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     help="Limit values to the codable range instead of failing; default: for motion capture only.",
 )
 @click.option("--epf", type=EXISTING, metavar="FILE", help="Code plane by plane as this EPF file says.")
-@click.option(
+@options.choice_option(
     "--spine",
-    type=click.Choice(["spread", "full", "simple", "joints"]),
-    default="spread",
-    show_default=True,
-    help="Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
-)
-@click.option(
+    "Motion capture: turn a dozen vertebrae, all, four, or one for each joint of the source.",
+    "spread", "full", "simple", "joints",
+)  # fmt: skip
+@options.choice_option(
     "--ground",
-    type=click.Choice(["floor", "source", "none"]),
-    default="floor",
-    show_default=True,
-    help="Motion capture: feet stand at height 0, at the height of the source's ground, or uncorrected.",
-)
+    "Motion capture: feet stand at height 0, at the height of the source's ground, or uncorrected.",
+    "floor", "source", "none",
+)  # fmt: skip
 @click.option(
     "--plant/--no-plant",
     default=True,
     show_default=True,
-    help="Motion capture: bend legs a little where feet would else miss the ground, or slip on it.",
+    help="Motion capture: bend legs a little where feet would otherwise miss the ground, or slip on it.",
 )
-@click.option(
-    "--origin",
-    type=click.Choice(["source", "start", "middle"]),
-    default="source",
-    show_default=True,
-    help="Motion capture: what is placed at the default position.",
+@options.choice_option(
+    "--origin", "Motion capture: what is placed at the default position.", "source", "start", "middle"
 )
-@click.option(
+@options.choice_option(
     "--limits",
-    type=click.Choice(["off", "report", "clamp"]),
-    default="off",
-    show_default=True,
-    help="Report where joints exceed normal human motion, or clamp them to it.",
+    "Report where joints exceed normal human motion, or clamp them to it.",
+    "off",
+    "report",
+    "clamp",
 )
 @click.option("--report", is_flag=True, help="Motion capture: print how far each bone is from the source's.")
 @options.salvage_option
@@ -145,34 +142,34 @@ def command(
     outputs = Outputs([Output("--output", output)], [*inputs, epf], no_clobber=no_clobber)
     capture = {option: settings.pop(option) for option in CAPTURE}
     with Progress("reading", len(inputs)) as step:
-        animation = _joined(
+        animation = _read_all(
             inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
             capture=capture, format=format,
         )  # fmt: skip
-    captures = [path for path in inputs if _captured(path, format)]
-    animation, said = capture_report.limited(animation, limits)
+    captures = [path for path in inputs if _is_capture(path, format)]
+    animation, report_values = capture_report.apply_limits(animation, limits)
     if report:
         if animation.body is None:
             raise click.UsageError("--report compares bones of motion capture, and there is no body")
-        said = capture_report.compared(captures, animation, format) | said
+        report_values = capture_report.compare(captures, animation, format) | report_values
     if settings["clamp"] is None:
         settings["clamp"] = bool(captures)
     table = settings["bap_steps"]
     with Progress("encoding", None):
-        coded = _coded(animation, settings) if epf is None else _coded_as(epf, animation, table)
+        coded = _encode(animation, settings) if epf is None else _encode_as_epf(epf, animation, table)
     step_tables.warn_of_coarse_steps(animation, table, coded.bap_quant, captured=bool(captures))
     outputs.write(output, coded.data)
     if as_json:
         used = {"bap_steps": table if animation.body is not None else None}
-        outputs.print_json({"output": str(output), **_figures(coded, animation), **used, **said})
+        outputs.print_json({"output": str(output), **_figures(coded, animation), **used, **report_values})
         return
-    for line in (_summary(output, coded, animation), *capture_report.lines(said)):
+    for line in (_summary(output, coded, animation), *capture_report.report_lines(report_values)):
         outputs.say(line)
     step_tables.remind(output, animation, table, coded.bap_quant)
 
 
-class _Coded(NamedTuple):
-    """bap_quant: the largest that is used; 0 where BAPs go unquantised."""
+class _Encoded(NamedTuple):
+    """A stream, and what it took. bap_quant: the largest of any plane; 0 if BAPs are unquantised."""
 
     data: bytes
     planes: int
@@ -181,16 +178,18 @@ class _Coded(NamedTuple):
     bap_quant: int
 
 
-def _coded(animation: Animation, settings: Mapping[str, Any]) -> _Coded:
-    """settings: fields of EncoderOptions."""
+def _encode(animation: Animation, settings: Mapping[str, Any]) -> _Encoded:
+    """Return the stream of an animation. settings: fields of EncoderOptions."""
     from fba.codec import EncoderOptions, encode_with_statistics
 
     data, statistics = encode_with_statistics(animation, EncoderOptions(**settings))
-    return _Coded(data, statistics.planes, statistics.intra_planes, statistics.clamped, settings["bap_quant"])
+    return _Encoded(
+        data, statistics.planes, statistics.intra_planes, statistics.clamped, settings["bap_quant"]
+    )
 
 
-def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
-    """Plane by plane as an EPF file says."""
+def _encode_as_epf(epf: Path, animation: Animation, bap_steps: str) -> _Encoded:
+    """Return the stream of an animation, coded plane by plane as an EPF file says."""
     from fba.codec import encode_planes
     from fba.formats.epf.epf import read_epf
 
@@ -198,26 +197,26 @@ def _coded_as(epf: Path, animation: Animation, bap_steps: str) -> _Coded:
         planes = read_epf(file)
     data = encode_planes(animation, planes, bap_steps=bap_steps)
     quant = max((plane.body.quant for plane in planes if plane.body is not None), default=0)
-    return _Coded(data, len(planes), sum(plane.intra for plane in planes), 0, quant)
+    return _Encoded(data, len(planes), sum(plane.intra for plane in planes), 0, quant)
 
 
 def _refuse_beside_epf() -> None:
-    """click.UsageError for an option that says what the EPF file says already."""
+    """Raise click.UsageError for an option that the EPF file replaces."""
     context = click.get_current_context()
-    said = ("fap_quant", "bap_quant", "intra_period", "start_codes", "preset", "unsent", "gender", "clamp")
+    own = ("fap_quant", "bap_quant", "intra_period", "start_codes", "preset", "unsent", "gender", "clamp")
     for parameter in context.command.params:
-        given = context.get_parameter_source(parameter.name or "")
-        if parameter.name in said and given is click.core.ParameterSource.COMMANDLINE:
+        origin = context.get_parameter_source(parameter.name or "")
+        if parameter.name in own and origin is click.core.ParameterSource.COMMANDLINE:
             raise click.UsageError(
                 f"{parameter.opts[0]} and --epf contradict each other: the EPF file says how planes are coded"
             )
 
 
-def _bits_per_second(coded: _Coded, animation: Animation) -> float:
+def _bits_per_second(coded: _Encoded, animation: Animation) -> float:
     return 8 * len(coded.data) / float(animation.duration)
 
 
-def _figures(coded: _Coded, animation: Animation) -> dict[str, Any]:
+def _figures(coded: _Encoded, animation: Animation) -> dict[str, Any]:
     return {
         "size": len(coded.data),
         "frames": coded.planes,
@@ -229,7 +228,7 @@ def _figures(coded: _Coded, animation: Animation) -> dict[str, Any]:
     }
 
 
-def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
+def _summary(output: Path, coded: _Encoded, animation: Animation) -> str:
     text = (
         f"{display_name(output)}: {coded.planes} frames, {seconds_text(animation.duration)} at "
         f"{rate_text(animation.rate)} frames/s, {len(coded.data)} bytes, "
@@ -239,13 +238,13 @@ def _summary(output: Path, coded: _Coded, animation: Animation) -> str:
     return f"{text}; {coded.clamped} values clamped" if coded.clamped else text
 
 
-def _captured(path: Path, format: str | None) -> bool:
+def _is_capture(path: Path, format: str | None) -> bool:
     from fba.formats import format_of
 
     return str(path) != "-" and format_of(path, format).read_motion is not None
 
 
-def _joined(
+def _read_all(
     inputs: tuple[Path, ...],
     *,
     fps: Fraction | None,
@@ -256,7 +255,7 @@ def _joined(
     capture: Mapping[str, object],
     format: str | None,
 ) -> Animation:
-    """Face and body of all inputs as one animation."""
+    """Return face and body of all inputs as one animation."""
     from fba.formats import merge
 
     result: Animation | None = None

@@ -1,4 +1,4 @@
-"""`fba gait`: someone walks; or the steps of someone who walked."""
+"""`fba gait`: generates walks, and detects the steps of a walk."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ DEFAULT_RATE = Fraction(30)
     "--stride",
     type=float,
     metavar="METRES",
-    help="From one contact of a foot to its next, two steps; sets the speed. Default: the character's own.",
+    help="Length of two steps, from one contact of a foot to its next; sets the speed. "
+    "Default: the character's own.",
 )
 @click.option("--character", default="normal", show_default=True, metavar="NAME", help="One of --list.")
 @click.option("--cycles", type=float, metavar="N", help="Number of strides; default: 4.")
@@ -93,9 +94,9 @@ def command(
     if to is not None and output is None:
         raise click.UsageError("--to goes with -o")
     if listed:
-        _list(as_json)
+        _print_characters(as_json)
     elif find is not None:
-        _find(find, bap_steps, fps, format, as_json)
+        _print_steps(find, bap_steps, fps, format, as_json)
     elif output is not None:
         if as_json:
             raise click.UsageError("--json goes with --list and --find")
@@ -135,30 +136,32 @@ def _summary(animation: Animation, output: Path, character: str, *, in_place: bo
     return line
 
 
-def _list(as_json: bool) -> None:
+def _print_characters(as_json: bool) -> None:
     from fba.body import gait
 
-    known = [gait.Character.named(name) for name in gait.characters()]
+    characters = [gait.Character.named(name) for name in gait.characters()]
     if as_json:
-        rows = [{"name": c.name, "about": c.about, "stride": c.stride, "seconds": c.seconds} for c in known]
+        rows = [
+            {"name": c.name, "about": c.about, "stride": c.stride, "seconds": c.seconds} for c in characters
+        ]
         print_json(rows)
         return
-    width = max(len(c.name) for c in known)
-    for c in known:
+    width = max(len(c.name) for c in characters)
+    for c in characters:
         pace = f"{c.stride:.2f} m in {c.seconds:.2f} s"
         click.echo(f"{c.name:{width}}  {pace}  {c.about}")
 
 
-def _find(file: Path, bap_steps: str, fps: Fraction | None, format: str | None, as_json: bool) -> None:
+def _print_steps(file: Path, bap_steps: str, fps: Fraction | None, format: str | None, as_json: bool) -> None:
     from fba.body import gait
     from fba.errors import FormatError
 
     animation = read_input(file, bap_steps=bap_steps, header_fps=fps, format=format)
     if animation.body is None:
         raise FormatError("has no body to walk with", path=file)
-    found = gait.detect(animation)
+    detected = gait.detect(animation)
     if as_json:
-        print_json(found.as_dict())
+        print_json(detected.as_dict())
         return
-    for line in found.lines():
+    for line in detected.lines():
         click.echo(line)

@@ -53,17 +53,17 @@ def command(
                 _trace(path, bap_steps=bap_steps, as_json=as_json, values=values)
         each.finish()
         return
-    found = []
+    reports = []
     for path in files:
         with each.file(path), input_file(path) as file:
             info = probe_input(file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage)
             if info.format == "fba" and info.body is not None:
                 step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
-            found.append({"file": str(path), **info.to_dict()})
+            reports.append({"file": str(path), **info.to_dict()})
             if not as_json:
                 _print(path, info)
     if as_json:
-        print_json(found if len(files) > 1 else found[0])
+        print_json(reports if len(files) > 1 else reports[0])
     each.finish()
 
 
@@ -99,14 +99,18 @@ def _print(path: Path, info: StreamInfo) -> None:
         )
     for name, part in (("face", info.face), ("body", info.body)):
         if part is not None:
-            click.echo(f"  {name}     {_part(part, 'FAP' if name == 'face' else 'BAP', info.frames)}")
+            click.echo(f"  {name}     {_part_text(part, 'FAP' if name == 'face' else 'BAP', info.frames)}")
     for damage in info.damage:
         click.echo(f"  damage   bytes {damage.start}..{damage.stop}: {damage.error}")
 
 
-def _part(part: PartInfo, kind: str, frames: int) -> str:
+def _part_text(part: PartInfo, kind: str, frames: int) -> str:
     count = len(part.parameters)
-    text = f"{count} {kind}{'s' if count != 1 else ''}: {_spans(part.parameters)}" if count else f"no {kind}s"
+    text = (
+        f"{count} {kind}{'s' if count != 1 else ''}: {_span_text(part.parameters)}"
+        if count
+        else f"no {kind}s"
+    )
     if part.frames != frames:
         text += f"; in {part.frames} frames"
     if part.quants:
@@ -114,8 +118,8 @@ def _part(part: PartInfo, kind: str, frames: int) -> str:
     return text
 
 
-def _spans(numbers: tuple[int, ...]) -> str:
-    """1..3, 5, 7..9"""
+def _span_text(numbers: tuple[int, ...]) -> str:
+    """Return sorted numbers as text: "1..3, 5, 7..9"."""
     spans: list[list[int]] = []
     for number in numbers:
         if spans and number == spans[-1][1] + 1:

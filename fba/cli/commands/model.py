@@ -1,4 +1,4 @@
-"""`fba model`: look at face models, check them, import them, fit them to a person."""
+"""`fba model`: inspect face models, check them, import them, fit them to a person."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from fba.face.model import FaceModel
 
 SOURCE = click.Path(exists=True, path_type=Path)
-GLB = OutputType()
 KINDS = ("makehuman", "gltf", "obj", "ply", "wfm", "fdp")
 POINT_FILES = "FDP, CSV or JSON file"
 
@@ -40,7 +39,17 @@ def command() -> None:
     """Face models: look at one, check it, import one, fit one to a person."""
 
 
-def _one_of(file: Path | None, default: bool) -> FaceModel:
+_output_option = click.option(
+    "-o",
+    "--output",
+    metavar="OUT.glb",
+    required=True,
+    type=OutputType(),
+    help="Model to write; - for standard output.",
+)
+
+
+def _read_or_default(file: Path | None, default: bool) -> FaceModel:
     if (file is None) != default:
         raise click.UsageError("give either the FILE of a face model, or --default for the built-in head")
     return _read(file)
@@ -70,9 +79,9 @@ def info(file: Path | None, default: bool, as_json: bool) -> None:
     """
     from fba.cli import model_text
 
-    model = _one_of(file, default)
+    model = _read_or_default(file, default)
     if as_json:
-        print_json(model_text.described(model))
+        print_json(model_text.model_as_json(model))
     else:
         model_text.print_model(model)
 
@@ -96,7 +105,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     from fba.cli import model_text
     from fba.face import checks
 
-    model = _one_of(file, default)
+    model = _read_or_default(file, default)
     findings: list[Finding] = []
     if only != "faps":
         findings += checks.check_neutral(model)
@@ -121,7 +130,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     ),
 )
 @click.argument("source", metavar="IN", type=SOURCE)
-@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
+@_output_option
 @options.no_clobber_option
 @click.option(
     "--points",
@@ -142,7 +151,7 @@ def validate(file: Path | None, default: bool, only: str | None, as_json: bool) 
     "kinds",
     multiple=True,
     metavar="NAME=KIND",
-    help="What a group, object, mesh or material is: skin, eye, teeth, tongue, ..., or none; again for more.",
+    help="Kind of a group, object, mesh or material: skin, eye, teeth, tongue, ..., or none; repeatable.",
 )
 @click.option("--name", help="Name of the model. Default: that of the file.")
 def import_(
@@ -165,9 +174,9 @@ def import_(
     from fba.face.importers import import_model
 
     outputs = _outputs(output, [source, points], no_clobber=no_clobber)
-    chosen = _kinds(kinds) or None
+    part_kinds = _parse_kinds(kinds) or None
     with Progress("importing", None):
-        model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=chosen, name=name)
+        model = import_model(source, kind=kind, points=points, unit=unit, up=up, kinds=part_kinds, name=name)
     _write(model, output, outputs)
 
 
@@ -179,7 +188,7 @@ def import_(
     ),
 )
 @click.argument("points", metavar="POINTS", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("-o", "--output", metavar="OUT.glb", required=True, type=GLB, help="- for standard output.")
+@_output_option
 @options.no_clobber_option
 @click.option(
     "--model", "base", metavar="FILE", type=SOURCE, help="The face to fit. Default: the built-in head."
@@ -187,16 +196,14 @@ def import_(
 @click.option(
     "--unit",
     metavar="mm|cm|m|in",
-    help="Unit of POINTS, or metres for one unit. Default: found from the size.",
+    help="Unit of POINTS, or metres for one unit. Default: estimated from the size.",
 )
-@click.option(
+@options.choice_option(
     "--tables",
-    type=click.Choice(["auto", "carry", "author"]),
-    default="auto",
-    show_default=True,
-    help="How FAP tables are made: carried over with the surface, authored anew, "
+    "How FAP tables are made: carried over with the surface, authored anew, "
     "or whichever meets the standard better.",
-)
+    "auto", "carry", "author",
+)  # fmt: skip
 @click.option("--name", help="Name of the fitted model. Default: that of the file.")
 def fit(
     points: Path,
@@ -210,21 +217,21 @@ def fit(
     """Fit a face to a person's feature points, and write it as glTF.
 
     POINTS is an FDP, CSV or JSON file in any unit and pose; points that it lacks are mirrored from the
-    other side, or follow their surroundings. Of an Xface file without its mesh, the distances are used.
+    other side, or follow their surroundings. For an Xface file without its mesh, the distances are used.
     """
     from fba.face.calibration import fit as fitted
 
     outputs = _outputs(output, [points, base], no_clobber=no_clobber)
-    scale = _unit(unit)
+    scale = _parse_unit(unit)
     with Progress("fitting", None):
         model = _read(base)
-        wanted = _points(points, model)
+        wanted = _read_points(points, model)
         face = fitted(model, wanted, unit=scale, tables=tables, name=name or points.stem)
     _write(face, output, outputs)
 
 
-def _points(path: Path, model: FaceModel) -> Float64:
-    """Feature points of a file; of an Xface file without its mesh those that its distances tell."""
+def _read_points(path: Path, model: FaceModel) -> Float64:
+    """Return feature points of a file; for an Xface file without its mesh, those that its distances imply."""
     from fba.face.importers.points.fdp import load_fdp
     from fba.face.importers.points.points_file import read_points
     from fba.face.importers.points.xface import xface_points
@@ -250,7 +257,7 @@ def _points(path: Path, model: FaceModel) -> Float64:
     return points_of_distances(model, fdp.distances)
 
 
-def _unit(text: str | None) -> str | float | None:
+def _parse_unit(text: str | None) -> str | float | None:
     from fba.face.calibration import UNITS
 
     if text is None or text in UNITS:
@@ -263,22 +270,22 @@ def _unit(text: str | None) -> str | float | None:
         ) from None
 
 
-def _kinds(texts: tuple[str, ...]) -> Mapping[str, str]:
+def _parse_kinds(texts: tuple[str, ...]) -> Mapping[str, str]:
     from fba.face.model import PART_KINDS
 
-    found = {}
+    kinds = {}
     for text in texts:
         name, equals, kind = text.rpartition("=")
         if not equals or not name or kind not in (*PART_KINDS, "none"):
             raise click.UsageError(
                 f"--part {text}: write NAME=KIND, with a kind of {', '.join(PART_KINDS)} or none"
             )
-        found[name] = kind
-    return found
+        kinds[name] = kind
+    return kinds
 
 
 def _outputs(output: Path, inputs: list[Path | None], *, no_clobber: bool) -> Outputs:
-    """Raises click.UsageError also for a suffix that would hide that it is a .glb."""
+    """Return the outputs; click.UsageError also for a suffix other than .glb."""
     outputs = Outputs([Output("--output", output)], inputs, no_clobber=no_clobber)
     if output != STANDARD and output.suffix.lower() not in ("", ".glb"):
         name = output.with_suffix(".glb").name
@@ -292,5 +299,5 @@ def _write(model: FaceModel, output: Path, outputs: Outputs) -> None:
     with outputs.file(output) as file:
         model.save(file)
     outputs.say(f"{display_name(output)}: {model_text.summary(model)}")
-    for line in model_text.lost(model):
+    for line in model_text.lost_lines(model):
         outputs.say(f"  {line}")

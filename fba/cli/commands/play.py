@@ -109,23 +109,23 @@ def _play(
     start: float | None = None,
     **window: Any,
 ) -> tuple[Path, ...]:
-    """Play files in a window; those that were dropped onto it."""
+    """Play files in a window; return those that were dropped onto it."""
     from fba import player
     from fba.cli import scene_loading
 
-    voice = scene_loading.voice(files, sound, "played without sound")
+    audio = scene_loading.find_sound(files, sound, "played without sound")
     streams = []
     try:
-        opened, said = [], list[str]()
+        opened, doubts = [], list[str]()
         for file in files:
-            opened.append(scene_loading.opened(file, how, said))
+            opened.append(scene_loading.open_file(file, how, doubts))
             if opened[-1][1]:
                 streams.append(opened[-1][0])
         names = [
             animation.name if name == "-" else name
-            for name, (animation, _) in zip(scene_loading.names_of(files), opened, strict=True)
+            for name, (animation, _) in zip(scene_loading.display_names(files), opened, strict=True)
         ]
-        scene = scene_loading.scene(opened, names, how, over=compare)
+        scene = scene_loading.build_scene(opened, names, how, over=compare)
         _check_start(scene, start, growing=bool(streams))
         single = (
             len(files) == 1 and not streams and str(files[0]) != "-" and not scene_loading.is_pipe(files[0])
@@ -135,11 +135,11 @@ def _play(
             title=" | ".join(names),
             camera=how.camera,
             start=start,
-            audio=voice,
+            audio=audio,
             audio_offset=sound.audio_offset,
             file=files[0] if single else None,
             bap_steps=how.bap_steps,
-            warnings=tuple(said),
+            warnings=tuple(doubts),
             panels=("differences",) if compare else (),
             **window,
         )
@@ -151,13 +151,13 @@ def _play(
 
 
 def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
-    """A window with a neutral figure and the sliders that move it."""
+    """Open a window with a neutral figure and sliders that move it; return files dropped onto it."""
     from fba import player
     from fba.cli import scene_loading
     from fba_player.session.performer import neutral
 
     title = " ".join(file.name for file in (how.model, how.body) if file is not None)
-    scene = scene_loading.scene([(neutral(body=how.body is not None), False)], [title], how)
+    scene = scene_loading.build_scene([(neutral(body=how.body is not None), False)], [title], how)
     return player.play(
         scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",)
     )

@@ -72,15 +72,15 @@ class SheetType(click.ParamType[str | int]):
     "faps",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Without a file: a FAP of the face, by name or number; again for more. A left or right one alone "
-    "moves both sides, as in a stream: give its mate as well.",
+    help="Without a file: a FAP of the face, by name or number; repeatable. A left or right FAP alone "
+    "moves both sides, as in a stream; give its counterpart as well to move them apart.",
 )
 @click.option(
     "--viseme",
     "visemes",
     multiple=True,
     metavar="NAME[=BLEND]",
-    help="Without a file: a viseme by number, name or sound; of two, BLEND (0..63) is the share.",
+    help="Without a file: a viseme by number, name or sound; of two, BLEND (0..63) is the share of one.",
 )
 @click.option(
     "--expression",
@@ -94,7 +94,7 @@ class SheetType(click.ParamType[str | int]):
     "sheet",
     type=SheetType(),
     metavar="N|" + "|".join(SHEETS),
-    help="With a file: N of its frames, at even distances, on one sheet. Without: all FAPs, visemes or "
+    help="With a file: N of its frames, at even intervals, on one sheet. Without: all FAPs, visemes or "
     "expressions. --size is that of one picture.",
 )
 @click.option("--size", type=options.SizeType(), metavar="WxH", help="Default: 1280x720; of a GIF, 480x270.")
@@ -104,7 +104,7 @@ class SheetType(click.ParamType[str | int]):
     "--start", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: start time."
 )
 @click.option("--end", type=options.MomentType(), metavar="SECONDS", help="For a film or a sheet: end time.")
-@scene_options.sound_options("Sound of an MP4,")
+@scene_options.sound_options("Sound of an MP4")
 @click.option("--transparent", is_flag=True, help="PNG without a background.")
 @click.option("--replace", is_flag=True, help="Overwrite numbered pictures that exist.")
 @scene_options.scene_options(
@@ -148,7 +148,7 @@ def command(
         if not files and value is not None:
             raise click.UsageError(f"{name} goes with a file; {given[0]} makes a single picture")
     check_files(files, how, sound, "picture")
-    target = _Target.of(output, to)
+    target = _Target.parse(output, to)
     film, mp4 = target.film, target.suffix == ".mp4"
     if no_clobber and replace:
         raise click.UsageError("--no-clobber and --replace contradict each other")
@@ -172,10 +172,10 @@ def command(
     if not files and film:
         raise click.UsageError("a face in one pose is a picture: write it to a .png")
     from fba.cli import scene_loading
-    from fba.cli.pose_options import still
+    from fba.cli.pose_options import still_animation
     from fba_player.export.render import render
 
-    audio = scene_loading.voice(files, sound, "the film has no sound") if mp4 else None
+    audio = scene_loading.find_sound(files, sound, "the film has no sound") if mp4 else None
     outputs = target.outputs([*files, how.model, how.body, audio], no_clobber=no_clobber, replace=replace)
     with Progress("preparing", None):
         animations = [
@@ -183,9 +183,9 @@ def command(
                 file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage, format=how.format
             )
             for file in files
-        ] or [still(faps, visemes, expressions)]
-        names = scene_loading.names_of(files) or [""]
-        scene = scene_loading.scene([(animation, False) for animation in animations], names, how)
+        ] or [still_animation(faps, visemes, expressions)]
+        names = scene_loading.display_names(files) or [""]
+        scene = scene_loading.build_scene([(animation, False) for animation in animations], names, how)
     heard = f", with the sound of {audio}" if audio is not None else ""
     with target.file(outputs) as name:
         if sheet is not None:
@@ -226,8 +226,8 @@ class _Target:
     pictures: Numbered | None = None
 
     @staticmethod
-    def of(output: str, to: str | None) -> _Target:
-        """What `--output` and `--to` say together."""
+    def parse(output: str, to: str | None) -> _Target:
+        """Return the target that `--output` and `--to` name."""
         from fba_player.export.image_files import Numbered, is_sequence
 
         if is_sequence(output):
@@ -242,13 +242,13 @@ class _Target:
 
     @property
     def film(self) -> bool:
-        """Whether it is many pictures."""
+        """Whether there are many pictures."""
         from fba_player.export.image_files import is_film
 
         return self.pictures is not None or is_film(f"film{self.suffix}")
 
     def outputs(self, inputs: Iterable[Path | None], *, no_clobber: bool, replace: bool) -> Outputs:
-        """The files that are written; of numbered pictures, those that are replaced."""
+        """Return the files to write; of numbered pictures, those that are replaced."""
         if self.pictures is None:
             return Outputs([Output("--output", self.path)], inputs, no_clobber=no_clobber)
         numbers = self.pictures.existing() if replace else []
@@ -256,7 +256,7 @@ class _Target:
 
     @contextmanager
     def file(self, outputs: Outputs) -> Iterator[str]:
-        """The name to write to, for a `with` statement."""
+        """Give the name to write to, for a `with` statement."""
         if self.pictures is not None:
             yield self.given
             return
@@ -272,7 +272,7 @@ def _size(size: tuple[int, int] | None, output: str) -> str:
 
 
 def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, int] | None) -> str:
-    """Draw and write it; its size."""
+    """Write a sheet of FAPs, visemes or expressions; return its size as text."""
     from fba_player.export.contact_sheet import contact_sheet
     from fba_player.export.image_files import check_picture, write_picture
 
@@ -284,7 +284,7 @@ def _kinds_sheet(what: str, output: Path, model: Path | None, size: tuple[int, i
 
 
 def _frames_sheet(scene: Showable, count: int, output: Path, **how: Any) -> str:
-    """Likewise."""
+    """Write a sheet of frames; return its size as text."""
     from fba_player.export.film_sheet import film_sheet
     from fba_player.export.image_files import check_picture, write_picture
 
