@@ -1,8 +1,8 @@
-"""The face: units, feature points, visemes and expressions, and what a face shows for given FAPs.
+"""The face: models, units, feature points, visemes and expressions, and how FAPs move them.
 
 shown = fba.face.resolve(animation.face)       # float32 (T, 68): every FAP of every frame
 points = fba.face.FeaturePointFace()(shown)    # float32 (T, 84, 3): feature points in metres
-vertices = fba.face.Deformer(model)(shown)     # float32 (T, V, 3): a whole face, metres
+vertices = fba.face.Deformer(model)(shown)     # float32 (T, V, 3): all vertices of a face, metres
 """
 
 from fba.face.deform.deformer import Deformer

@@ -1,7 +1,7 @@
-"""FAPs that were never sent, estimated from those that were: left/right mates, inner and outer lips.
+"""Estimates unsent FAPs from sent ones: left/right mates, inner and outer lips.
 
-ISO/IEC 14496-2 leaves this to the decoder: with one side of the face sent, the other copies it, and
-the outer contour of the lips follows the inner one and the other way round.
+ISO/IEC 14496-2 leaves this to the decoder: if one side of the face is sent, the other copies it, and the
+outer contour of the lips copies the inner one and vice versa.
 """
 
 from __future__ import annotations
@@ -12,30 +12,28 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Bool, Intp
-from fba.parameters import FAP_COUNT, faps
+from fba.parameters import faps
 
 
 @cache
 def donors() -> tuple[Intp, ...]:
-    """Columns (68,) from which an unsent FAP is copied, best first: mate, lip mate, the lip mate's mate.
+    """Columns (68,) that unsent FAPs copy, best first: mate, lip mate, the lip mate's mate.
 
-    A FAP without such a relative names itself.
+    A FAP without such a mate has its own column.
     """
-    own = np.arange(FAP_COUNT)
     mate = np.array([(f.left_right_mate or f.number) - 1 for f in faps()])
     lip = np.array([(f.lip_mate or f.number) - 1 for f in faps()])
-    return (np.where(mate != own, mate, own), lip, mate[lip])
+    return (mate, lip, mate[lip])
 
 
 def fill(values: npt.NDArray[np.generic], sent: Bool) -> tuple[npt.NDArray[np.generic], Bool]:
-    """Values in which unsent FAPs are copied from their mates, and a mask of the values now known.
+    """(values with unsent FAPs copied from their mates, mask of the values now known), as new arrays.
 
-    values: (..., 68). sent: bool (..., 68), True where the value was sent at some time. Returns new
-    arrays of the same shapes.
+    values: (..., 68). sent: bool (..., 68), whether the value was ever sent.
     """
     filled, known = values.copy(), sent.copy()
     for column in donors():
-        take = ~known & sent[..., column]
-        np.copyto(filled, values[..., column], where=take)
-        known |= take
+        copied = ~known & sent[..., column]
+        np.copyto(filled, values[..., column], where=copied)
+        known |= copied
     return filled, known

@@ -1,4 +1,4 @@
-"""A smaller file for a face: numbers rounded by less than can be seen."""
+"""Rounds the numbers of a face by less than is visible, for smaller files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fba.face.model import FaceModel, Part
 from fba.face.tables import FaceDefMesh, FaceDefTables
 
 BITS = 20
-"""Displacements keep this many bits below the largest of their FaceDefMesh: one part in a million."""
+"""Displacements are rounded to multiples of 2**-BITS of the largest of their FaceDefMesh."""
 SHADES = 65535
 """Colours become multiples of 1 / SHADES, which glTF stores in 16 bits."""
 
@@ -19,9 +19,8 @@ SHADES = 65535
 def compact(model: FaceModel) -> FaceModel:
     """The face with displacements rounded to 2**-20 of the largest and colours to multiples of 1/65535.
 
-    A vertex then ends less than a millionth of the way beside where it was; files get a tenth smaller or
-    more. Saving never does this by itself. Vertices that a FAP moves by less than the rounding stay in
-    its tables.
+    The error is less than a millionth of a vertex's motion; files get at least a tenth smaller. `save` does
+    not round. Vertices that a FAP moves by less than the rounding stay in its tables.
     """
     return replace(
         model,
@@ -36,8 +35,8 @@ def compact(model: FaceModel) -> FaceModel:
 def _part(part: Part) -> Part:
     if part.colours is None:
         return part
-    top = np.float32(SHADES)
-    return replace(part, colours=np.rint(np.clip(part.colours, 0, 1) * top) / top)
+    steps = np.float32(SHADES)
+    return replace(part, colours=np.rint(np.clip(part.colours, 0, 1) * steps) / steps)
 
 
 def _mesh(mesh: FaceDefMesh) -> FaceDefMesh:

@@ -1,9 +1,8 @@
 """Definitions of the 14 visemes and the 6 expressions: their FAPs at full intensity.
 
-`definitions.csv` lists them for the left half and the midline; the right half and the outer lips
-follow from their mates. Profiles of the expressions after the measured vocabularies of the six
-universal emotions (means of the FAPs that each one moves, signs as the standard counts them), with
-what those measurements leave open set by eye.
+`definitions.csv` lists them for the left half and the midline; the right half and the outer lips copy
+their mates. Expressions follow measured vocabularies of the six universal emotions (the mean of each FAP
+that one moves, with the standard's signs); FAPs that those leave open are set by eye.
 """
 
 from __future__ import annotations
@@ -76,11 +75,11 @@ def _default() -> Definitions:
         "viseme": np.zeros((VISEME_SELECT_MAX + 1, FAP_COUNT), dtype=np.float32),
         "expression": np.zeros((EXPRESSION_SELECT_MAX + 1, FAP_COUNT), dtype=np.float32),
     }
-    given = {kind: np.zeros(table.shape, dtype=bool) for kind, table in tables.items()}
+    listed = {kind: np.zeros(table.shape, dtype=bool) for kind, table in tables.items()}
     with (files(__package__) / "definitions.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            place = (int(row["select"]), fap_numbers()[row["fap"]] - 1)
-            tables[row["kind"]][place] = float(row["value"])
-            given[row["kind"]][place] = True
-    filled = {kind: fill(table, given[kind])[0] for kind, table in tables.items()}
+            entry = (int(row["select"]), fap_numbers()[row["fap"]] - 1)
+            tables[row["kind"]][entry] = float(row["value"])
+            listed[row["kind"]][entry] = True
+    filled = {kind: fill(table, listed[kind])[0] for kind, table in tables.items()}
     return Definitions(filled["viseme"].astype(np.float32), filled["expression"].astype(np.float32))

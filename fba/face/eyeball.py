@@ -9,7 +9,6 @@ import numpy as np
 
 from fba.arrays import Float64, Floating
 from fba.face.feature_points import row_of
-from fba.face.tables import FaceDefMesh, FaceDefTables
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
@@ -28,8 +27,8 @@ class Eyeball:
     """One eyeball of a model.
 
     part: name of the part. side: "left" or "right", the subject's. centre: (3,), radius: metres, of the
-    sphere that fits its vertices best, a bulging cornea or a flat iris left out. error: root mean
-    square distance of the vertices on the sphere from it, metres. share: of the vertices on the sphere.
+    sphere that fits its vertices best, without a bulging cornea or a flat iris. error: root mean square
+    distance of the vertices on the sphere from it, metres. share: proportion of the vertices on the sphere.
     """
 
     part: str
@@ -41,8 +40,8 @@ class Eyeball:
 
 
 def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
-    """The eyeballs by side: the biggest part of kind "eye" on each; a side without one is missing."""
-    found: dict[str, Eyeball] = {}
+    """The eyeballs by side, "left" and "right": the biggest part of kind "eye" on each, if any."""
+    result: dict[str, Eyeball] = {}
     middle = symmetry_plane(model.points)
     for part in model.of_kind("eye"):
         fitted = sphere(part)
@@ -50,21 +49,21 @@ def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
             continue
         centre, radius, error, share = fitted
         side = "left" if centre[0] > middle else "right"
-        if side not in found or radius > found[side].radius:
-            found[side] = Eyeball(part.name, side, centre, radius, error, share)
-    return found
+        if side not in result or radius > result[side].radius:
+            result[side] = Eyeball(part.name, side, centre, radius, error, share)
+    return result
 
 
 def symmetry_plane(points: Float64) -> float:
-    """The x of the plane between left and right: half way between the pupils, 0 where they are unknown."""
+    """The x of the plane between left and right: the pupils' mean, or 0 where they are unknown."""
     pair = points[[row_of()["3.5"], row_of()["3.6"]], 0]
     return float(pair.mean()) if np.isfinite(pair).all() else 0.0
 
 
 def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
-    """(centre, radius, error, share) of the sphere through most of a part's vertices, None for too few.
+    """(centre, radius, error, share) of the sphere through most of a part's vertices, as in `Eyeball`.
 
-    Least squares, repeated without outliers, so that a cornea or an iris has no influence.
+    Least squares, repeated without outliers, such as a cornea or an iris. None for too few vertices.
     """
     vertices = np.unique(part.vertices.astype(np.float64), axis=0)
     if len(vertices) < FEWEST_VERTICES:
@@ -82,10 +81,10 @@ def sphere(part: Part) -> tuple[Float64, float, float, float] | None:
         radius = float(np.sqrt(max(solution[3] + solution[:3] @ solution[:3], 0.0)))
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
         limit = max(3 * float(np.median(away)), 1e-6 * radius)
-        again = away <= limit
-        if again.sum() < FEWEST_VERTICES or (again == on_sphere).all():
+        inliers = away <= limit
+        if inliers.sum() < FEWEST_VERTICES or (inliers == on_sphere).all():
             break
-        on_sphere = again
+        on_sphere = inliers
     if not radius > 0:
         return None
     away = np.abs(np.linalg.norm(vertices[on_sphere] - centre, axis=1) - radius)
@@ -100,37 +99,29 @@ def gaze(model: FaceModel, eye: Eyeball) -> Float64 | None:
 
 
 def pupil_diameter(model: FaceModel, eye: Eyeball) -> float | None:
-    """Metres across the pupil: across the vertices that dilate_pupil moves most; None where unknown."""
+    """Diameter of the pupil, metres, from the vertices that dilate_pupil moves most; None where unknown."""
     table = model.table_of.get(PUPIL_FAP[eye.side])
     direction = gaze(model, eye)
     if table is None or direction is None:
         return None
-    across = [
-        diameter
-        for mesh in table.meshes
-        if model.part(mesh.part).kind == "eye"
-        for diameter in _rim(model.part(mesh.part), mesh, eye.centre, direction)
-    ]
-    return max(across) if across else _scaled_part(model, table, eye.centre, direction)
-
-
-def _rim(part: Part, mesh: FaceDefMesh, centre: Float64, direction: Float64) -> list[float]:
-    from_axis = _off_axis(part.vertices[mesh.vertices], centre, direction)
-    moves = np.linalg.norm(mesh.displacements, axis=2).max(axis=1)
-    if not len(moves) or not moves.max() > 0:
-        return []
-    return [2 * float(np.median(from_axis[moves > 0.95 * moves.max()]))]
-
-
-def _scaled_part(model: FaceModel, table: FaceDefTables, centre: Float64, direction: Float64) -> float | None:
-    """A pupil that is a part of its own, and scaled as a whole."""
+    diameters = []
+    for mesh in table.meshes:
+        part = model.part(mesh.part)
+        moves = np.linalg.norm(mesh.displacements, axis=2).max(axis=1, initial=0)
+        if part.kind == "eye" and moves.max(initial=0) > 0:
+            rim = part.vertices[mesh.vertices[moves > 0.95 * moves.max()]]
+            diameters.append(2 * float(np.median(distances_from_axis(rim, eye.centre, direction))))
+    if diameters:
+        return max(diameters)
     for transform in table.transforms:
-        if transform.kind == "scale" and transform.part in model.starts:
-            return 2 * float(_off_axis(model.part(transform.part).vertices, centre, direction).max())
+        if transform.kind == "scale" and transform.part in model.starts:  # a pupil that is a part of its own
+            vertices = model.part(transform.part).vertices
+            return 2 * float(distances_from_axis(vertices, eye.centre, direction).max())
     return None
 
 
-def _off_axis(vertices: Floating, centre: Float64, direction: Float64) -> Float64:
-    arms = vertices.astype(np.float64) - centre
+def distances_from_axis(points: Floating, centre: Float64, direction: Float64) -> Float64:
+    """(N,) distances of points (N, 3) from the line through a centre along a unit vector."""
+    arms = points.astype(np.float64) - centre
     distances: Float64 = np.linalg.norm(arms - np.outer(arms @ direction, direction), axis=1)
     return distances

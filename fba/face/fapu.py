@@ -1,4 +1,4 @@
-"""FAPU: the face animation parameter units, in which FAPs are normalised to the face that plays them."""
+"""FAPU: the face animation parameter units, which scale FAPs to the face that plays them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from fba.errors import ModelError
 from fba.face.feature_points import row_of
 
 PER_DISTANCE = 1024
-"""A distance unit is this fraction of the face's distance."""
+"""Each unit of length is a distance of the face divided by this."""
 AU = 1e-5
 """The angle unit, in radians."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fapu:
-    """The units of one face, as sizes of one step: metres (or the face's own unit) and radians.
+    """The units of one face: metres (or the unit of its points) and radians.
 
-    `fapu.MNS * 300` is how far a value of 300 moves a point whose FAP counts in MNS.
+    `fapu.MNS * 300` is how far a value of 300 moves a point whose FAP has the unit MNS.
     """
 
     IRISD: float
@@ -32,7 +32,7 @@ class Fapu:
 
     @classmethod
     def measure(cls, points: npt.ArrayLike) -> Fapu:
-        """From the feature points of a neutral face, (84, 3), in any unit of length.
+        """The FAPU of a neutral face, from its feature points (84, 3) in any unit of length.
 
         IRISD0 is the height of the eye opening, ES0 the distance between the pupils, ENS0 from the
         pupils down to the nose, MNS0 from the nose down to the mouth, MW0 the width of the mouth; each

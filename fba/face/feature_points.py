@@ -2,9 +2,9 @@
 
 `neutral.csv` lists the left half and the midline in millimetres; the right half is its exact mirror.
 The distances follow published norms of adult heads (nasion to chin 119 mm, between the outer eye
-corners 91 mm, mouth 52 mm, nose 34 mm wide, head 193 mm long), and the standard's rules for a neutral
-face hold: lids tangent to the iris, pupil a third of it, lips and teeth touching, tongue flat with its
-tip at the teeth. Axes: +x the subject's left, +y up, +z forward; the origin lies between the pupils.
+corners 91 mm, mouth 52 mm, nose 34 mm wide, head 193 mm long) and the standard's rules for a neutral
+face: lids tangent to the iris, pupil a third of it, lips and teeth touching, tongue flat with its tip at
+the teeth. Axes: +x the subject's left, +y up, +z forward; the origin lies between the pupils.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.parameters import feature_points
-
-Points = Float64
 
 MIRRORED = {
     "2.4": "2.5", "2.6": "2.7", "2.8": "2.9", "2.11": "2.12", "2.13": "2.14",
@@ -44,14 +42,14 @@ def row_of() -> dict[str, int]:
 
 
 @cache
-def neutral_points() -> Points:
+def neutral_points() -> Float64:
     """(84, 3) float64, metres; read-only."""
     points = np.full((len(names()), 3), np.nan)
     with (files(__package__) / "neutral.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            place = np.array([float(row["x"]), float(row["y"]), float(row["z"])]) / 1000.0
-            points[row_of()[row["point"]]] = place
+            position = np.array([float(row[axis]) for axis in "xyz"]) / 1000.0
+            points[row_of()[row["point"]]] = position
             if row["point"] in MIRRORED:
-                points[row_of()[MIRRORED[row["point"]]]] = place * (-1.0, 1.0, 1.0)
+                points[row_of()[MIRRORED[row["point"]]]] = position * (-1.0, 1.0, 1.0)
     points.flags.writeable = False
     return points

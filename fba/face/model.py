@@ -1,4 +1,4 @@
-"""A face: meshes, the feature points bound to them, and what every FAP does to them."""
+"""A face: meshes, the feature points bound to them, and the tables by which FAPs move them."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ __all__ = ["PART_KINDS", "FaceModel", "Material", "Part", "bind", "point_row"]
 
 
 PART_KINDS = ("skin", "eye", "teeth", "tongue", "mouth", "brow", "lash", "hair", "other")
-"""What a part is. "mouth" is the inside of the mouth where it is not part of the skin; "eye" a whole
-eyeball, left or right by the side of its centre."""
+"""Kinds of parts. "mouth" is the inside of the mouth where it is not part of the skin; "eye" a whole eyeball,
+left or right by the side of its centre."""
 SHARED_POINT = 1e-4
-"""A bound feature point may stand this far from its vertex, as a share of the face's height."""
+"""Largest distance of a bound feature point from its vertex, as a share of the face's height."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +71,13 @@ class FaceModel(Meshes[Part]):
 
     parts: its meshes; vertices of the whole model are counted through them in order. points: float64
     (84, 3), the neutral feature points in metres, rows as `feature_point_names()`, NaN where the face
-    has none. bound: int32 (84,), the vertex that each stands on, -1 for those inside or outside the
-    meshes (the centre of the head, the thickness of hair). tables: what each FAP does, each FAP at most
-    once. fit: how unsent FAPs follow from sent ones, or None for the standard's mates. definitions: the
-    FAPs of visemes and expressions. lost: FAPs without tables and why, by number. notes: origin,
-    licence and the like.
+    has none. bound: int32 (84,), the vertex that each is at, -1 for those on no mesh (the centre of the
+    head, the thickness of hair). tables: the effect of each FAP, each FAP at most once. fit: how unsent
+    FAPs follow from sent ones, or None for the standard's mates. definitions: the FAPs of visemes and
+    expressions. lost: FAPs without tables and why, by number. notes: origin, licence and the like.
 
-    Axes: +x the subject's left, +y up, +z forward. Raises ModelError naming the place of what is wrong.
+    Axes: +x the subject's left, +y up, +z forward. Raises ModelError naming the part, point or FAP that is
+    wrong.
     """
 
     parts: tuple[Part, ...]
@@ -95,9 +95,9 @@ class FaceModel(Meshes[Part]):
         object.__setattr__(self, "tables", tuple(sorted(self.tables, key=lambda table: table.fap)))
         if not self.parts:
             raise ModelError("a face needs at least one part")
-        seen = [part.name for part in self.parts]
-        for name in seen:
-            if seen.count(name) > 1:
+        part_names = [part.name for part in self.parts]
+        for name in part_names:
+            if part_names.count(name) > 1:
                 raise ModelError(f"two parts are named {name!r}")
         self._check_points()
         self._check_tables()
@@ -106,7 +106,7 @@ class FaceModel(Meshes[Part]):
                 raise ModelError(f"FAP {number} cannot be lost: there are {FIRST_LOW_LEVEL_FAP}..{FAP_COUNT}")
         object.__setattr__(self, "lost", dict(self.lost))
         object.__setattr__(self, "notes", dict(self.notes))
-        self.fapu  # noqa: B018 - a face without units is none
+        self.fapu  # noqa: B018 - raises ModelError for a face without units
 
     @staticmethod
     def default() -> FaceModel:
@@ -119,15 +119,15 @@ class FaceModel(Meshes[Part]):
     def load(cls, path: str | os.PathLike[str]) -> FaceModel:
         """A face from a glTF 2.0 file (.glb or .gltf) with the FBA extension, as `save` writes it.
 
-        Raises FormatError where the file cannot be opened, ModelError, which names the place in it,
-        where it is damaged, contradicts itself or brings no such extension.
+        Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
+        damaged, contradicts itself, or lacks the extension.
         """
         from fba.face.gltf.storage import load
 
         return load(path)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the face as glTF 2.0 (.glb): whole or not at all."""
+        """Write the face as glTF 2.0 (.glb), atomically."""
         from fba.face.gltf.storage import save
 
         save(self, path)
@@ -149,7 +149,7 @@ class FaceModel(Meshes[Part]):
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Feature points that the face does not have."""
+        """Names of the feature points that the face does not have."""
         return tuple(n for n, p in zip(names(), self.points, strict=True) if np.isnan(p).any())
 
     def of_kind(self, kind: str) -> tuple[Part, ...]:
@@ -177,11 +177,11 @@ class FaceModel(Meshes[Part]):
                 )
             if vertex >= 0 and np.isnan(points[row]).any():
                 raise ModelError(f"feature point {name} is bound to vertex {vertex}, but has no position")
-        tall = float(np.ptp(self.vertices[:, 1])) if len(self.vertices) else 0.0
-        held = bound >= 0
-        away = np.linalg.norm(self.vertices[bound[held]] - points[held], axis=1)
-        if len(away) and float(away.max()) > SHARED_POINT * max(tall, 1e-9):
-            row = int(np.flatnonzero(held)[int(away.argmax())])
+        height = float(np.ptp(self.vertices[:, 1])) if len(self.vertices) else 0.0
+        rows = np.flatnonzero(bound >= 0)
+        away = np.linalg.norm(self.vertices[bound[rows]] - points[rows], axis=1)
+        if len(away) and float(away.max()) > SHARED_POINT * max(height, 1e-9):
+            row = int(rows[away.argmax()])
             raise ModelError(
                 f"feature point {names()[row]} stands {away.max():g} m away from its vertex {bound[row]}"
             )
@@ -216,11 +216,11 @@ def bind(parts: tuple[Part, ...], points: npt.ArrayLike, most: float) -> Int32:
     """int32 (84,): for each feature point the nearest vertex at most `most` metres away, else -1."""
     from scipy.spatial import cKDTree
 
-    places = np.asarray(points, dtype=np.float64)
+    positions = np.asarray(points, dtype=np.float64)
     tree = cKDTree(np.concatenate([part.vertices for part in parts]))
-    known = np.isfinite(places).all(axis=1)
-    bound = np.full(len(places), -1, dtype=np.int32)
-    distance, vertex = tree.query(places[known])
+    known = np.isfinite(positions).all(axis=1)
+    bound = np.full(len(positions), -1, dtype=np.int32)
+    distance, vertex = tree.query(positions[known])
     bound[known] = np.where(distance <= most, vertex, -1)
     return bound
 

@@ -1,15 +1,15 @@
-"""FAPs -> moved feature points: what each FAP does to a face that is nothing but its feature points.
+"""Moves a face of feature points alone by FAPs.
 
-Every low-level FAP moves its own points by value x FAPU in the standard's direction. The jaw turns on a
-hinge below the ears, eyeballs and head turn about their centres, and points without a FAP of their own
-follow their neighbours (`followers.csv`), so that curves drawn through the points stay smooth.
+Every low-level FAP moves its own points by value x FAPU in the standard's direction. The jaw turns about a
+hinge below the ears, eyeballs and head about their centres, and points without a FAP of their own follow
+their neighbours (`followers.csv`), so that curves drawn through the points stay smooth.
 """
 
 from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64
 from fba.errors import ModelError
-from fba.face.fapu import Fapu
+from fba.face.fapu import PER_DISTANCE, Fapu
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
 from fba.parameters import FAP_COUNT, faps
 from fba.rotations import axis_matrices
@@ -33,41 +33,45 @@ DIRECTIONS = {
 
 OPEN_JAW, THRUST_JAW, SHIFT_JAW = 3, 14, 15
 YAW_EYE, PITCH_EYE, DILATE_PUPIL = (23, 24), (25, 26), (29, 30)
+THRUST_EYE = {27: "3.5", 28: "3.6"}
+"""Feature point of each eyeball, by the FAP that moves it forward."""
 TONGUE_ROLL = 47
 HEAD_PITCH, HEAD_YAW, HEAD_ROLL = 48, 49, 50
 ROTATING = {OPEN_JAW, *YAW_EYE, *PITCH_EYE, *DILATE_PUPIL, TONGUE_ROLL, HEAD_PITCH, HEAD_YAW, HEAD_ROLL}
-"""FAPs that turn or scale something, and so are not in the table of plain shifts."""
+"""FAPs that rotate or scale; `shift_table` leaves them out."""
 
 MANDIBLE = ("2.1", "2.10", "2.11", "2.12", "2.13", "2.14", "9.9", "9.11", "6.1", "6.2", "6.3", "6.4")
-"""Points carried by the lower jaw. The lips have FAPs of their own and stay."""
+"""Points that move with the lower jaw. The lips have FAPs of their own and stay."""
 EYEBALL_PER_IRIS = 1.03
-"""Radius of an eyeball by diameter of its iris: 12 mm by 11.7 mm in adults."""
+"""Ratio of an eyeball's radius to the diameter of its iris: 12 mm to 11.7 mm in adults."""
 
 
 @cache
 def _followers() -> tuple[tuple[int, int, Float64], ...]:
+    """(row of a point, row of the point that it follows, (3,) share of each coordinate) of every follower."""
     with (files(__package__) / "followers.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    found = []
+    followers = []
     for row in rows:
         weight = np.array([float(row[axis]) for axis in "xyz"])
-        pair = (row["point"], row["source"])
-        found.append((*(row_of()[name] for name in pair), weight))
-        mirror = tuple(MIRRORED.get(name, name) for name in pair)
-        if pair[0] in MIRRORED:
-            found.append((*(row_of()[name] for name in mirror), weight))
-    return tuple(found)  # type: ignore[arg-type]
+        point, source = row["point"], row["source"]
+        followers.append((row_of()[point], row_of()[source], weight))
+        if point in MIRRORED:
+            followers.append((row_of()[MIRRORED[point]], row_of()[MIRRORED.get(source, source)], weight))
+    return tuple(followers)
 
 
 def shift_table(fapu: Fapu) -> Float64:
-    """(68, 84, 3): how far one step of each FAP shifts each feature point; FAPs that rotate excluded."""
+    """(68, 84, 3) shift of each feature point by one step of each FAP; zero for FAPs that rotate or scale."""
     table = np.zeros((FAP_COUNT, len(names()), 3))
     for fap in faps():
         if fap.positive not in DIRECTIONS or fap.number in ROTATING:
             continue
         step = np.array(DIRECTIONS[fap.positive]) * fapu[fap.unit]
         points = MANDIBLE if fap.number in (THRUST_JAW, SHIFT_JAW) else fap.feature_points
-        for name in points or _eye_point(fap.number):
+        if fap.number in THRUST_EYE:
+            points = (THRUST_EYE[fap.number],)
+        for name in points:
             table[fap.number - 1, row_of()[name]] += step
     own = table.copy()
     for point, source, weight in _followers():
@@ -75,13 +79,9 @@ def shift_table(fapu: Fapu) -> Float64:
     return table
 
 
-def _eye_point(number: int) -> tuple[str, ...]:
-    return {27: ("3.5",), 28: ("3.6",)}.get(number, ())
-
-
 @dataclass(frozen=True, eq=False)
 class Eyeballs:
-    """Where the eyes are and look, left first, in the frame of the head.
+    """Eyeballs over time, the left one first, in the frame of the head.
 
     centres: (T, 2, 3). gaze: (T, 2, 3), unit vectors. pupils: (T, 2), diameters.
     """
@@ -92,7 +92,7 @@ class Eyeballs:
 
 
 class FeaturePointFace:
-    """A face of 84 feature points; call it with FAPs to see them move.
+    """A face of 84 feature points; calling it with FAPs gives the moved points.
 
     points: (84, 3) neutral feature points, +x the subject's left, +y up, +z forward, any unit of
     length; by default those of an adult head in metres. Raises ModelError where they are not finite or
@@ -103,31 +103,49 @@ class FeaturePointFace:
         self.points: Float64 = np.array(neutral_points() if points is None else points, dtype=np.float64)
         self.fapu = Fapu.measure(self.points)
         if not np.isfinite(self.points).all():
-            lost = [n for n, p in zip(names(), self.points, strict=True) if not np.isfinite(p).all()]
-            raise ModelError(f"feature points without a finite position: {', '.join(lost)}")
-        row = row_of()
-        self._shift = shift_table(self.fapu).reshape(FAP_COUNT, -1)
-        self.eyeball_radius = EYEBALL_PER_IRIS * self.fapu.IRISD * 1024
-        eyes = self.points[[row["3.5"], row["3.6"]]]
-        self.eyeball_centres: Float64 = eyes - (0.0, 0.0, self.eyeball_radius)
-        self.head_centre: Float64 = self.points[row["7.1"]]
-        ear = (self.points[row["10.7"]] + self.points[row["10.8"]] + self.points[row["10.9"]] * 2) / 4
-        self.jaw_hinge: Float64 = np.array([0.0, ear[1], ear[2]])
-        self._mandible = [row[name] for name in MANDIBLE]
+            unknown = [n for n, p in zip(names(), self.points, strict=True) if not np.isfinite(p).all()]
+            raise ModelError(f"feature points without a finite position: {', '.join(unknown)}")
+
+    @cached_property
+    def eyeball_radius(self) -> float:
+        """Radius of each eyeball, from the diameter of its iris."""
+        return EYEBALL_PER_IRIS * self.fapu.IRISD * PER_DISTANCE
+
+    @cached_property
+    def eyeball_centres(self) -> Float64:
+        """(2, 3) centres of the eyeballs in the neutral face, the left one first."""
+        pupils: Float64 = self.points[[row_of()["3.5"], row_of()["3.6"]]]
+        return pupils - (0.0, 0.0, self.eyeball_radius)
+
+    @cached_property
+    def head_centre(self) -> Float64:
+        """(3,) centre of the head's rotations."""
+        return np.asarray(self.points[row_of()["7.1"]])
+
+    @cached_property
+    def jaw_hinge(self) -> Float64:
+        """(3,) a point on the axis of the jaw, below the ears."""
+        top, bottom = self.points[[row_of()["10.7"], row_of()["10.8"]]], self.points[row_of()["10.9"]]
+        ear = (top[0] + top[1] + bottom * 2) / 4
+        return np.array([0.0, ear[1], ear[2]])
+
+    @cached_property
+    def _shift(self) -> Float64:
+        return shift_table(self.fapu).reshape(FAP_COUNT, -1)
 
     def __call__(self, faps: npt.ArrayLike) -> Float32:
-        """Feature points moved by FAPs: (68,) -> (84, 3), or (T, 68) -> (T, 84, 3), float32.
+        """Moved feature points: (68,) -> (84, 3), or (T, 68) -> (T, 84, 3), float32.
 
-        Values as `resolve` gives them, in the units of the standard; columns 0 and 1 do nothing.
+        Values as `resolve` gives them, in the units of the standard; columns 0 and 1 are ignored.
         Raises ValueError on another shape.
         """
         values, single = _as_frames(faps)
         moved = self._local(values)
-        turned = (moved - self.head_centre) @ _head_matrices(values).swapaxes(1, 2) + self.head_centre
-        return (turned[0] if single else turned).astype(np.float32)
+        rotated = (moved - self.head_centre) @ _head_matrices(values).swapaxes(1, 2) + self.head_centre
+        return (rotated[0] if single else rotated).astype(np.float32)
 
     def local(self, faps: npt.ArrayLike) -> Float32:
-        """Like calling, but in the frame of the head: head pitch, yaw and roll left out."""
+        """Like calling, but in the frame of the head: without head pitch, yaw and roll."""
         values, single = _as_frames(faps)
         moved = self._local(values)
         return (moved[0] if single else moved).astype(np.float32)
@@ -139,7 +157,7 @@ class FeaturePointFace:
         return matrices[0] if single else matrices
 
     def jaw_angle(self, faps: npt.ArrayLike) -> Float64:
-        """(T,) radians by which the jaw hangs open."""
+        """(T,) angle by which the jaw is open, radians."""
         return self._jaw_angle(_as_frames(faps)[0])
 
     def eyeballs(self, faps: npt.ArrayLike) -> Eyeballs:
@@ -152,16 +170,16 @@ class FeaturePointFace:
         gaze = np.stack([np.sin(yaw) * np.cos(pitch), -np.sin(pitch), np.cos(yaw) * np.cos(pitch)], axis=-1)
         centres = np.repeat(self.eyeball_centres[None], len(values), axis=0)
         centres[..., 2] += values[:, 26:28] * self.fapu.ES
-        pupils = self.fapu.IRISD * (1024 / 3 + dilation)
+        pupils = self.fapu.IRISD * (PER_DISTANCE / 3 + dilation)
         return Eyeballs(centres, gaze, np.maximum(pupils, 0.0))
 
     def _local(self, values: Float64) -> Float64:
         shift = (values @ self._shift).reshape(len(values), -1, 3)
         moved = self.points + shift
         row = row_of()
-        angle = self._jaw_angle(values)
-        moved[:, self._mandible] = _turned_x(self.points[self._mandible], self.jaw_hinge, angle)
-        moved[:, self._mandible] += shift[:, self._mandible]
+        mandible = [row[name] for name in MANDIBLE]
+        moved[:, mandible] = _rotate_x(self.points[mandible], self.jaw_hinge, self._jaw_angle(values))
+        moved[:, mandible] += shift[:, mandible]
         eyes = self.eyeballs(values)
         pupils = [row["3.5"], row["3.6"]]
         moved[:, pupils] = eyes.centres + eyes.gaze * self.eyeball_radius
@@ -193,8 +211,8 @@ def _as_frames(faps: npt.ArrayLike) -> tuple[Float64, bool]:
     return values, single
 
 
-def _turned_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
-    """Points (N, 3) turned about an axis along x by each angle (T,): (T, N, 3); positive lowers +z."""
+def _rotate_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
+    """(T, N, 3): points (N, 3) rotated about an axis along x by each angle (T,); positive lowers +z."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     y, z = points[:, 1] - centre[1], points[:, 2] - centre[2]
     x = np.broadcast_to(points[:, 0], (len(angle), len(points)))

@@ -1,8 +1,8 @@
-"""FaceDefTables: what each FAP does to the vertices and the parts of a face model.
+"""FaceDefTables: the effect of each FAP on the vertices and the parts of a face model.
 
 ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform. One FAP moves vertices along
-piecewise linear paths (`FaceDefMesh`) and turns, scales or shifts whole parts (`FaceDefTransform`).
-What several FAPs do to a vertex adds up; transforms act afterwards, a part's own before the head's.
+piecewise linear paths (`FaceDefMesh`) and rotates, scales or shifts whole parts (`FaceDefTransform`).
+Shifts of a vertex by several FAPs add up; transforms are applied afterwards, a part's own before the head's.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from fba.errors import ModelError
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 HEAD = "head"
-"""The part name that stands for all parts together: what turns with the head."""
+"""The part name that stands for all parts together."""
 KINDS = ("rotation", "scale", "translation")
-"""What a transform changes; position in the tuple + 1 is the standard's fieldId."""
+"""Kinds of transforms; the index in the tuple + 1 is the standard's fieldId."""
 
 
 @dataclass(frozen=True, eq=False)
 class FaceDefMesh:
     """Vertices of one part that a FAP moves, and their displacements.
 
-    part: its name. borders: int32 (K,), K >= 2, FAP values in rising order, exactly one of them 0.
+    part: its name. borders: int32 (K,), K >= 2, FAP values in ascending order, exactly one of them 0.
     vertices: int32 (N,), indices into the part's vertices, each once. displacements: float32
     (N, K - 1, 3): on interval j (from borders[j] to borders[j + 1]) one step of the FAP moves vertex i
-    by displacements[i, j] x FAPU. Beyond the outermost borders the outermost intervals go on.
+    by displacements[i, j] x FAPU. The outermost intervals extend beyond the outermost borders.
 
-    Arrays are copied and read-only. Raises ModelError where they contradict this.
+    Arrays are copied and read-only. Raises ModelError where one is not as described.
     """
 
     part: str
@@ -59,9 +59,9 @@ class FaceDefMesh:
                 f"displacements of shape ({len(vertices)}, {len(borders) - 1}, 3), not {moves.shape}"
             )
         if not np.isfinite(moves).all():
-            place = int(np.argwhere(~np.isfinite(moves))[0, 0])
+            row = int(np.argwhere(~np.isfinite(moves))[0, 0])
             raise ModelError(
-                f"FaceDefMesh of {self.part!r}: the displacement of vertex {vertices[place]} is not finite"
+                f"FaceDefMesh of {self.part!r}: the displacement of vertex {vertices[row]} is not finite"
             )
         if len(vertices) and int(vertices.min()) < 0:
             raise ModelError(f"FaceDefMesh of {self.part!r}: vertex index {vertices.min()} is negative")
@@ -74,12 +74,12 @@ class FaceDefMesh:
             object.__setattr__(self, name, array)
 
     def shift(self, value: float) -> Float32:
-        """How far each vertex is moved by a FAP value, in FAPU: float32 (N, 3)."""
+        """Shift of each vertex by a FAP value, in FAPU: float32 (N, 3)."""
         return interval_lengths(self.borders, value) @ self.displacements
 
 
 def interval_lengths(borders: Int32, value: float) -> Float32:
-    """How much of each interval a FAP value passes through, coming from 0: float32 (K - 1,), signed.
+    """Length of each interval between 0 and a FAP value: float32 (K - 1,), with the value's sign.
 
     The worked example of the standard: borders [-1000, 0, 500, 1000] and the value 600 give
     [0, 500, 100].
@@ -94,12 +94,12 @@ def interval_lengths(borders: Int32, value: float) -> Float32:
 
 @dataclass(frozen=True, eq=False)
 class FaceDefTransform:
-    """A turn, a change of size or a shift of a part.
+    """A rotation, scale or translation of a part.
 
-    part: its name, or `HEAD` for everything. kind: "rotation", "scale" or "translation".
-    amount: float (3,), for one step of the FAP: "rotation", the axis times radians per FAPU (1e-5 rad a
-    step where the unit is AU); "scale", by how much each axis grows per FAPU, above 1; "translation",
-    the shift per FAPU. centre: (3,), the fixed point of a rotation or scale, in the neutral face.
+    part: its name, or `HEAD` for all. kind: "rotation", "scale" or "translation". amount: float (3,), for
+    one step of the FAP: "rotation", the axis times radians per FAPU (1e-5 rad a step where the unit is AU);
+    "scale", the growth of each axis per FAPU, 0 for none; "translation", the shift per FAPU. centre: (3,),
+    the fixed point of a rotation or scale, in the neutral face.
 
     Raises ModelError where a number is not finite or the kind unknown.
     """
@@ -126,7 +126,7 @@ class FaceDefTransform:
 
 @dataclass(frozen=True, eq=False)
 class FaceDefTables:
-    """The effect of one FAP. fap: its number, 3..68. ModelError for another, or a part listed twice."""
+    """The effect of one FAP. fap: its number, 3..68. ModelError for another, or two meshes of a part."""
 
     fap: int
     meshes: tuple[FaceDefMesh, ...] = ()

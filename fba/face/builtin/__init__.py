@@ -19,5 +19,5 @@ def default() -> FaceModel:
     from fba.face.gltf.storage import load
 
     with as_file(files(__package__) / "head.glb") as path:
-        # What a viseme looks like may be tuned without making the head anew.
+        # The current definitions, so that visemes can be tuned without a new head.glb.
         return replace(load(path), definitions=Definitions.default())

@@ -9,6 +9,7 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.face.checks._findings import Finding
 from fba.face.checks.posing import Poser
+from fba.face.eyeball import distances_from_axis
 from fba.face.points import (
     DILATE_PUPIL,
     DIRECTIONS,
@@ -17,6 +18,7 @@ from fba.face.points import (
     HEAD_YAW,
     OPEN_JAW,
     PITCH_EYE,
+    THRUST_EYE,
     TONGUE_ROLL,
     YAW_EYE,
 )
@@ -33,7 +35,6 @@ MATE = 0.01
 """Distance that its mate may move, as a share of the point's."""
 ARC = {OPEN_JAW, 19, 20, 21, 22}
 """FAPs whose points follow an arc: only the component along the direction is prescribed."""
-THRUST_EYE = {27: "3.5", 28: "3.6"}
 EYE_POINT = {23: "3.5", 24: "3.6", 25: "3.5", 26: "3.6", **THRUST_EYE, 29: "3.5", 30: "3.6"}
 HEAD_AXIS = {HEAD_PITCH: (1.0, 0.0, 0.0), HEAD_YAW: (0.0, 1.0, 0.0), HEAD_ROLL: (0.0, 0.0, 1.0)}
 
@@ -155,21 +156,16 @@ def _check_pupil(poser: Poser, fap: int) -> Iterator[Finding]:
     side = "left" if EYE_POINT[fap] == "3.5" else "right"
     eye, unit = poser.eyes[side], poser.model.fapu.IRISD
     own = _eye_vertices(poser, side)
-
-    def off_axis(points: Float64) -> Float64:
-        arms = points - eye.centre
-        return np.asarray(np.linalg.norm(arms - np.outer(arms @ eye.gaze, eye.gaze), axis=1))
-
     radius = unit * 1024 / 6
-    distance = off_axis(poser.neutral[own])
+    distance = distances_from_axis(poser.neutral[own], eye.centre, eye.gaze)
     front = (poser.neutral[own] - eye.centre) @ eye.gaze > 0
     rim = own[front & (np.abs(distance - radius) < 0.25 * radius)]
     if not len(rim):
         rim = own[front & (distance < 1.5 * radius) & (distance > 1e-6)]
-    before = off_axis(poser.neutral[rim])
+    before = distances_from_axis(poser.neutral[rim], eye.centre, eye.gaze)
     for value in (6 * SMALL, -6 * SMALL):
         # Vertices inside the pupil move in proportion to their radius, those outside it less and less.
-        grown = off_axis(poser.pose({fap: value})[rim]) - before
+        grown = distances_from_axis(poser.pose({fap: value})[rim], eye.centre, eye.gaze) - before
         wanted = (
             value
             * unit
