@@ -57,19 +57,19 @@ class Eyeball:
             matrix @ frame,
             iris,
             min(max(pupil / 2 / self.radius, 0.03), iris * 0.92),
-            self._lid_places(face, centre),
+            self._lid_positions(face, centre),
             matrix[:3, :3] / math.sqrt(matrix[:3, 0] @ matrix[:3, 0]),
         )
 
-    def _lid_places(self, face: Float32, centre: Float64) -> Float64:
+    def _lid_positions(self, face: Float32, centre: Float64) -> Float64:
         """(4, 3): lid middles and corners relative to the centre, in radii; an open eye's if missing."""
         if min(self.lids) >= 0:
             known: Float64 = (face.take(self.lids, axis=0) - centre) / self.radius
             return known
         open_ = np.array([[0.0, 0.5, 0.86], [0.0, -0.5, 0.86], [1.0, 0.0, 0.3], [-1.0, 0.0, 0.3]])
-        for place, vertex in enumerate(self.lids):
+        for row, vertex in enumerate(self.lids):
             if vertex >= 0:
-                open_[place] = (face[vertex] - centre) / self.radius
+                open_[row] = (face[vertex] - centre) / self.radius
         return open_
 
 
@@ -78,11 +78,11 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     vertices = part.vertices.astype(np.float64)
     if len(vertices) < FEWEST:
         return None
-    on = np.ones(len(vertices), dtype=bool)
+    on_sphere = np.ones(len(vertices), dtype=bool)
     for _ in range(4):  # leaves out what stands out, such as a cornea
-        centre, radius = _fit_sphere(vertices[on])
+        centre, radius = _fit_sphere(vertices[on_sphere])
         away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
-        on = away <= max(float(np.quantile(away, 0.7)), 1e-9)
+        on_sphere = away <= max(float(np.quantile(away, 0.7)), 1e-9)
     if not np.isfinite(radius) or radius <= 0 or float(np.median(away)) > ROUND * radius:
         return None
     if float(np.ptp(vertices, axis=0).max()) > 2.4 * radius:
@@ -102,8 +102,9 @@ def _fit_sphere(points: Float64) -> tuple[Float64, float]:
     middle = points.mean(axis=0)
     p = points - middle
     a = np.column_stack([2 * p, np.ones(len(p))])
-    found = np.linalg.lstsq(a, (p * p).sum(axis=1), rcond=None)[0]
-    return found[:3] + middle, float(np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
+    solution = np.linalg.lstsq(a, (p * p).sum(axis=1), rcond=None)[0]
+    centre = solution[:3]
+    return centre + middle, float(np.sqrt(max(solution[3] + centre @ centre, 0.0)))
 
 
 @compiled
@@ -142,12 +143,12 @@ def _fit_motion(before: Float64, after: Float64, centre: Float64) -> tuple[Float
                 x[j, k] = new
         if change < 1e-12:
             break
-    placed = np.zeros(3)
+    image = np.zeros(3)
     for j in range(3):
-        placed[j] = middle[j]
+        image[j] = middle[j]
         for k in range(3):
-            placed[j] += x[j, k] * (centre[k] - start[k])
-    return x, placed
+            image[j] += x[j, k] * (centre[k] - start[k])
+    return x, image
 
 
 def _fit_rotation(before: Float64, after: Float64) -> Float64:

@@ -31,8 +31,8 @@ class Table(NamedTuple):
 
 
 @compiled
-def light_vertices(table: Table, basis: Float32, share: float, more: float, found: Float32) -> None:
-    """Write found (N, 4): key light, sky, through, rim light.
+def light_vertices(table: Table, basis: Float32, share: float, more: float, light: Float32) -> None:
+    """Write light (N, 4): key light, sky, through, rim light.
 
     basis: (2, 16), weights of the harmonics for key and rim light. share: how far the mouth is wide open.
     more: the share of the missing light that is added.
@@ -41,28 +41,28 @@ def light_vertices(table: Table, basis: Float32, share: float, more: float, foun
     share, more = np.float32(share), np.float32(more)  # type: ignore[assignment]
     key, rim, back = _products(table.light, table.through, basis, count)
     for i in range(count):
-        found[i, 0], found[i, 1], found[i, 2], found[i, 3] = key[i], table.open[i], back[i], rim[i]
+        light[i, 0], light[i, 1], light[i, 2], light[i, 3] = key[i], table.open[i], back[i], rim[i]
     if share > 0.0 and len(table.near):
         key, rim, back = _products(table.wide_light, table.wide_through, basis, len(table.near))
         for k in range(len(table.near)):
             i = table.near[k]
-            found[i, 0] += share * (key[k] - found[i, 0])
-            found[i, 1] += share * (table.wide_open[k] - found[i, 1])
-            found[i, 2] += share * (back[k] - found[i, 2])
-            found[i, 3] += share * (rim[k] - found[i, 3])
+            light[i, 0] += share * (key[k] - light[i, 0])
+            light[i, 1] += share * (table.wide_open[k] - light[i, 1])
+            light[i, 2] += share * (back[k] - light[i, 2])
+            light[i, 3] += share * (rim[k] - light[i, 3])
     if more > 0.0:
         for i in range(count):
-            found[i, 0] += more * (np.float32(1.0) - found[i, 0])
-            found[i, 1] += more * (np.float32(1.0) - found[i, 1])
+            light[i, 0] += more * (np.float32(1.0) - light[i, 0])
+            light[i, 1] += more * (np.float32(1.0) - light[i, 1])
 
 
 @compiled
-def blend_swaying(found: Float32, still: Float32, rows: Intp, share: Float32) -> None:
-    """Blend rows of found (N, 4) with `still` (M, 4), the same vertices standing still. share: (M,), how far
+def blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) -> None:
+    """Blend rows of light (N, 4) with `still` (M, 4), the same vertices standing still. share: (M,), how far
     each goes with the head."""
     for k in range(len(rows)):
         for column in range(4):
-            found[rows[k], column] = still[k, column] + share[k] * (found[rows[k], column] - still[k, column])
+            light[rows[k], column] = still[k, column] + share[k] * (light[rows[k], column] - still[k, column])
 
 
 @compiled

@@ -14,7 +14,7 @@ from fba.easing import smoothstep
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.mesh.simplify import DetailLevels
-from fba_player.mesh.textures import RELIEF, FacePicture, texture_breadth
+from fba_player.mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
 from fba_player.view.view import FaceShape
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ def compute_sway(model: FaceModel) -> Float32:
 
 def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
     """(3,): the middle of the first two of the named feature points that the face has, or None."""
-    places = np.array([model.points[point_row(name)] for name in names])
-    known = places[np.isfinite(places).all(axis=1)][:2]
+    points = np.array([model.points[point_row(name)] for name in names])
+    known = points[np.isfinite(points).all(axis=1)][:2]
     return np.asarray(known.mean(axis=0)) if len(known) else None
 
 
@@ -108,9 +108,9 @@ def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
 
 def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:
     """The shape with these triangles (F, 3) only."""
-    left = np.ascontiguousarray(triangles, dtype=np.int32)
-    coarser = None if shape.coarser is None else replace(shape.coarser, triangles=left)
-    return replace(shape, triangles=left, coarser=coarser)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+    coarser = None if shape.coarser is None else replace(shape.coarser, triangles=triangles)
+    return replace(shape, triangles=triangles, coarser=coarser)
 
 
 def find_hairs(part: Part) -> Float32 | None:
@@ -139,26 +139,26 @@ def find_hairs(part: Part) -> Float32 | None:
     hair = _pieces(edges, count)
     tip = np.full(count, -1)
     tip[hair[~paired]] = np.flatnonzero(~paired)  # unpaired: a tip's nearest has a nearer one
-    kept = paired & (tip[hair] >= 0)
-    found = np.zeros((count, 8), dtype=np.float32)
-    found[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
-    found[kept, :3] = _units(vertices[kept] - vertices[opposite[kept]])
-    found[kept, 3] = half[kept]
-    found[kept, 4:7] = _units(vertices[tip[hair[kept]]] - vertices[kept])
-    return found
+    complete = paired & (tip[hair] >= 0)
+    across = np.zeros((count, 8), dtype=np.float32)
+    across[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
+    across[complete, :3] = _units(vertices[complete] - vertices[opposite[complete]])
+    across[complete, 3] = half[complete]
+    across[complete, 4:7] = _units(vertices[tip[hair[complete]]] - vertices[complete])
+    return across
 
 
 def _pieces(edges: Intp, count: int) -> Intp:
     """(V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
     lowest = np.arange(count)
     while True:  # each round halves the remaining distance
-        found = lowest.copy()
-        np.minimum.at(found, edges[:, 0], lowest[edges[:, 1]])
-        np.minimum.at(found, lowest, found)
-        found = found[found]
-        if np.array_equal(found, lowest):
+        lower = lowest.copy()
+        np.minimum.at(lower, edges[:, 0], lowest[edges[:, 1]])
+        np.minimum.at(lower, lowest, lower)
+        lower = lower[lower]
+        if np.array_equal(lower, lowest):
             return lowest
-        lowest = found
+        lowest = lower
 
 
 def _units(vectors: Float64) -> Float64:
@@ -178,9 +178,9 @@ def _is_smooth(part: Part) -> bool:
     """Whether most edges bend so little that light may be interpolated between vertices."""
     if part.normals is None or not len(part.triangles):
         return True
-    upright, places = part.normals[part.triangles], part.vertices[part.triangles]
-    cosines = np.einsum("tkn,tkn->tk", upright, np.roll(upright, 1, axis=1))
-    lengths = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2)
+    normals, corners = part.normals[part.triangles], part.vertices[part.triangles]
+    cosines = np.einsum("tkn,tkn->tk", normals, np.roll(normals, 1, axis=1))
+    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     return bool(((cosines < BENT) & (lengths > LONG)).mean() < MOST_BENT)
 
 
@@ -189,7 +189,7 @@ def _picture(part: Part) -> FacePicture | None:
     if part.material.texture is None:
         return None
     try:
-        return FacePicture(part.material.texture)
+        return load_picture(part.material.texture)
     except (OSError, ValueError, SyntaxError) as error:
         warnings.warn(
             f"the texture of part {part.name!r} cannot be read ({error}): its colour is shown instead",

@@ -42,7 +42,7 @@ NEAREST = 3
 LARGE = 4000
 """Neighbours are cached on disk for bodies with at least this many vertices."""
 MAKING = 1
-"""Cache version of neighbours; increment when `_near` gives other results."""
+"""Cache version of neighbours; increment when `_nearest_samples` gives other results."""
 FOLDS = 0.75
 """Strength of occlusion by folds: below 1, as cloth lets light through and the posture changes."""
 
@@ -75,7 +75,7 @@ class BodyLight:
         capsules = _capsules(joints[self.ends.ravel(), :3, 3].reshape(-1, 2, 3), self.radii)
         past = np.empty((len(sampled), 2), dtype=np.float32)
         _shade_by_capsules(positions, normals, sampled, capsules, past)
-        _spread(past, near, shares, folds, light)
+        _interpolate(past, near, shares, folds, light)
         return light
 
     @cached_property
@@ -91,12 +91,14 @@ class BodyLight:
             coarser = self.coarser[part.name]
             left = None if coarser is None else coarser.triangles_within(COARSE)
             rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
-        near, shares = _near([part.vertices for part in body.parts], rows)
+        near, shares = _nearest_samples([part.vertices for part in body.parts], rows)
         starts = [body.starts[part.name] for part in body.parts]
         every = np.ones(len(body.vertices), dtype=bool)
         open_ = cached_visibility(body.vertices, body.normals, body.triangles, every).open
         return (
-            np.concatenate([some + start for some, start in zip(rows, starts, strict=True)]).astype(np.int32),
+            np.concatenate([samples + start for samples, start in zip(rows, starts, strict=True)]).astype(
+                np.int32
+            ),
             near,
             shares,
             (1 - FOLDS * (1 - np.clip(open_, 0, 1))).astype(np.float32),
@@ -114,7 +116,7 @@ def build_body_light(body: BodyModel, coarser: Mapping[str, DetailLevels | None]
     return BodyLight(body, coarser, ends, radii)
 
 
-def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
+def _nearest_samples(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
     """For each vertex of all parts, (V, 3) each: indices (V, NEAREST) of the nearest sampled vertices of its
     part, counted over the rows of all parts, and their weights (V, NEAREST)."""
 
@@ -123,17 +125,17 @@ def _near(parts: list[Float32], rows: list[Integer]) -> tuple[Int32, Float32]:
 
         near, shares = [], []
         count = 0
-        for vertices, some in zip(parts, rows, strict=True):
-            if len(some):
-                away, found = cKDTree(vertices[some]).query(vertices, k=min(NEAREST, len(some)))
-                away, found = away.reshape(len(vertices), -1), found.reshape(len(vertices), -1)
-                missing = NEAREST - found.shape[1]
+        for vertices, samples in zip(parts, rows, strict=True):
+            if len(samples):
+                away, index = cKDTree(vertices[samples]).query(vertices, k=min(NEAREST, len(samples)))
+                away, index = away.reshape(len(vertices), -1), index.reshape(len(vertices), -1)
+                missing = NEAREST - index.shape[1]
                 away = np.pad(away, ((0, 0), (0, missing)), constant_values=1e9)
-                found = np.pad(found, ((0, 0), (0, missing)))
+                index = np.pad(index, ((0, 0), (0, missing)))
                 weight = 1 / np.maximum(away, 1e-4)
-                near.append(found + count)
+                near.append(index + count)
                 shares.append(weight / weight.sum(axis=1, keepdims=True))
-            count += len(some)
+            count += len(samples)
         return [np.concatenate(near).astype(np.int32), np.concatenate(shares).astype(np.float32)]
 
     total = sum(map(len, parts))
@@ -151,19 +153,19 @@ def _capsules(ends: Float64, radii: Float64) -> Float32:
     """float32 (K, 11) for ends (K, 2, 3) and radii (K,): one end (3), the axis to the other end (3), its
     inverse squared length, its component towards the key light, the inverse squared length of the rest, the
     radius and its square."""
-    found = np.empty((len(ends), 11), dtype=np.float32)
-    way = ends[:, 1] - ends[:, 0]
-    squared = np.maximum(np.einsum("ij,ij->i", way, way), 1e-9)
-    along = way @ KEY
-    found[:, :3], found[:, 3:6], found[:, 7] = ends[:, 0], way, along
-    found[:, 6], found[:, 8] = 1 / squared, 1 / np.maximum(squared - along * along, 1e-9)
-    found[:, 9], found[:, 10] = radii, radii * radii
-    return found
+    capsules = np.empty((len(ends), 11), dtype=np.float32)
+    axis = ends[:, 1] - ends[:, 0]
+    squared = np.maximum(np.einsum("ij,ij->i", axis, axis), 1e-9)
+    along = axis @ KEY
+    capsules[:, :3], capsules[:, 3:6], capsules[:, 7] = ends[:, 0], axis, along
+    capsules[:, 6], capsules[:, 8] = 1 / squared, 1 / np.maximum(squared - along * along, 1e-9)
+    capsules[:, 9], capsules[:, 10] = radii, radii * radii
+    return capsules
 
 
 @compiled
 def _shade_by_capsules(
-    places: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32
+    positions: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32
 ) -> None:
     """Write past (N, 2): the shares of the key light and of the sky that come past the capsules to rows (N,).
 
@@ -176,7 +178,7 @@ def _shade_by_capsules(
     lit, sky = np.ones(count, np.float32), np.ones(count, np.float32)
     for i in range(count):
         row = rows[i]
-        x[i], y[i], z[i] = places[row, 0], places[row, 1], places[row, 2]
+        x[i], y[i], z[i] = positions[row, 0], positions[row, 1], positions[row, 2]
         nx[i], ny[i], nz[i] = normals[row, 0], normals[row, 1], normals[row, 2]
     for k in range(len(capsules)):
         cx, cy, cz = capsules[k, 0], capsules[k, 1], capsules[k, 2]
@@ -213,7 +215,7 @@ def _shade_by_capsules(
 
 
 @compiled
-def _spread(past: Float32, near: Int32, shares: Float32, folds: Float32, light: Float32) -> None:
+def _interpolate(past: Float32, near: Int32, shares: Float32, folds: Float32, light: Float32) -> None:
     """Write light (V, 4): what comes past capsules and folds."""
     lit, open_ = np.float32(REACH[0]), np.float32(REACH[1])
     through, rim = np.float32(REACH[2]), np.float32(REACH[3])

@@ -15,7 +15,7 @@ from fba.parameters import faps
 SIZES = (0.01, 1.0)
 """Distances between the eyes (m) that are taken for metres: from dolls to giants."""
 EYES_APART = 0.062
-KINDS = {"eye": "eyes", "teeth": "teeth"}
+EXPECTED = {"eye": "eyes", "teeth": "teeth"}
 
 
 def prepare_model(model: FaceModel) -> FaceModel:
@@ -24,7 +24,7 @@ def prepare_model(model: FaceModel) -> FaceModel:
     Gives an FbaWarning for such a unit, for missing eyes or teeth, and for missing FaceDefTables.
     """
     named = f"the face {model.name!r}" if model.name else "the face"
-    missing = [words for kind, words in KINDS.items() if not model.of_kind(kind)]
+    missing = [plural for kind, plural in EXPECTED.items() if not model.of_kind(kind)]
     if missing:
         _warn(f"{named} has no {' and no '.join(missing)}: it is shown without")
     if not model.tables:

@@ -71,17 +71,17 @@ def bake(
         # Copies: read-only arrays, as a model's, are another type, for which loops would be compiled again.
         normals, triangles = normals.copy(), triangles.copy()
         rows = np.arange(count) if within is None or not within.any() else np.flatnonzero(within)
-        chosen = vertices[rows]
-        centre = (chosen.min(axis=0) + chosen.max(axis=0)) / 2
-        reach = float(np.linalg.norm(chosen - centre, axis=1).max()) * 1.01
+        baked = vertices[rows]
+        centre = (baked.min(axis=0) + baked.max(axis=0)) / 2
+        reach = float(np.linalg.norm(baked - centre, axis=1).max()) * 1.01
         size = int(np.clip(2 * reach / PIXEL, 16, MOST_PIXELS))
         depth = np.empty((size, size), dtype=np.float32)
         for column, direction in enumerate(directions):
             frame = _frame(direction).astype(np.float32)
             seen = ((vertices - centre) @ frame.T / reach).astype(np.float32)
             facing = (normals @ direction).astype(np.float32)
-            _draw(seen, triangles, depth)
-            _look(seen, facing, rows, depth, reach, visible[:, column], through[:, column])
+            _draw_depths(seen, triangles, depth)
+            _read_depths(seen, facing, rows, depth, reach, visible[:, column], through[:, column])
         _mirror(visible, normals, directions.astype(np.float32))
     above = np.maximum(normals.astype(np.float32) @ directions.T.astype(np.float32), 0)
     free = (above * visible).sum(axis=1) / np.maximum(above.sum(axis=1), 1e-9)
@@ -96,31 +96,31 @@ def weights(directions: Float64) -> Float64:
 
 def harmonics(directions: Float64) -> Float64:
     """float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
-    found = np.empty((len(directions), HARMONICS))
-    _harmonics(np.ascontiguousarray(directions, dtype=np.float64), found)
-    return found
+    values = np.empty((len(directions), HARMONICS))
+    _harmonics(np.ascontiguousarray(directions, dtype=np.float64), values)
+    return values
 
 
 @compiled
-def _harmonics(directions: Float64, found: Float64) -> None:
+def _harmonics(directions: Float64, values: Float64) -> None:
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
-        found[i, 0] = 0.282095
-        found[i, 1] = 0.488603 * y
-        found[i, 2] = 0.488603 * z
-        found[i, 3] = 0.488603 * x
-        found[i, 4] = 1.092548 * x * y
-        found[i, 5] = 1.092548 * y * z
-        found[i, 6] = 0.315392 * (3 * z * z - 1)
-        found[i, 7] = 1.092548 * x * z
-        found[i, 8] = 0.546274 * (x * x - y * y)
-        found[i, 9] = 0.590044 * y * (3 * x * x - y * y)
-        found[i, 10] = 2.890611 * x * y * z
-        found[i, 11] = 0.457046 * y * (5 * z * z - 1)
-        found[i, 12] = 0.373176 * z * (5 * z * z - 3)
-        found[i, 13] = 0.457046 * x * (5 * z * z - 1)
-        found[i, 14] = 1.445306 * z * (x * x - y * y)
-        found[i, 15] = 0.590044 * x * (x * x - 3 * y * y)
+        values[i, 0] = 0.282095
+        values[i, 1] = 0.488603 * y
+        values[i, 2] = 0.488603 * z
+        values[i, 3] = 0.488603 * x
+        values[i, 4] = 1.092548 * x * y
+        values[i, 5] = 1.092548 * y * z
+        values[i, 6] = 0.315392 * (3 * z * z - 1)
+        values[i, 7] = 1.092548 * x * z
+        values[i, 8] = 0.546274 * (x * x - y * y)
+        values[i, 9] = 0.590044 * y * (3 * x * x - y * y)
+        values[i, 10] = 2.890611 * x * y * z
+        values[i, 11] = 0.457046 * y * (5 * z * z - 1)
+        values[i, 12] = 0.373176 * z * (5 * z * z - 3)
+        values[i, 13] = 0.457046 * x * (5 * z * z - 1)
+        values[i, 14] = 1.445306 * z * (x * x - y * y)
+        values[i, 15] = 0.590044 * x * (x * x - 3 * y * y)
 
 
 @cache
@@ -161,16 +161,16 @@ def _mirror(visible: Float32, normals: Float32, directions: Float32) -> None:
             x -= 2.0 * down * normals[i, 0]
             y -= 2.0 * down * normals[i, 1]
             z -= 2.0 * down * normals[i, 2]
-            best, found = -2.0, 0
+            best, mirrored = -2.0, 0
             for other in range(count):
                 near = x * directions[other, 0] + y * directions[other, 1] + z * directions[other, 2]
                 if near > best:
-                    best, found = near, other
-            visible[i, k] = visible[i, found]
+                    best, mirrored = near, other
+            visible[i, k] = visible[i, mirrored]
 
 
 @compiled
-def _draw(seen: Float32, triangles: Int32, depth: Float32) -> None:
+def _draw_depths(seen: Float32, triangles: Int32, depth: Float32) -> None:
     """Draw the depths of front-facing triangles. seen: (V, 3), x and y in -1..1, z towards the viewer."""
     size = depth.shape[0]
     depth[:] = -10.0
@@ -202,7 +202,7 @@ def _draw(seen: Float32, triangles: Int32, depth: Float32) -> None:
 
 
 @compiled
-def _look(
+def _read_depths(
     seen: Float32,
     facing: Float32,
     rows: Intp,

@@ -59,9 +59,9 @@ def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Fl
 
 def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
     """Pixels per metre at the middle of the dots."""
-    if not len(dots.places):
+    if not len(dots.positions):
         return 0.0
-    away = float(np.linalg.norm(dots.places.mean(axis=0) - camera.eye))
+    away = float(np.linalg.norm(dots.positions.mean(axis=0) - camera.eye))
     return size[1] / (2 * max(away, 1e-6) * math.tan(math.radians(camera.field_of_view) / 2))
 
 
@@ -199,7 +199,7 @@ class ExtrasRenderer:
 
     def _draw_dots(self, dots: Dots, scale: float, near: float) -> None:
         """Draw dots. near: pixels per metre where they are."""
-        if not len(dots.places):
+        if not len(dots.positions):
             return
         gl, program = self._gl, self._programs["dot"]
         set_uniform(program, "radius", max(min(dots.radius * scale, dots.most * near), LEAST_RADIUS))
@@ -207,19 +207,19 @@ class ExtrasRenderer:
         set_uniform(program, "colour", dots.colour)
         content = [
             (self._square, "2f", "in_corner"),
-            (self._fill_buffer("places", dots.places.astype("f4")), "3f/i", "in_place"),
+            (self._fill_buffer("places", dots.positions.astype("f4")), "3f/i", "in_place"),
         ]
         for opacity, depth in ((HIDDEN, ">"), (1.0, "<")):
             set_uniform(program, "opacity", opacity)
             gl.depth_func = depth
-            self._render("dot", content, len(dots.places))
+            self._render("dot", content, len(dots.positions))
 
     def _draw_names(
         self, dots: Dots, matrix: Float64, eye: Float64, size: tuple[int, int], scale: float
     ) -> None:
         pixels = max(round(NAME_SIZE * scale), SMALLEST_NAME)
         texture, boxes = self._label((dots.names, pixels), lambda: names_picture(dots.names, pixels))
-        at = dots.places.astype(np.float64)
+        at = dots.positions.astype(np.float64)
         facing = np.einsum("ij,ij->i", dots.facing, eye - at) >= 0
         pixel, depth = project(at, matrix, size)
         nearer = project(_lift(at, eye, dots.lift), matrix, size)[1]

@@ -1,8 +1,8 @@
 """Compiled loops of `fba_player.mesh.simplify`: edges are collapsed where that changes the surface least.
 
 Garland and Heckbert's quadrics, "Simplifying Surfaces with Color and Texture using Quadric Error Metrics"
-(1998), for points of any dimension. Of an edge's two ends one stays where it is, so that the vertices that
-are left are a subset of those that were there.
+(1998), for points of any dimension. One end of each collapsed edge stays where it is, so the vertices that
+remain are some of the original ones.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def around(triangles: Int32, count: int, start: Int64, owners: Int32) -> None:
             start[triangles[t, k] + 1] += 1
     for v in range(count):
         start[v + 1] += start[v]
-    place = start.copy()
+    free = start.copy()
     for t in range(len(triangles)):
         for k in range(3):
             v = triangles[t, k]
-            owners[place[v]] = t
-            place[v] += 1
+            owners[free[v]] = t
+            free[v] += 1
 
 
 @compiled
@@ -169,9 +169,11 @@ def _fits(
             edge = ex * ex + ey * ey + ez * ez
             u_far = (ux - ex) ** 2 + (uy - ey) ** 2 + (uz - ez) ** 2
             v_far = (vx - ex) ** 2 + (vy - ey) ** 2 + (vz - ez) ** 2
-            was = max(edge, ux * ux + uy * uy + uz * uz, u_far)
-            is_ = max(edge, vx * vx + vy * vy + vz * vz, v_far)
-            if np.sqrt(after) < THIN * is_ and after * was * was < before * is_ * is_:
+            longest_before = max(edge, ux * ux + uy * uy + uz * uz, u_far)
+            longest_after = max(edge, vx * vx + vy * vy + vz * vz, v_far)
+            if np.sqrt(after) < THIN * longest_after and (
+                after * longest_before * longest_before < before * longest_after * longest_after
+            ):
                 return False
     return True
 
@@ -198,7 +200,7 @@ def candidates(
     n = points.shape[1]
     near = np.empty(2 * MOST_AROUND, dtype=np.int32)
     shared = np.empty(2 * MOST_AROUND, dtype=np.int32)
-    found = 0
+    count_with_goal = 0
     for u in range(len(points)):
         goal[u] = -1
         first, stop = start[u], start[u + 1]
@@ -253,8 +255,8 @@ def candidates(
             goal[u] = v
         if goal[u] >= 0:
             cost[u] = best
-            found += 1
-    return found
+            count_with_goal += 1
+    return count_with_goal
 
 
 @compiled

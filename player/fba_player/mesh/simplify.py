@@ -43,15 +43,13 @@ class DetailLevels:
         if level < 0 or len(self.triangles) < FEWEST or not is_compiled():
             return None
         onto, first = self._collapses
-        place = np.arange(len(onto), dtype=np.int32)
-        goes = first <= level
+        target = np.arange(len(onto), dtype=np.int32)
+        collapses = first <= level
         for _ in range(MOST_PASSES * len(TOLERANCES)):  # no more steps than passes were made
-            if not goes[place].any():
+            if not collapses[target].any():
                 break
-            place = np.where(goes[place], onto[place], place)
-        left = place[self.triangles]
-        flat = (left[:, 0] == left[:, 1]) | (left[:, 1] == left[:, 2]) | (left[:, 2] == left[:, 0])
-        return np.ascontiguousarray(left[~flat])
+            target = np.where(collapses[target], onto[target], target)
+        return _without_flat(target[self.triangles])
 
     @cached_property
     def _collapses(self) -> tuple[Int32, Int32]:
@@ -90,33 +88,38 @@ def simplify(
     a, b = np.zeros((count, size, size)), np.zeros((count, size))
     c, w = np.zeros(count), np.zeros(count)
     loops.quadrics(points, left, start, owners, a, b, c, w)
-    locked = _shared_places(points[:, :3])
+    locked = _share_positions(points[:, :3])
     goal, cost = np.empty(count, dtype=np.int32), np.empty(count)
     touched = np.empty(count, dtype=bool)
     onto = np.arange(count, dtype=np.int32)
     first = np.full(count, len(tolerances), dtype=np.int32)
     for level, tolerance in enumerate(tolerances):
         for _ in range(MOST_PASSES):
-            found = loops.candidates(
+            candidates = loops.candidates(
                 points, poses, left, start, owners, border, locked, a, b, c, w, tolerance**2, goal, cost
             )
-            if not found:
+            if not candidates:
                 break
-            chosen = np.flatnonzero(goal >= 0)
-            order = chosen[np.argsort(cost[chosen], kind="stable")]
+            movable = np.flatnonzero(goal >= 0)
+            order = movable[np.argsort(cost[movable], kind="stable")]
             done = loops.collapse(order, goal, left, start, owners, touched, onto, a, b, c, w)
             first[(onto != np.arange(count)) & (first == len(tolerances))] = level
-            flat = (left[:, 0] == left[:, 1]) | (left[:, 1] == left[:, 2]) | (left[:, 2] == left[:, 0])
-            left = np.ascontiguousarray(left[~flat])
+            left = _without_flat(left)
             loops.around(left, count, start, owners)
             if done < WORTH * len(left):
                 break
     return onto, first
 
 
-def _shared_places(places: Float64) -> Bool:
+def _without_flat(triangles: Int32) -> Int32:
+    """The triangles (F, 3) with three different corners."""
+    a, b, c = triangles.T
+    return np.ascontiguousarray(triangles[(a != b) & (b != c) & (c != a)])
+
+
+def _share_positions(positions: Float64) -> Bool:
     """bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
-    rounded = np.ascontiguousarray(np.round(places * 1e6).astype(np.int64))
+    rounded = np.ascontiguousarray(np.round(positions * 1e6).astype(np.int64))
     _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
     shared: Bool = counts[inverse.ravel()] > 1
     return shared

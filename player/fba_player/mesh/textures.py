@@ -6,6 +6,7 @@ Decoding a picture takes a tenth of a second, so the reduced sizes that screens 
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -31,55 +32,68 @@ RELIEF_MAKING = 1
 """Cache version of the relief; increment when `skin_relief` gives other pixels."""
 
 
+@dataclass(frozen=True, eq=False)
 class FacePicture:
-    """A texture from the bytes of a PNG or JPEG file.
+    """A texture; see `load_picture`.
 
-    Raises OSError, ValueError or SyntaxError if it cannot be read.
+    data: the bytes of a PNG or JPEG file. size: width and height. opaque: whether alpha is 255 everywhere.
     """
 
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._bytes = np.frombuffer(data, dtype=np.uint8)
-        if len(data) < LARGE:
-            (found,) = self._measured()
-        else:
-            (found,) = load_or_make(
-                make_key("picture", MAKING, self._bytes), ((3,),), self._measured, np.int32
-            )
-            if found.min() < 0 or found.max() > LARGEST:
-                (found,) = self._measured()
-        self.size = (int(found[0]), int(found[1]))
-        """Width and height."""
-        self.opaque = bool(found[2])
-        """Whether alpha is 255 everywhere."""
+    data: bytes
+    size: tuple[int, int]
+    opaque: bool
 
     @property
     def pixels(self) -> UInt8:
         """uint8 (H, W, 4), sRGB and alpha, decoded on every access."""
-        from PIL import Image
-
-        try:
-            with Image.open(io.BytesIO(self._data), formats=("PNG", "JPEG")) as image:
-                if max(image.size) > LARGEST:
-                    image.draft("RGB", (LARGEST, LARGEST))
-                    image.thumbnail((LARGEST, LARGEST))
-                return np.asarray(image.convert("RGBA"))
-        except Image.DecompressionBombError as error:
-            raise ValueError(str(error)) from error
+        return _decode(self.data)
 
     def reduced(self, factor: int) -> UInt8:
         """uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and alpha."""
-        if factor < 2 or len(self._data) < LARGE:
+        if factor < 2 or len(self.data) < LARGE:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
-        key = make_key("texture", MAKING, factor, self._bytes)
-        (found,) = load_or_make(key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8)
-        return found
+        key = make_key("texture", MAKING, factor, np.frombuffer(self.data, dtype=np.uint8))
+        (pixels,) = load_or_make(
+            key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8
+        )
+        return pixels
 
-    def _measured(self) -> list[Int32]:
-        pixels = self.pixels
+
+def load_picture(data: bytes) -> FacePicture:
+    """The picture in the bytes of a PNG or JPEG file.
+
+    Raises OSError, ValueError or SyntaxError if it cannot be read.
+    """
+
+    def measure() -> list[Int32]:
+        """Width, height, and 1 if it is opaque."""
+        pixels = _decode(data)
         height, width = pixels.shape[:2]
         return [np.array([width, height, (pixels[..., 3] == 255).all()], dtype=np.int32)]
+
+    if len(data) < LARGE:
+        (measures,) = measure()
+    else:
+        key = make_key("picture", MAKING, np.frombuffer(data, dtype=np.uint8))
+        (measures,) = load_or_make(key, ((3,),), measure, np.int32)
+        if measures.min() < 0 or measures.max() > LARGEST:
+            (measures,) = measure()
+    return FacePicture(data, (int(measures[0]), int(measures[1])), bool(measures[2]))
+
+
+def _decode(data: bytes) -> UInt8:
+    """uint8 (H, W, 4): the pixels of a file, at most `LARGEST` wide and high."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
+            if max(image.size) > LARGEST:
+                image.draft("RGB", (LARGEST, LARGEST))
+                image.thumbnail((LARGEST, LARGEST))
+            return np.asarray(image.convert("RGBA"))
+    except Image.DecompressionBombError as error:
+        raise ValueError(str(error)) from error
 
 
 def _reduced(pixels: UInt8, factor: int) -> UInt8:
@@ -117,8 +131,8 @@ def skin_relief() -> UInt8:
     From pores to the coarser grain seen from further away; always the same, stored in the disk cache.
     """
     key = make_key("relief", RELIEF_MAKING, RELIEF_SIZE, SPREAD, SHARES)
-    (found,) = load_or_make(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
-    return found
+    (pixels,) = load_or_make(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
+    return pixels
 
 
 def _make_relief() -> UInt8:

@@ -127,7 +127,7 @@ def _moved_extras(extras: Extras, offset: Float64) -> Extras:
     return replace(
         extras,
         lines=lines,
-        dots=tuple(replace(one, places=one.places + by) for one in extras.dots),
+        dots=tuple(replace(one, positions=one.positions + by) for one in extras.dots),
         shells=tuple(replace(mesh, matrix=shift @ mesh.matrix) for mesh in extras.shells),
         grid=grid,
     )

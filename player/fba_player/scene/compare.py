@@ -15,7 +15,7 @@ from fba_player.scene._layout import Drawing, caption, join_views, move_view
 from fba_player.scene.differences import Differences, differences
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import PRESETS, Camera, Subject
-from fba_player.view.protocols import InTime
+from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
 from fba_player.view.view import View, srgb
 
@@ -39,7 +39,7 @@ ABOVE = 0.96
 """Height of a caption above the middle of a head, in half heads."""
 
 
-class CompareScene(InTime[CompareTimeline]):
+class CompareScene(Timed[CompareTimeline]):
     """Several scenes shown together on one timeline; a `Showable` like `Scene`.
 
     scenes: at least one. arrangement: "side" or "over"; may be set at any time. names: captions of the

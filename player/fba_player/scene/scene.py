@@ -12,7 +12,7 @@ from fba.arrays import Float32, Float64
 from fba_player.playback.timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
 from fba_player.view.camera import Camera, Subject
-from fba_player.view.protocols import InTime
+from fba_player.view.protocols import Timed
 from fba_player.view.switches import SWITCHES, Switches
 from fba_player.view.view import View
 
@@ -33,7 +33,7 @@ LOOKS = ("figure", "points")
 """How a scene may be shown: as a person, or as feature points and bones."""
 
 
-class Scene(InTime[Timeline]):
+class Scene(Timed[Timeline]):
     """An animation ready to be drawn: face alone as a head with shoulders, body with the head on it.
 
     animation: at least one frame, else ValueError. model: the face, by default the built-in head; one that is

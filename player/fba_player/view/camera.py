@@ -96,8 +96,8 @@ class Camera:
     @property
     def eye(self) -> Float64:
         """(3,) position of the camera."""
-        place: Float64 = np.array(self.target) + self._axes()[2] * self.distance
-        return place
+        eye: Float64 = np.array(self.target) + self._axes()[2] * self.distance
+        return eye
 
     def view_matrix(self) -> Float64:
         """(4, 4) matrix from world to camera space."""

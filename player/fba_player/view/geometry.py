@@ -11,8 +11,8 @@ from fba_player.view.view import FaceMesh
 
 def world_positions(mesh: FaceMesh) -> Float32:
     """float32 (V, 3): the mesh's positions in the world."""
-    at = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
-    world: Float32 = (at @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
+    turned = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
+    world: Float32 = (turned @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
     return world
 
 
@@ -29,11 +29,11 @@ def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Floa
 
     turn: (3,), the rotation's axis times its angle.
     """
-    at = positions.astype(np.float64)
+    start = positions.astype(np.float64)
     angle = float(np.linalg.norm(turn))
     if angle < 1e-6:
-        return at
-    axis, arm = turn / angle, at - centre
+        return start
+    axis, arm = turn / angle, start - centre
     angles = angle * sway.astype(np.float64)[:, None]
     along = (arm @ axis)[:, None] * axis
     turned: Float64 = (

@@ -37,7 +37,7 @@ class Times(Protocol):
         """Seconds from start to end."""
 
     interpolate: bool
-    """Whether what is shown between two frames lies between them."""
+    """Whether values between two frames are interpolated."""
 
     @property
     def growing(self) -> bool:
@@ -45,7 +45,7 @@ class Times(Protocol):
 
     @property
     def arrived(self) -> int:
-        """Changes whenever some did, and when no more will."""
+        """A counter that changes when frames arrive, and when the last one has."""
 
     def time_of(self, frame: int) -> Fraction:
         """Exact time of a frame by its index."""
@@ -57,7 +57,7 @@ class Times(Protocol):
 Own = TypeVar("Own", bound=Times)
 
 
-class InTime(Generic[Own]):
+class Timed(Generic[Own]):
     """Gives a scene the times of its timeline."""
 
     timeline: Own

@@ -91,15 +91,15 @@ class Switch:
 @cache
 def _table() -> dict[str, Switch]:
     text = (files(__package__) / "switches.csv").read_text(encoding="utf-8")
-    found: dict[str, Switch] = {}
+    table: dict[str, Switch] = {}
     for row in csv.DictReader(text.splitlines()):
         choices = tuple(row["choices"].split())
         default: Value = {"flag": row["default"] == "on", "choice": row["default"], "fap": None}[row["kind"]]
         name = row["name"]
-        found[name] = Switch(
+        table[name] = Switch(
             name, row["key"], row["label"], row["kind"], default, choices, row["description"]
         )
-    return found
+    return table
 
 
 SWITCHES: Mapping[str, Switch] = _table()

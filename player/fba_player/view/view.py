@@ -148,13 +148,13 @@ class Lines:
 class Dots:
     """Round dots with names, of the same size near and far.
 
-    places: float32 (N, 3), positions. colour: of all dots. radius: pixels in a picture 720 high; 0 for names
+    positions: float32 (N, 3). colour: of all dots. radius: pixels in a picture 720 high; 0 for names
     alone. lift: as for lines; a dot hidden further shows through faintly. names: one for each dot, drawn if
     few are in view. facing: float32 (N, 3), the direction from which a dot is visible; zeros for all. most:
     largest radius of a dot (m), so that dots stay apart from afar.
     """
 
-    places: Float32
+    positions: Float32
     colour: Colour
     radius: float
     lift: float
@@ -217,16 +217,18 @@ class View:
     extras: Extras | None = None
 
 
-def spheres(places: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:
-    """float32 (N, 16): spheres as capsules. places: (N, 3), and radii (N,), metres. colour: with gloss."""
-    centres = np.asarray(places, dtype=np.float32)
-    found = np.zeros((len(centres), CAPSULE_FLOATS), dtype=np.float32)
-    found[:, 0:3] = centres
-    found[:, 4:7] = centres + np.array([0.0, 2e-5, 0.0], dtype=np.float32)  # the axis must not have length 0
-    found[:, 3] = found[:, 7] = radii
-    found[:, 8:12] = (0.0, 0.0, 1.0, 1.0)
-    found[:, 12:16] = colour
-    return found
+def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:
+    """float32 (N, 16): spheres as capsules. centres: (N, 3), and radii (N,), metres. colour: with gloss."""
+    starts = np.asarray(centres, dtype=np.float32)
+    capsules = np.zeros((len(starts), CAPSULE_FLOATS), dtype=np.float32)
+    capsules[:, 0:3] = starts
+    capsules[:, 4:7] = starts + np.array(
+        [0.0, 2e-5, 0.0], dtype=np.float32
+    )  # the axis must not have length 0
+    capsules[:, 3] = capsules[:, 7] = radii
+    capsules[:, 8:12] = (0.0, 0.0, 1.0, 1.0)
+    capsules[:, 12:16] = colour
+    return capsules
 
 
 def srgb(text: str) -> tuple[float, float, float]:

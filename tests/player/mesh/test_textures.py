@@ -10,7 +10,7 @@ import pytest
 
 Image = pytest.importorskip("PIL.Image")
 
-from fba_player.mesh.textures import LARGE, FacePicture  # noqa: E402 - needs Pillow
+from fba_player.mesh.textures import LARGE, load_picture  # noqa: E402 - needs Pillow
 
 
 def encoded(pixels: np.ndarray) -> bytes:
@@ -20,7 +20,7 @@ def encoded(pixels: np.ndarray) -> bytes:
 
 
 def test_what_is_seen_are_square_roots_of_light() -> None:
-    grey = FacePicture(encoded(np.full((5, 8, 3), 128, dtype=np.uint8)))
+    grey = load_picture(encoded(np.full((5, 8, 3), 128, dtype=np.uint8)))
     assert (grey.size, grey.opaque) == ((8, 5), True)
     half = grey.reduced(2)
     assert half.shape == (3, 4, 4)
@@ -32,7 +32,7 @@ def test_what_is_seen_are_square_roots_of_light() -> None:
 def test_one_clear_texel_is_enough() -> None:
     pixels = np.full((4, 4, 4), 255, dtype=np.uint8)
     pixels[1, 2, 3] = 254
-    assert not FacePicture(encoded(pixels)).opaque
+    assert not load_picture(encoded(pixels)).opaque
 
 
 def test_a_large_one_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -40,14 +40,14 @@ def test_a_large_one_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     noise = np.random.default_rng(5).integers(0, 256, (300, 200, 3), dtype=np.uint8)
     data = encoded(noise)
     assert len(data) > LARGE
-    first = FacePicture(data)
+    first = load_picture(data)
     seen = first.reduced(4)
 
-    def fails(self: FacePicture) -> None:
+    def fails(data: bytes) -> None:
         raise AssertionError("decoded again")
 
-    monkeypatch.setattr(FacePicture, "pixels", property(fails))
-    again = FacePicture(data)
+    monkeypatch.setattr("fba_player.mesh.textures._decode", fails)
+    again = load_picture(data)
     assert (again.size, again.opaque) == (first.size, first.opaque) == ((200, 300), True)
     np.testing.assert_array_equal(again.reduced(4), seen)
     with pytest.raises(AssertionError, match="decoded again"):

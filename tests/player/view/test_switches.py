@@ -153,7 +153,7 @@ class TestViews:
         scene.show("points")
         dots = scene.view_at(0.0).extras.dots[0]  # type: ignore[union-attr]
         marks = shown(subject, view="points").view_at(0.0).marks
-        np.testing.assert_allclose(dots.places, marks[:, :3], atol=1e-6)
+        np.testing.assert_allclose(dots.positions, marks[:, :3], atol=1e-6)
         assert len(dots.names) == 84
         assert dots.names[0] == "2.1"
 

@@ -1,13 +1,13 @@
 #version 330 core
-// One capsule an instance: a rounded cone of elliptic section between two ends.
+// One instance per capsule: a rounded cone with an elliptic section between two ends.
 uniform mat4 camera;
 uniform vec3 eye;
 uniform float pixel;      // size of a pixel at a distance of 1
-uniform float raised;     // drawn over what hides it by less, metres
+uniform float raised;     // drawn over surfaces that hide it by less than this, metres
 uniform float thinnest;   // least radius, pixels
 in vec3 in_sphere;   // on the unit sphere, y along the axis
 in float in_end;     // 0 at the start, 1 at the end
-in vec4 in_start;    // place and radius
+in vec4 in_start;    // position and radius
 in vec4 in_finish;
 in vec4 in_front;    // direction of the section's depth, and depth / width
 in vec4 in_colour;

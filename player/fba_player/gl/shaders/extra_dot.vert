@@ -1,5 +1,5 @@
 #version 330 core
-// One dot an instance: a square around a place, as large near as far.
+// One instance per dot: a square around a point, of the same size near and far.
 uniform mat4 camera;
 uniform vec3 eye;
 uniform vec2 size;        // of the picture, pixels

@@ -1,11 +1,12 @@
 #version 330 core
 uniform vec2 centre;
 uniform float reach;
-uniform float step_;      // between bold lines; ten fine ones in each
+uniform float step_;      // between bold lines, with ten fine steps between them
 in vec2 at;
 out vec4 pixel;
 
-// How much of a pixel lines a step apart cover; wide: pixels. Where they get denser than pixels, their mean.
+// Share of a pixel that lines at whole numbers cover; wide: their width, pixels. Lines denser than pixels give
+// their mean.
 float lines(vec2 place, float wide) {
     vec2 size = max(fwidth(place), vec2(1e-6));
     vec2 away = abs(fract(place - 0.5) - 0.5) / size;

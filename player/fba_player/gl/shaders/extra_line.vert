@@ -1,5 +1,5 @@
 #version 330 core
-// One line an instance: a strip of two triangles as wide as the line and a pixel more, for smooth sides.
+// One instance per line: two triangles a pixel wider than the line on each side, for smooth edges.
 uniform mat4 camera;
 uniform vec3 eye;
 uniform vec2 size;        // of the picture, pixels

@@ -1,5 +1,5 @@
 #version 330 core
-// A skin of glass: clear where one looks straight at it, milky at its edges.
+// A shell of glass: clear where it faces the eye, milky at its edges.
 uniform vec3 eye;
 in vec3 place;
 in vec3 normal;

@@ -1,18 +1,18 @@
 #version 330 core
 //include lighting.glsl
-uniform float iris;      // radii, by the eyeball's
+uniform float iris;      // radii, as shares of the eyeball's
 uniform float pupil;
 uniform mat3 head;       // axes of the head, in the world
 uniform mat3 ball;       // axes of the eyeball, in the world
-uniform vec3 lids[4];    // middles of upper and lower lid, outer and inner corner, by the eyeball's radius
+uniform vec3 lids[4];    // middles of upper and lower lid, outer and inner corner, in radii of the eyeball
 uniform vec3 tint;       // of the iris
 in vec3 place;
 in vec3 normal;
 in vec3 local;
 out vec4 pixel;
 
-const float CORNEA = 0.26;    // the centre of the cornea lies this far before that of the eyeball
-const float DEEP = 0.02;      // the iris lies this far below the rim of the cornea
+const float CORNEA = 0.26;    // how far the cornea's centre lies in front of the eyeball's
+const float DEEP = 0.02;      // how far the iris lies below the rim of the cornea
 
 float grain(vec2 at) {
     return fract(sin(dot(at, vec2(12.9898, 78.233))) * 43758.5453);
@@ -24,9 +24,9 @@ float noise(float at) {
     return mix(grain(vec2(low, 1.0)), grain(vec2(low + 1.0, 1.0)), part * part * (3.0 - 2.0 * part));
 }
 
-// Fibres that run from the pupil outwards.
+// Brightness of the fibres that run outwards from the pupil.
 float fibres(float angle, float across) {
-    float turn = angle * 6.3662;   // 40 a turn
+    float turn = angle * 6.3662;   // 40 fibres around the pupil
     float coarse = noise(turn + 50.0) * 0.5 + noise(turn * 2.3 + across * 1.5 + 90.0) * 0.3;
     return coarse + noise(turn * 5.0 + 190.0) * 0.2;
 }
@@ -45,8 +45,7 @@ void main() {
     float rim = at.z > 0.0 ? length(at.xy) : 2.0;
     float cornea = 1.0 - smoothstep(iris * 0.92, iris * 1.16, rim);
 
-    // Through the cornea the iris is seen where refraction takes the look; straight on, it and the pupil
-    // have the size that they are said to have.
+    // The cornea refracts the line of sight to the iris; seen from the front, iris and pupil keep their sizes.
     vec3 bulge = normalize(at - vec3(0.0, 0.0, CORNEA));
     vec3 bend = normalize(mix(at, bulge, 0.7));
     vec3 bent = refract(-(transpose(ball) * view), bend, 1.0 / 1.336);
@@ -60,7 +59,7 @@ void main() {
     float across = clamp((r - pupil) / max(iris - pupil, 1e-3), 0.0, 1.0);
     vec3 ring = mix(tint * vec3(1.75, 1.25, 0.75) + vec3(0.03, 0.014, 0.0), tint, smoothstep(0.1, 0.55, across));
     ring *= 0.45 + 1.1 * fibres(angle, across);
-    ring *= 1.0 - 0.72 * smoothstep(0.72, 1.0, across);            // the dark ring around it
+    ring *= 1.0 - 0.72 * smoothstep(0.72, 1.0, across);            // dark ring around the iris
     ring *= 0.55 + 0.45 * smoothstep(0.0, 0.12, across);           // and around the pupil
     vec3 base = mix(ring, vec3(0.004), 1.0 - smoothstep(pupil - soft, pupil + soft, r));
     vec3 in_head = transpose(head) * n;
@@ -75,13 +74,13 @@ void main() {
     float shade = smoothstep(-0.06, 0.40, under);
     shade = (0.18 + 0.82 * shade) * (0.45 + 0.55 * smoothstep(-0.05, 0.20, above));
     shade *= 1.0 - 0.45 * aside;
-    // The iris is lit from the side opposite to the light, as a hollow is.
+    // The iris is lit like a hollow: on the side away from the light.
     vec3 hollow = normalize(mix(n, normalize(n - 0.9 * (ball * vec3(at.xy, 0.0))), cornea));
     float key = max(dot(hollow, KEY_DIRECTION) * 0.75 + 0.25, 0.0);
     vec3 light = KEY * key * shade + (FILL * 0.8 + mix(FLOOR, SKY, 0.55) * 0.62) * (0.25 + 0.75 * shade);
     vec3 shown = base * light;
 
-    // The wet surface mirrors the key light's window and the studio.
+    // The wet surface reflects the key light's window and the studio.
     vec3 wet = normalize(mix(n, ball * bulge, cornea));
     vec3 mirrored = reflect(-view, wet);
     vec3 right = normalize(cross(vec3(0.0, 1.0, 0.0), KEY_DIRECTION));

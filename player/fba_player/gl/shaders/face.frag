@@ -2,9 +2,9 @@
 //include lighting.glsl
 uniform sampler2D picture; // square roots of linear light
 uniform sampler2D relief;  // noise of three channels
-uniform vec2 fine;         // strength of the skin's relief, 0 for none, and how often it repeats
-uniform float scatter;     // how far light goes below the surface: 1 skin, 0 cloth
-uniform float two_sided;   // 0: what is seen from inside is a dark hollow
+uniform vec2 fine;         // strength of the skin's relief, 0 for none, and its repetitions
+uniform float scatter;     // how much light scatters below the surface: 1 skin, 0 cloth
+uniform float two_sided;   // 0: the inside is drawn as a dark hollow
 in vec4 upright;
 in vec4 coordinates;
 #ifdef SMOOTH

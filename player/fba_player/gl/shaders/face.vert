@@ -1,39 +1,39 @@
 #version 330 core
-// Parts of faces and bodies. Names that the preprocessor may know: SMOOTH, light is worked out here; HAIRS;
-// TEXTURED, the colour is multiplied by a picture; FINE, with the skin's relief. Software OpenGL takes both
-// ways of a condition, so that each of these is a program of its own.
+// Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
+// multiplies the colour by a picture; FINE adds the skin's relief. Software OpenGL runs both branches of a
+// condition, so each combination of options is a program of its own.
 //
-// The head turns as a whole; the neck bends along, and where it stands it stays.
+// The head turns rigidly; the neck bends with it, and stands still at its lower end.
 //include lighting.glsl
 uniform mat4 world;
 uniform mat4 camera;
 uniform vec3 turn;       // axis of the head's rotation times its angle
-uniform vec3 centre;     // and the point it turns about
+uniform vec3 centre;     // the point that it turns about
 uniform float pixel;     // size of a pixel at a distance of 1
-uniform float scatter;   // how far light goes below the surface: 1 skin, 0 cloth
-uniform float two_sided; // 0: what is seen from inside is a dark hollow
+uniform float scatter;   // how much light scatters below the surface: 1 skin, 0 cloth
+uniform float two_sided; // 0: the inside is drawn as a dark hollow
 in vec3 in_position;
 in vec3 in_normal;
 in vec4 in_colour;
 in vec2 in_texture;
-in vec4 in_light;       // what reaches the vertex: key light, open sky, through the skin, rim light
-in float in_sway;       // how far it goes with the head
+in vec4 in_light;       // light that reaches the vertex: key light, open sky, through the skin, rim light
+in float in_sway;       // how far it turns with the head
 #ifdef HAIRS
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
 #endif
 out vec4 upright;       // normal, and its cosine with the direction to the eye
-out vec4 coordinates;   // in the picture; how much of its pixels a hair covers; width of the mirrored light
+out vec4 coordinates;   // in the picture; share of its pixels that a hair covers; width of reflected light
 #ifdef SMOOTH
-out vec4 shade;         // diffuse light times the colour, and what is mirrored of the key light
-out vec4 halfway;       // between the directions to the eye and to the key light; what else is mirrored
+out vec4 shade;         // diffuse light times the colour, and the reflected share of the key light
+out vec4 halfway;       // between the directions to the eye and to the key light; other reflected light
 #else
 out vec3 place;
 out vec4 colour;
 out vec4 light;
 #endif
 
-const vec3 SKIN = vec3(0.60, 0.36, 0.28);   // about what a picture of skin holds
+const vec3 SKIN = vec3(0.60, 0.36, 0.28);   // typical colour of a texture of skin
 
 vec3 turned(vec3 at, vec3 axis, float sine, float cosine) {
     return at * cosine + cross(axis, at) * sine + axis * (dot(axis, at) * (1.0 - cosine));
@@ -45,7 +45,7 @@ void main() {
     float cover = 1.0;
 #ifdef HAIRS
     if (in_across.w < 0.9) {
-        // No hair is thinner than a pixel, however it is turned; it is fainter instead.
+        // A hair is at least about a pixel wide, however it is turned; it becomes fainter instead.
         vec3 look = eye - (world * vec4(at, 1.0)).xyz;
         float least = 0.6 * pixel * length(look);
         vec3 side = cross(in_along.xyz, transpose(mat3(world)) * look);
@@ -67,7 +67,7 @@ void main() {
     vec3 n = normalize(mat3(world) * out_);
     vec3 view = normalize(eye - stands.xyz);
     float facing = dot(n, view);
-    if (two_sided > 0.5 && facing < -0.35) {  // less: a silhouette, whose other side is seen
+    if (two_sided > 0.5 && facing < -0.35) {  // between this and 0 it is at a silhouette
         n = -n;
         facing = -facing;
     }

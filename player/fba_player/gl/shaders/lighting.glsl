@@ -11,7 +11,7 @@ const vec3 RIM = vec3(0.76, 0.80, 0.86);
 const vec3 SKY = vec3(0.46, 0.47, 0.50);
 const vec3 FLOOR = vec3(0.20, 0.175, 0.16);
 
-// Linear light to sRGB: highlights roll off, then a curve within 1/170 of the standard's, by one root.
+// Linear light to sRGB: highlights roll off, then sRGB's curve, within 1/170, by a single square root.
 vec3 encode(vec3 linear) {
     vec3 light = max(linear, 0.0);
     vec3 toned = light * (1.0 + light * 0.06) / (1.0 + light * 0.5);
@@ -23,7 +23,7 @@ float power(float x, int doublings) {
     return x;
 }
 
-// colour.a: 0 cloth, towards 1 skin with a sheen; skin also lets red light through at its terminator.
+// Light from a simple surface. colour.a: gloss, 0 for cloth, more for skin, which is redder where light ends.
 vec3 lit(vec3 place, vec3 normal, vec4 colour) {
     vec3 view = normalize(eye - place);
     vec3 n = dot(normal, view) < 0.0 ? -normal : normal;
@@ -41,15 +41,15 @@ vec3 lit(vec3 place, vec3 normal, vec4 colour) {
     return colour.rgb * diffuse + KEY * gloss * step(0.0, key) + rim * (0.25 + colour.rgb);
 }
 
-// Square of the width of a surface's mirrored light; gloss: 0 dull .. 1 sharp.
+// Square of the width of a surface's reflections; gloss: 0 dull .. 1 sharp.
 float widths(float gloss) {
     float rough = clamp(1.0 - gloss, 0.12, 1.0);
     rough *= rough;
     return rough * rough;
 }
 
-// How much a surface mirrors (GGX), by the square of the cosine between its normal and the direction halfway
-// between eye and light: the skin, and an oily film on it.
+// Strength of a reflection (GGX) from the squared cosine between the normal and the direction halfway between
+// eye and light: that of the skin, and of an oily film on it.
 float lobes(float nh2, float soft) {
     float sharp = soft * 0.16 + 0.0004;
     float a = nh2 * (soft - 1.0) + 1.0;
@@ -57,7 +57,7 @@ float lobes(float nh2, float soft) {
     return 0.75 * soft / (a * a) + 0.25 * sharp / (b * b);
 }
 
-// What of a light is mirrored at all: Schlick's Fresnel term and Kelemen's visibility.
+// Share of a light that is reflected: Schlick's Fresnel term and Kelemen's visibility.
 float mirrored(float nl, float vl) {
     float hh = 2.0 + 2.0 * vl;                      // square of view + light
     float off = max(1.0 - hh * 0.25, 0.0);
@@ -72,7 +72,7 @@ float mirrored_key(vec3 view, vec3 n, vec4 reach) {
 
 const vec3 AROUND = vec3(0.44, 0.45, 0.48);
 
-// The rim light and the studio around, mirrored; in parts of AROUND.
+// Reflections of the rim light and of the studio, as a share of AROUND.
 float mirrored_around(vec3 view, vec3 n, float gloss, vec4 reach) {
     float nv = max(dot(n, view), 0.02);
     float rl = max(dot(n, RIM_DIRECTION), 0.0);
@@ -89,15 +89,15 @@ float mirrored_around(vec3 view, vec3 n, float gloss, vec4 reach) {
     return rim + sky * (0.028 + 0.8 * graze * graze) * (1.0 - 0.6 * rough) * reach.y * reach.y;
 }
 
-// Light that a surface sends back of the studio, but for its colour. n: normal; reach: what reaches it of the
-// key light, the open sky, through it from behind, of the rim light; scatter: 1 skin, 0 cloth.
+// Diffuse light from a surface in the studio, without its colour. n: normal; reach: shares of light that reach
+// it: key light, open sky, through the skin from behind, rim light; scatter: 1 skin, 0 cloth.
 vec3 diffuse(vec3 n, vec3 albedo, vec4 reach, float scatter) {
-    // Light that wanders below the surface softens the edge of the shade, the red most.
-    vec3 wander = vec3(0.24, 0.12, 0.08) * scatter;
-    vec3 key = clamp((dot(n, KEY_DIRECTION) + wander) / (1.0 + wander), 0.0, 1.0);
-    key *= 1.0 - wander + wander * key;
+    // Scattering below the surface softens the edge of the shade, most of all in red.
+    vec3 spread = vec3(0.24, 0.12, 0.08) * scatter;
+    vec3 key = clamp((dot(n, KEY_DIRECTION) + spread) / (1.0 + spread), 0.0, 1.0);
+    key *= 1.0 - spread + spread * key;
     key *= reach.x * (1.0 + (1.0 - reach.x) * vec3(0.34, 0.10, 0.0) * scatter);
-    // Light bounces on in folds, and through flesh, which leaves the red of it.
+    // In folds, light is reflected again, and red light passes through flesh.
     vec3 open = reach.y * (1.0 + (1.0 - reach.y) * 0.85 * albedo);
     open += (1.0 - reach.y) * vec3(0.24, 0.10, 0.085) * scatter;
     vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) + mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;

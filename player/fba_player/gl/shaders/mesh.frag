@@ -1,6 +1,6 @@
 #version 330 core
 //include lighting.glsl
-uniform float two_sided;   // 0: what is seen from inside is a dark hollow
+uniform float two_sided;   // 0: the inside is drawn as a dark hollow
 in vec3 place;
 in vec3 normal;
 in vec4 colour;

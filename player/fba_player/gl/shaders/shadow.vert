@@ -1,5 +1,5 @@
 #version 330 core
-// Soft shadows on the ground: one square an instance.
+// Soft shadows on the ground: one instance per square.
 uniform mat4 camera;
 in vec2 in_corner;
 in vec4 in_blob;     // x, z, radius, darkness

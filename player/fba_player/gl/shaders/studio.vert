@@ -1,5 +1,5 @@
 #version 330 core
-// The whole picture, behind everything: backdrop, and the ground where there is one.
+// The full picture behind everything: the backdrop, and the ground if there is one.
 uniform mat4 unproject;
 in vec2 in_corner;
 out vec2 corner;
