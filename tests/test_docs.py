@@ -30,7 +30,7 @@ import pytest
 
 import graphics
 from fba.cli.main import _COMMANDS, group
-from ready_programs import BIN, ready_programs
+from ready_programs import BIN
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -177,13 +177,6 @@ def test_every_block_says_what_it_is(page: Path) -> None:
 def test_every_reason_for_not_running_belongs_to_a_block() -> None:
     there = {block.key for page in PAGES for block in blocks(page) if block.language == "console"}
     assert not set(ILLUSTRATIONS) - there
-
-
-@pytest.fixture(scope="module")
-def programs() -> Iterator[Path]:
-    """A folder with `fba` and `python` that start at once."""
-    with ready_programs() as folder:
-        yield folder
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=id_of)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -40,10 +40,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("reader")
 
 
-def run(name: str, folder: Path) -> str:
-    """What an example prints, run in a folder by a Python of its own."""
+@pytest.fixture
+def run(programs: Path, folder: Path) -> Callable[[str], str]:
+    """Return a function that runs an example in a folder, as a process of its own, and returns its output."""
+    return lambda name: output_of(name, programs, folder)
+
+
+def output_of(name: str, programs: Path, folder: Path) -> str:
+    """Return what an example prints."""
     done = subprocess.run(
-        [sys.executable, str(EXAMPLES / name)],
+        [str(programs / "python"), str(EXAMPLES / name)],
         cwd=folder, capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     if "DisplayError" in done.stderr and graphics.missing_opengl():
@@ -53,12 +59,12 @@ def run(name: str, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("name", [name for name in EXPECTED if not name.startswith(("04", "05", "10"))])
-def test_example(name: str, folder: Path) -> None:
-    assert re.search(EXPECTED[name], run(name, folder), re.DOTALL)
+def test_example(name: str, run: Callable[[str], str]) -> None:
+    assert re.search(EXPECTED[name], run(name), re.DOTALL)
 
 
-def test_quantisers_trade_size_for_errors(folder: Path) -> None:
-    table = [line.split() for line in run("04_quantisers_and_size.py", folder).splitlines()[2:]]
+def test_quantisers_trade_size_for_errors(run: Callable[[str], str]) -> None:
+    table = [line.split() for line in run("04_quantisers_and_size.py").splitlines()[2:]]
     assert [int(row[0]) for row in table] == [1, 2, 4, 8, 16, 31]
     sizes = [int(row[1]) for row in table]
     errors = [float(row[3]) for row in table]
@@ -66,18 +72,18 @@ def test_quantisers_trade_size_for_errors(folder: Path) -> None:
     assert errors == sorted(errors)
 
 
-def test_frames_arrive_soon_after_they_are_sent(folder: Path) -> None:
-    printed = run("05_stream_in_chunks.py", folder)
+def test_frames_arrive_soon_after_they_are_sent(run: Callable[[str], str]) -> None:
+    printed = run("05_stream_in_chunks.py")
     assert re.search(EXPECTED["05_stream_in_chunks.py"], printed, re.DOTALL)
     latency = re.search(r"latency: ([0-9.]+) frames", printed)
     assert latency is not None
     assert 0 < float(latency[1]) <= 3
 
 
-def test_a_strip_of_pictures(folder: Path) -> None:
+def test_a_strip_of_pictures(run: Callable[[str], str], folder: Path) -> None:
     from PIL import Image
 
-    assert re.search(EXPECTED["10_render_a_picture.py"], run("10_render_a_picture.py", folder))
+    assert re.search(EXPECTED["10_render_a_picture.py"], run("10_render_a_picture.py"))
     with Image.open(folder / "out" / "strip.png") as image:
         assert image.size == (640, 180)
         assert len(image.getcolors(1 << 20) or ()) > 500

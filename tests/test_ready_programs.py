@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from ready_programs import BIN, ROOT, ready_programs
-
-
-@pytest.fixture(scope="module")
-def programs() -> Iterator[Path]:
-    with ready_programs() as folder:
-        yield folder
+from ready_programs import BIN, ROOT
 
 
 def sh(programs: Path, command: str, folder: Path) -> tuple[int, str, str]:

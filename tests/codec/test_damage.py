@@ -40,10 +40,11 @@ def stream(name: str) -> bytes:
         return encode(motion.animation(None, motion.body(9, baps_sent=(1, 2, 124))), sections)
     if name == "high level":
         return encode(motion.animation(motion.face(6, faps_sent=(), high_level=True)), sections)
+    face = face[:8]
     mask = face.mask.copy()
     mask[4:6] = False  # planes without FAPs
     gone = FaceTrack(face.values, mask)
-    return encode(motion.animation(gone, motion.body(9, baps_sent=(1, 181))), sections)
+    return encode(motion.animation(gone, motion.body(8, baps_sent=(1, 181))), sections)
 
 
 @cache
