@@ -80,3 +80,12 @@ def test_both_joints_of_the_clavicle_take_half_of_its_turn() -> None:
     inner = Rotation.from_matrix(body.rotations["l_sternoclavicular"]).magnitude()[0]
     whole = Rotation.from_matrix(body.rotations["l_acromioclavicular"]).magnitude()[0]
     assert inner == pytest.approx(whole / 2, rel=0.15)
+
+
+def test_a_prefix_is_one_of_the_first_eight_names() -> None:
+    """As of "Bip01", "Bip01 Pelvis": joints repeat the name of the rig, which stands near the beginning."""
+    others = [f"camera{number}" for number in range(7)]
+    joints = [f"Bob{name}" for name in [*NAMES, "l_shoulder", "l_elbow", "r_shoulder", "r_elbow"]]
+    assert matching.match([*others, "Bob", *joints])[1]["l_hip"] == 9
+    with pytest.raises(ModelError, match="no known skeleton family"):
+        matching.match([*others, "camera7", "Bob", *joints])

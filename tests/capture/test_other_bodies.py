@@ -153,6 +153,19 @@ def test_a_report_of_given_joints() -> None:
     assert report.unused == ()
 
 
+def test_a_report_counts_feet_within_a_centimetre() -> None:
+    captured = motion("standing", 20)
+    animation = from_skeleton(captured)
+    assert animation.body is not None
+    for millimetres, within in ((8, 1.0), (12, 0.75)):
+        values = animation.body.values.copy()
+        values[::4, NUMBERS["HumanoidRoot_tr_vertical"] - 1] += millimetres
+        report = retarget_report(captured, replace(animation, body=replace(animation.body, values=values)))
+        assert report.feet is not None
+        assert report.feet.within == within
+        assert report.feet.worst == pytest.approx(millimetres / 1000, abs=0.001)
+
+
 def test_a_report_without_bones_or_frames() -> None:
     empty = RetargetReport("", 1, (), None, (), ())
     assert (empty.mean, empty.worst) == (0, 0)
@@ -190,6 +203,19 @@ def test_a_standard_skeleton_scaled_and_moved() -> None:
     assert value(from_skeleton(source, scale=0.25), "HumanoidRoot_tr_lateral").tolist() == [500, 1000, 2000]
     with pytest.raises(ValueError, match="scale must be a positive number, not 0"):
         from_skeleton(source, scale=0.0)
+
+
+def test_of_a_standard_skeleton_with_long_arms_the_legs_give_the_scale() -> None:
+    """Steps must be as long as the legs take them, whatever the arms."""
+    skeleton = Skeleton.default()
+    offsets = skeleton.offsets
+    for name in ("l_elbow", "r_elbow", "l_wrist", "r_wrist"):
+        offsets[skeleton.number(name)] *= 1.5
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (2, len(skeleton), 1))
+    path = offsets[0] + np.array([[0, 0, 0], [1.0, 0, 0]])
+    source = SkeletonMotion(skeleton.names, skeleton.parents, offsets, still, path, 25)
+    assert is_direct(source, skeleton)
+    assert value(from_skeleton(source), "HumanoidRoot_tr_lateral").tolist() == [0, 1000]
 
 
 @pytest.mark.parametrize("change", ["another root", "another parent", "no knee", "a bent knee"])

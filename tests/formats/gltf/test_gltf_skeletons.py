@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import fba
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.errors import FbaWarning, FormatError, ModelError
+from fba.formats.gltf import reader
 from fba.formats.gltf.reader import read_motion
 from fba.gltf.writer import Builder
 from gltf_edits import edited
@@ -193,6 +194,41 @@ def test_joints_and_places_of_the_file(tmp_path: Path) -> None:
 
 def places_of(motion: SkeletonMotion) -> np.ndarray:
     return motion.world()[1][:, [motion.names.index(name) for name in NAMES]]
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.008, False), (0.012, True)])
+def test_joints_that_stand_off_their_bind_pose_by_a_hundredth(
+    tmp_path: Path, share: float, warned: bool
+) -> None:
+    rest = reference().rest()
+    off = share * float(np.ptp(rest, axis=0).max())
+
+    def change(document: dict[str, Any]) -> None:
+        node = next(node for node in document["nodes"] if node["name"] == "LeftHand")
+        length = float(np.linalg.norm(node["translation"]))
+        node["translation"] = [number * (1 + off / length) for number in node["translation"]]
+
+    path = changed(tmp_path, change)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_motion(path)
+    assert any("held as they are there: LeftHand" in str(w.message) for w in caught) == warned
+
+
+@pytest.mark.parametrize(
+    ("steps", "rate"),
+    [
+        ([4] * 50, 25),
+        ([4] * 50 + [8, 12], 25),  # keys left out
+        ([4] * 48 + [4.3, 5.7], 25),  # 96 % regular
+        ([4] * 45 + [4.3, 5.7] * 3, 30),  # 90 %
+        ([], 30),
+    ],
+)
+def test_the_rate_of_keys(steps: list[float], rate: int) -> None:
+    """Steps in hundredths of a second; 30 frames/s where no usual rate fits more than 95 % of them."""
+    times = np.concatenate([[0], np.cumsum(steps)]) / 100
+    assert reader._rate(times) == rate
 
 
 def test_resampled_at_another_rate(tmp_path: Path) -> None:
