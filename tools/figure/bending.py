@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from cutting import Cloth
 from person import Person
 
+from fba.arrays import Float64
 from fba.body import Skeleton
-
-Float64 = npt.NDArray[np.float64]
+from fba.easing import smoothstep
 
 HINGES = (
     ("?_shoulder", "?_elbow", "?_wrist", (0.0, 0.0, 1.0), 0.040, 0.046),
@@ -51,13 +50,13 @@ def ease_limb_weights(person: Person, places: dict[str, Float64], weights: Float
             away = person.vertices - places[middle]
             turned = np.clip(away @ np.array(inside) / LIMB, -1.0, 1.0) / 2 + 0.5
             reach = stretch + (fold - stretch) * turned
-            share = _smooth(away @ along / (2 * reach) + 0.5)
+            share = smoothstep(away @ along / (2 * reach) + 0.5)
             both = weights[:, number[above]] + weights[:, number[middle]]
             weights[:, number[middle]] = both * share
             weights[:, number[above]] = both * (1 - share)
     body = np.linalg.norm(person.vertices[:, None] - [places[f"{s}_wrist"] for s in "lr"], axis=2).min(axis=1)
-    free = _smooth((body - 0.12) / 0.08) * _smooth((1.45 - person.vertices[:, 1]) / 0.06)
-    free *= _smooth((person.vertices[:, 1] - 0.14) / 0.06)
+    free = smoothstep((body - 0.12) / 0.08) * smoothstep((1.45 - person.vertices[:, 1]) / 0.06)
+    free *= smoothstep((person.vertices[:, 1] - 0.14) / 0.06)
     for side in "lr":  # an armpit keeps its fold
         pit = places[f"{side}_shoulder"] + np.array(PIT) * (1 if side == "l" else -1, 1, 1)
         free *= 1 - 0.7 * np.exp(-((np.linalg.norm(person.vertices - pit, axis=1) / 0.06) ** 2))
@@ -71,19 +70,19 @@ def _ease_shoulders(person: Person, places: dict[str, Float64], weights: Float64
     for side, sign in (("l", 1.0), ("r", -1.0)):
         joint = places[f"{side}_shoulder"]
         away = (person.vertices - joint) * (sign, 1.0, 1.0)
-        high = _smooth((away[:, 1] - ARMPIT[0]) / (ARMPIT[1] - ARMPIT[0]))
-        top = _smooth((away[:, 1] + 0.05) / 0.10)
+        high = smoothstep((away[:, 1] - ARMPIT[0]) / (ARMPIT[1] - ARMPIT[0]))
+        top = smoothstep((away[:, 1] + 0.05) / 0.10)
         reach = ARMHOLE[0] + (ARMHOLE[1] - ARMHOLE[0]) * top
-        behind = _smooth(-away[:, 2] / 0.05) * (1 - top)
+        behind = smoothstep(-away[:, 2] / 0.05) * (1 - top)
         out = away[:, 0] - SET[0] - (SET[1] - SET[0]) * top - BEHIND * behind
-        share = _smooth(out / (2 * reach) + 0.5) * np.maximum(high, _smooth((person.arms - 0.15) / 0.5))
+        share = smoothstep(out / (2 * reach) + 0.5) * np.maximum(high, smoothstep((person.arms - 0.15) / 0.5))
         arm = names.index(f"{side}_shoulder")
         rest = [n for n, name in enumerate(names) if not _belongs_to_arm(name, side)]
         near = (away[:, 1] > ARMPIT[0]) & (away[:, 0] < 0.12) & (away[:, 0] > -0.12)
         girdle = names.index(f"{side}_acromioclavicular")
         spine = [n for n, name in enumerate(names) if name.startswith("v")]
-        low = weights[:, girdle] * (1 - _smooth((away[:, 1] - BLADE[0]) / (BLADE[1] - BLADE[0])))
-        low *= _smooth(weights[:, spine].sum(axis=1) / 0.2)
+        low = weights[:, girdle] * (1 - smoothstep((away[:, 1] - BLADE[0]) / (BLADE[1] - BLADE[0])))
+        low *= smoothstep(weights[:, spine].sum(axis=1) / 0.2)
         weights[:, spine] *= 1 + (low / np.maximum(weights[:, spine].sum(axis=1), 1e-9))[:, None]
         weights[:, girdle] -= low
         trunk = weights[:, rest].sum(axis=1)
@@ -100,8 +99,3 @@ def _ease_shoulders(person: Person, places: dict[str, Float64], weights: Float64
 
 def _belongs_to_arm(name: str, side: str) -> bool:
     return name[:2] == f"{side}_" and name[2:].startswith(("shoulder", "elbow", "wrist"))
-
-
-def _smooth(value: Float64) -> Float64:
-    t = np.clip(value, 0.0, 1.0)
-    return t * t * (3 - 2 * t)

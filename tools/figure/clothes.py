@@ -10,17 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from cutting import MIDLINE, Cloth
 from person import Person
 from scipy.interpolate import PchipInterpolator
 
+from fba.arrays import Bool, Float64, Int64
 from fba.body import Skeleton
+from fba.easing import smoothstep
 from fba.mesh.meshes import vertex_normals
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-Bool = npt.NDArray[np.bool_]
 EdgeDistance = Callable[[Float64, Float64], Float64]
 
 _NAMES = list(Skeleton.default().names)
@@ -54,9 +52,8 @@ FOLD = 0.003
 class Garment:
     """A garment: vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J).
 
-    covered: for each
-    vertex of the person its depth under the garment, metres; negative where it is free. inside (V,): mask of
-    vertices folded in at an edge, which is a crease.
+    covered: depth of each vertex of the person under the garment, metres; negative where it is free.
+    inside (V,): mask of vertices folded in at an edge, which is a crease.
     """
 
     vertices: Float64
@@ -99,16 +96,16 @@ def make_shirt(body: Body) -> Garment:
     p = body.person.vertices
     arms = body.person.arms > 0.5
 
-    def way(places: Float64, kind: Float64) -> Float64:
-        ends = np.stack(
-            [length_inside_sleeve(places), depth_below_collar(places), places[:, 1] - HEM], axis=1
-        )
-        return np.take_along_axis(ends, kind.astype(int)[:, None], axis=1)[:, 0]
+    def way(points: Float64, kind: Float64) -> Float64:
+        ends = length_inside_sleeve(points), depth_below_collar(points), points[:, 1] - HEM
+        return np.choose(kind.astype(int), ends)
 
     # On an arm only the sleeve's plane counts: the hem's and the collar's would cut it, and it the trunk.
     kind = np.where(arms, 0, np.where(p[:, 1] > 1.25, 1, 2))
-    loose = _smooth((1.30 - p[:, 1]) / 0.25)
-    thick = 0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * _smooth((0.13 - length_inside_sleeve(p)) / 0.13)
+    loose = smoothstep((1.30 - p[:, 1]) / 0.25)
+    thick = (
+        0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
+    )
     return _make_garment(body, way, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
 
 
@@ -116,17 +113,17 @@ def make_trousers(body: Body) -> Garment:
     """Plain trousers, a little wide below the knee."""
     p = body.person.vertices
 
-    def way(places: Float64, kind: Float64) -> Float64:
-        ends = np.stack([np.full(len(places), -1.0), WAIST - places[:, 1], height_above_hem(places)], axis=1)
-        return np.take_along_axis(ends, kind.astype(int)[:, None], axis=1)[:, 0]
+    def way(points: Float64, kind: Float64) -> Float64:
+        ends = np.full(len(points), -1.0), WAIST - points[:, 1], height_above_hem(points)
+        return np.choose(kind.astype(int), ends)
 
     kind = np.where(body.person.arms > 0.3, 0, np.where(p[:, 1] > 0.6, 1, 2))
-    below = _smooth((0.86 - p[:, 1]) / 0.5)
+    below = smoothstep((0.86 - p[:, 1]) / 0.5)
     thick = (
         0.0010
-        + 0.0025 * _smooth((0.95 - p[:, 1]) / 0.05)
+        + 0.0025 * smoothstep((0.95 - p[:, 1]) / 0.05)
         + 0.0105 * below
-        + 0.006 * _smooth((0.35 - p[:, 1]) / 0.25)
+        + 0.006 * smoothstep((0.35 - p[:, 1]) / 0.25)
     )
     return _make_garment(body, way, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 
@@ -240,8 +237,3 @@ def _split_by_shade(
     found, number = np.unique(pairs, axis=0, return_inverse=True)
     rows = found[:, 0]
     return vertices[rows], weights[rows], number.reshape(-1, 3), np.unique(shade)[found[:, 1]]
-
-
-def _smooth(value: Float64) -> Float64:
-    t = np.clip(value, 0.0, 1.0)
-    return t * t * (3 - 2 * t)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
+from meshes import average_with_neighbours, open_edges, unique_edges
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-Bool = npt.NDArray[np.bool_]
+from fba.arrays import Bool, Float64, Int64
 
 MIDLINE = 1e-6
 """Vertices within this many metres of the plane of symmetry are on it."""
@@ -30,16 +28,12 @@ class Cloth:
     @property
     def edges(self) -> Int64:
         """(E, 2) each edge once."""
-        return np.unique(np.sort(_sides(self.triangles), axis=1), axis=0)
+        return unique_edges(self.triangles)
 
     @property
     def border(self) -> Int64:
         """(E, 2) open edges, in the direction of their triangles."""
-        sides = _sides(self.triangles)
-        _, inverse, counts = np.unique(
-            np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
-        )
-        return sides[counts[inverse.ravel()] == 1]
+        return open_edges(self.triangles)
 
     def select(self, faces: Bool) -> Cloth:
         """The mesh of some triangles (mask (F,)) and the vertices that they use."""
@@ -103,11 +97,7 @@ class Cloth:
         """Rows (V, N) moved to their neighbours' mean by shares free (V,), `rounds` times."""
         edges = self.edges
         for _ in range(rounds):
-            total, count = array.copy(), np.ones((len(array), 1))
-            for a, b in (edges.T, edges[:, ::-1].T):
-                np.add.at(total, a, array[b])
-                np.add.at(count, a, 1)
-            array = array + (total / count - array) * free[:, None]
+            array = array + (average_with_neighbours(array, edges) - array) * free[:, None]
         return array
 
 
@@ -124,10 +114,6 @@ def _cut(corners: list[int], height: Float64, number: dict[tuple[int, int], int]
         if middle is not None:
             return [[a, b, middle], [a, middle, c]]
     return [corners]
-
-
-def _sides(triangles: Int64) -> Int64:
-    return np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
 
 
 def triangulate(vertices: Float64, quads: Int64) -> Int64:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+from meshes import Mesh, tube
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
+from fba.arrays import Float64, Int64
 
 AROUND = 40
 SCLERA = np.array([0.80, 0.76, 0.72])
@@ -18,8 +17,8 @@ PUPIL = np.array([0.004, 0.004, 0.004])
 VEIN = np.array([0.62, 0.30, 0.26])
 
 
-def eyeball(centre: Float64, radius: float, iris: float) -> tuple[Float64, Int64, Float64]:
-    """Vertices (V, 3), triangles and colours (V, 4) of an eyeball looking along +z.
+def eyeball(centre: Float64, radius: float, iris: float) -> Mesh:
+    """An eyeball looking along +z.
 
     The first vertex is the middle of the pupil. iris: its diameter; the pupil's is a third of it.
     """
@@ -34,18 +33,17 @@ def eyeball(centre: Float64, radius: float, iris: float) -> tuple[Float64, Int64
     ), axis=-1)  # fmt: skip
     unit = np.concatenate([[[0, 0, 1.0]], ring.reshape(-1, 3), [[0, 0, -1.0]]])
     triangles = _sphere(len(polar))
-    colours = np.concatenate([_colours(polar, turn, pupil, edge).reshape(-1, 4)])
+    colours = _colours(polar, turn, pupil, edge).reshape(-1, 4)
     first, last = np.append(PUPIL, 0.9)[None], np.append(VEIN * 0.6, 0.9)[None]
     return centre + unit * radius, triangles, np.concatenate([first, colours, last])
 
 
 def _sphere(rings: int) -> Int64:
-    rows = 1 + np.arange(rings * AROUND).reshape(rings, AROUND)
-    after = np.roll(rows, -1, axis=1)
-    cap = np.stack([np.zeros(AROUND, dtype=int), rows[0], after[0]], axis=1)
-    quads = np.stack([rows[:-1], rows[1:], after[1:], rows[:-1], after[1:], after[:-1]], axis=-1)
-    end = np.stack([rows[-1], np.full(AROUND, rings * AROUND + 1), after[-1]], axis=1)
-    return np.concatenate([cap, quads.reshape(-1, 3), end])
+    """Triangles of a sphere: its first vertex, rings, its last vertex."""
+    first, last = 1 + np.arange(AROUND), 1 + np.arange(AROUND) + (rings - 1) * AROUND
+    cap = np.stack([np.zeros(AROUND, dtype=int), first, np.roll(first, -1)], axis=1)
+    end = np.stack([last, np.full(AROUND, rings * AROUND + 1), np.roll(last, -1)], axis=1)
+    return np.concatenate([cap, 1 + tube(rings, AROUND), end])
 
 
 def _colours(polar: Float64, turn: Float64, pupil: float, edge: float) -> Float64:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
+from meshes import unique_edges
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
+from fba.arrays import Bool, Float64, Int64, Integer
 
 FILE = Path(__file__).parent / "figure.npz"
 EYE_LEVEL = 1.65
@@ -38,17 +37,15 @@ class Surface:
     @cached_property
     def edges(self) -> Int64:
         """(E, 2) the edges, each once, smaller vertex first."""
-        sides = np.stack([self.quads, np.roll(self.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
-        sides = sides[sides[:, 0] != sides[:, 1]]
-        return np.unique(np.sort(sides, axis=1), axis=0)
+        return unique_edges(self.quads)
 
-    def select(self, faces: npt.NDArray[np.bool_]) -> Surface:
+    def select(self, faces: Bool) -> Surface:
         """The surface of some faces (mask (F,)) and the vertices that they use."""
         used, quads = np.unique(self.quads[faces], return_inverse=True)
         used_uvs, corners = np.unique(self.corners[faces], return_inverse=True)
         return Surface(self.vertices[used], quads.reshape(-1, 4), corners.reshape(-1, 4), self.uvs[used_uvs])
 
-    def rings(self, start: npt.NDArray[np.integer], most: int) -> Int64:
+    def rings(self, start: Integer, most: int) -> Int64:
         """(V,) number of edges from the start vertices, -1 beyond `most`."""
         distance = np.full(len(self.vertices), -1, dtype=np.int64)
         distance[start] = 0
@@ -62,7 +59,7 @@ class Surface:
             distance[front] = ring
         return distance
 
-    def vertices_of(self, faces: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    def vertices_of(self, faces: Bool) -> Bool:
         """(V,) mask of the vertices that any of the faces uses."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.quads[faces]] = True
@@ -88,5 +85,5 @@ def head() -> Surface:
     """
     figure, _ = load()
     high = (figure.vertices[figure.quads][:, :, 1] > EYE_LEVEL - 0.12).all(axis=1)
-    found = figure.select((figure.tile == 0) | ((figure.tile == 1) & high))
-    return Surface(found.vertices - (0.0, EYE_LEVEL, 0.0), found.quads, found.corners, found.uvs)
+    head = figure.select((figure.tile == 0) | ((figure.tile == 1) & high))
+    return replace(head, vertices=head.vertices - (0.0, EYE_LEVEL, 0.0))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import figure
 import numpy as np
-import numpy.typing as npt
 from cutting import Cloth
-from sculpt import smooth
+from meshes import average_with_neighbours, open_edges, tube
 from subdivide import refine
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
+from fba.arrays import Float64, Int64
+from fba.easing import smoothstep
+from fba.mesh.meshes import vertex_normals
 
 COLOUR = np.array([0.052, 0.088, 0.125])
 """Linear light."""
@@ -46,25 +48,18 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
 
     origin: (3,) of the head, in the frame of `figure.head`.
     """
-    whole_figure, _ = figure.load()
-    surface = figure.Surface(
-        whole_figure.vertices - (0.0, figure.EYE_LEVEL, 0.0) - origin,
-        whole_figure.quads,
-        whole_figure.corners,
-        whole_figure.uvs,
-    )
+    surface, _ = figure.load()
+    surface = replace(surface, vertices=surface.vertices - (0.0, figure.EYE_LEVEL, 0.0) - origin)
     middle = surface.vertices[surface.quads].mean(axis=1)
     trunk = (middle[:, 1] > LOWEST) & (np.abs(middle[:, 0]) < WIDEST) & (surface.tile != 1)
     whole_skin = surface.vertices[np.unique(surface.quads[trunk])]
     torso = _refine_near_neck(surface.select(trunk & (middle[:, 1] < neckline(middle) + 0.004)))
     triangles = torso.quads[:, :3]
-    from fba.mesh.meshes import vertex_normals
-
     outward = vertex_normals(torso.vertices, triangles).astype(np.float64)
     for _ in range(6):  # cloth does not follow every hollow
-        outward = _average_with_neighbours(outward, torso.edges)
+        outward = average_with_neighbours(outward, torso.edges)
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    rim = _rim(torso)
+    rim = np.unique(open_edges(torso.quads[:, :3]))
     top = rim[torso.vertices[rim, 1] > -0.21]
     vertices = torso.vertices.copy()
     rim_places = _evenly_around_neck(torso, top)
@@ -72,15 +67,15 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     turn = np.arctan2(vertices[top, 0], vertices[top, 2] - AXIS)
     outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
     for _ in range(4):  # the rows below follow
-        eased = _average_with_neighbours(vertices, torso.edges)
-        near = smooth(1 - (neckline(vertices) - vertices[:, 1]) / 0.05)[:, None]
+        eased = average_with_neighbours(vertices, torso.edges)
+        near = smoothstep(1 - (neckline(vertices) - vertices[:, 1]) / 0.05)[:, None]
         near[top] = 0
         vertices = vertices + (eased - vertices) * near * 0.6
     hang = np.clip((-0.19 - vertices[:, 1]) / 0.12, 0, 1)[:, None]
     vertices = vertices + outward * (THICK + 0.004 * hang)
     fallen = vertices.copy()
     for _ in range(5):
-        smoothed = _average_with_neighbours(fallen, torso.edges)
+        smoothed = average_with_neighbours(fallen, torso.edges)
         fallen = np.where(hang > 0, fallen * (1 - 0.7 * hang) + smoothed * 0.7 * hang, fallen)
     cloth = Cloth(fallen, outward, np.zeros((len(fallen), 0)), np.zeros((len(fallen), 0)), triangles)
     cloth = cloth.cut_above(_within_bust(fallen))
@@ -113,13 +108,8 @@ def _close_below(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
     core = np.stack([places[:, 0], np.minimum(places[:, 1], ARCH), beyond], axis=1)
     a, b = start + sides[:, 0], start + sides[:, 1]
     rows = len(edge)
-    triangles = np.concatenate(
-        [
-            np.stack([b, a, a + rows], axis=1),
-            np.stack([b, a + rows, b + rows], axis=1),
-        ]
-    )
-    return np.concatenate([places, core]), triangles
+    triangles = [np.stack([b, a, a + rows], axis=1), np.stack([b, a + rows, b + rows], axis=1)]
+    return np.concatenate([places, core]), np.concatenate(triangles)
 
 
 def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
@@ -138,10 +128,7 @@ def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
         rows.append(
             np.stack([ring[:, 0] * tight, place[:, 1] + out * 0.25, AXIS + ring[:, 2] * tight], axis=1)
         )
-    grid = start + np.arange(len(BAND) * AROUND).reshape(len(BAND), AROUND)
-    after = np.roll(grid, -1, axis=1)
-    quads = np.stack([grid[:-1], grid[1:], after[1:], grid[:-1], after[1:], after[:-1]], axis=-1)
-    return np.concatenate(rows), quads.reshape(-1, 3)
+    return np.concatenate(rows), start + tube(len(BAND), AROUND)
 
 
 def _evenly_around_neck(torso: figure.Surface, top: Int64) -> Float64:
@@ -149,9 +136,8 @@ def _evenly_around_neck(torso: figure.Surface, top: Int64) -> Float64:
 
     The edge climbs in steps along the quads; a collar is even.
     """
-    after = {
-        int(a): int(b) for a, b in _open_edges(torso) if a in set(top.tolist()) and b in set(top.tolist())
-    }
+    edges = open_edges(torso.quads[:, :3])
+    after = dict(edges[np.isin(edges, top).all(axis=1)].tolist())
     chain = [int(top[torso.vertices[top, 2].argmax()])]
     while after[chain[-1]] != chain[0]:
         chain.append(after[chain[-1]])
@@ -191,23 +177,3 @@ def _refine_near_neck(surface: figure.Surface) -> figure.Surface:
     # Triangles as quads with a doubled corner.
     quads = np.concatenate([refined.triangles, refined.triangles[:, 2:]], axis=1)
     return figure.Surface(refined.vertices, quads, quads * 0, refined.uvs)
-
-
-def _average_with_neighbours(values: Float64, edges: Int64) -> Float64:
-    total, count = values.copy(), np.ones((len(values), 1))
-    for a, b in (edges.T, edges[:, ::-1].T):
-        np.add.at(total, a, values[b])
-        np.add.at(count, a, 1)
-    return total / count
-
-
-def _open_edges(surface: figure.Surface) -> Int64:
-    """(E, 2) edges of one face only, in that face's direction."""
-    corners = surface.quads[:, :3]
-    sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
-    _, inverse, counts = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return sides[counts[inverse.ravel()] == 1]
-
-
-def _rim(surface: figure.Surface) -> Int64:
-    return np.unique(_open_edges(surface))

@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import sculpt
 from subdivide import Refined
 
+from fba.arrays import Bool, Float64, Int32
 from fba.face.feature_points import MIRRORED, names, row_of
-from fba.mesh.meshes import vertex_normals
 
-Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 
 
 def bound_points(
-    surface: Refined,
-    where: sculpt.Marks,
-    found: dict[str, int],
-    starts: dict[str, int],
-) -> tuple[Float64, npt.NDArray[np.int32]]:
+    surface: Refined, marks: sculpt.Marks, inner: dict[str, int], starts: dict[str, int]
+) -> tuple[Float64, Int32]:
     """(feature points (84, 3), the vertices (84,) they are bound to), by the rules of points.csv.
 
-    found: vertices of points on parts other than the skin; starts: first vertex of each part.
+    marks: of the surface. inner: vertices of points on parts other than the skin. starts: first vertex of
+    each part.
     """
     points, bound = np.full((len(names()), 3), np.nan), np.full(len(names()), -1, dtype=np.int32)
-    finder = Finder(surface, where)
+    outside = np.zeros(len(surface.vertices), dtype=bool)
+    outside[surface.triangles[surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0]] = True
+    skin = Skin(surface.vertices, marks, outside)
     with (HERE / "points.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             name, part = row["point"], row["part"]
@@ -37,60 +36,60 @@ def bound_points(
             if name in MIRRORED:
                 pair.append((MIRRORED[name], place, -1.0))
             for point, target, side in pair:
-                at = row_of()[point]
+                number = row_of()[point]
                 if row["rule"] == "free":
-                    points[at] = target / 1000
+                    points[number] = target / 1000
                 elif part == "skin":
-                    bound[at] = finder.find(row["rule"], target, side)
+                    bound[number] = skin.find(row["rule"], target, side)
                 else:
                     own = part.replace("left", "right") if side < 0 else part
-                    bound[at] = starts[own] + found[point]
+                    bound[number] = starts[own] + inner[point]
     return points, bound
 
 
-class Finder:
-    """Finds vertices of the skin by the rules of points.csv."""
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """The skin that points are bound to. marks: of its vertices. outside: (V,) mask of its outer side."""
 
-    def __init__(self, surface: Refined, where: sculpt.Marks) -> None:
-        self.vertices = surface.vertices
-        self.eye, self.mouth = (
-            sculpt.interpolate_rings(surface, where.eye),
-            sculpt.interpolate_rings(surface, where.mouth),
-        )
-        self.lip = surface.blend @ where.lip.astype(np.float64)
-        self.normals = vertex_normals(surface.vertices, surface.triangles)
-        self.outside = np.zeros(len(self.vertices), dtype=bool)
-        self.outside[surface.triangles[surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0]] = True
+    vertices: Float64
+    marks: sculpt.Marks
+    outside: Bool
 
     def find(self, rule: str, target: Float64, side: float) -> int:
         """The vertex of a rule of points.csv, on the left (side 1) or right (-1)."""
-        places = self.vertices * (side, 1.0, 1.0)
-        return int(getattr(self, f"_{rule}")(places, target))
+        score, candidates = RULES[rule](self, self.vertices * (side, 1.0, 1.0), target)
+        return int(np.where(candidates, score, np.inf).argmin())
 
-    def _best(self, score: Float64, chosen: npt.NDArray[np.bool_]) -> int:
-        return int(np.where(chosen, score, np.inf).argmin())
 
-    def _near(self, places: Float64, target: Float64) -> int:
-        face = self.outside & ((self.mouth == sculpt.FAR) | (self.mouth > 2))
-        on_midline = np.abs(places[:, 0]) < 1e-6 if target[0] == 0 else np.abs(places[:, 0]) > 1e-6
-        return self._best(np.linalg.norm(places - target / 1000, axis=1), face & on_midline)
+def _near(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
+    mouth = skin.marks.mouth
+    face = skin.outside & ((mouth == sculpt.FAR) | (mouth > 2))
+    on_midline = np.abs(places[:, 0]) < 1e-6
+    return np.linalg.norm(places - target / 1000, axis=1), face & (on_midline == (target[0] == 0))
 
-    def _lip(self, places: Float64, target: Float64) -> int:
-        ring = np.abs(self.mouth - sculpt.CONTACT_RING) < 1e-6
-        widest = places[ring, 0].max()
-        lips = ring & (self.lip * target[1] > 0) if target[1] else ring
-        return self._best(np.abs(places[:, 0] - target[0] * widest), lips)
 
-    def _lid(self, places: Float64, target: Float64) -> int:
-        ring = (np.abs(self.eye - sculpt.MARGIN_RING) < 1e-6) & (places[:, 0] > 0)
-        if target[0]:
-            return self._best(-places[:, 0] * target[0], ring)
-        height = places[:, 1] * target[1]
-        centre = sculpt.EYE_CENTRE - sculpt.ORIGIN
-        return self._best(np.abs(places[:, 0] - centre[0]), ring & (height > 0.002))
+def _on_lip(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
+    ring = np.abs(skin.marks.mouth - sculpt.CONTACT_RING) < 1e-6
+    widest = places[ring, 0].max()
+    lips = ring & (skin.marks.lip * target[1] > 0) if target[1] else ring
+    return np.abs(places[:, 0] - target[0] * widest), lips
 
-    def _top(self, places: Float64, target: Float64) -> int:
-        return self._best(-places[:, 1], np.abs(places[:, 0]) < 1e-6)
 
-    def _back(self, places: Float64, target: Float64) -> int:
-        return self._best(places[:, 2], (np.abs(places[:, 0]) < 1e-6) & (places[:, 1] > -0.03))
+def _on_lid(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
+    ring = (np.abs(skin.marks.eye - sculpt.MARGIN_RING) < 1e-6) & (places[:, 0] > 0)
+    if target[0]:
+        return -places[:, 0] * target[0], ring
+    centre = sculpt.EYE_CENTRE - sculpt.ORIGIN
+    return np.abs(places[:, 0] - centre[0]), ring & (places[:, 1] * target[1] > 0.002)
+
+
+def _at_top(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
+    return -places[:, 1], np.abs(places[:, 0]) < 1e-6
+
+
+def _at_back(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
+    return places[:, 2], (np.abs(places[:, 0]) < 1e-6) & (places[:, 1] > -0.03)
+
+
+RULES = {"near": _near, "lip": _on_lip, "lid": _on_lid, "top": _at_top, "back": _at_back}
+"""(score of each vertex, lowest for the point; which vertices may be it) by the rule's name."""

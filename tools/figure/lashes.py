@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+from meshes import Mesh, join
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-Mesh = tuple[Float64, Int64, Float64]
+from fba.arrays import Float64, Int64
 
 COLOUR = np.array([0.012, 0.008, 0.006])
 """Linear light."""
@@ -17,7 +15,7 @@ LENGTH = 0.0076
 
 
 def lashes(margin: Float64, centre: Float64) -> Mesh:
-    """Upper lashes of the left eye: vertices, triangles, colours (V, 4); one connected piece each.
+    """Upper lashes of the left eye, one connected piece each.
 
     margin: (N, 3) points along the upper lid's margin from the inner to the outer corner. centre: the
     eyeball's.
@@ -25,27 +23,24 @@ def lashes(margin: Float64, centre: Float64) -> Mesh:
     random = np.random.default_rng(23)
     blades = []
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(margin, axis=0), axis=1))])
-    at = np.linspace(0.22, 0.985, UPPER) + random.normal(0, 0.003, UPPER)
-    for share in np.clip(at, 0.02, 0.99):
+    along = np.linspace(0.22, 0.985, UPPER) + random.normal(0, 0.003, UPPER)
+    for share in np.clip(along, 0.02, 0.99):
         root = np.array([np.interp(share * run[-1], run, margin[:, axis]) for axis in range(3)])
         full = LENGTH * (0.55 + 0.45 * np.sin(np.pi * np.clip(share * 1.05 - 0.12, 0, 1)) ** 0.8)
         full *= 0.86 + 0.28 * random.random()
         blades.append(_blade(root, centre, full, share, random))
-    starts = np.cumsum([0, *(len(blade) for blade in blades)])[:-1]
-    pattern = _pattern()
-    vertices = np.concatenate(blades)
-    triangles = np.concatenate([pattern + start for start in starts])
-    return vertices, triangles, np.tile([*COLOUR, 0.35], (len(vertices), 1))
+    pattern, colours = _pattern(), np.tile([*COLOUR, 0.35], (len(blades[0]), 1))
+    return join([(blade, pattern, colours) for blade in blades])
 
 
 def _pattern() -> Int64:
     """Triangles of one blade: pairs of vertices along it, one at its tip."""
-    found = []
+    triangles = []
     for k in range(SEGMENTS - 1):
         a, b, c, d = 2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 3
-        found += [[a, b, d], [a, d, c]]
+        triangles += [[a, b, d], [a, d, c]]
     last = 2 * (SEGMENTS - 1)
-    return np.array([*found, [last, last + 1, last + 2]])
+    return np.array([*triangles, [last, last + 1, last + 2]])
 
 
 def _blade(

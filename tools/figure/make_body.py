@@ -15,14 +15,13 @@ from pathlib import Path
 import clothes
 import figure
 import numpy as np
-import numpy.typing as npt
 import rig
 import shoes
 from cutting import Cloth
 from person import Person
 from sculpt import ORIGIN
-from shoulders import slope_shoulders
 
+from fba.arrays import Bool, Float64, Int64
 from fba.body import Skeleton
 from fba.body.model import BodyModel, BodyPart, Material
 from fba.body.skin.skin_weights import strongest_weights
@@ -31,8 +30,6 @@ from fba.face.model import FaceModel, point_row
 from fba.mesh.meshes import vertex_normals
 from fba_player.figure.occlusion import bake
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
 GLOSS = 0.38
 DARKEST = 0.55
@@ -63,7 +60,7 @@ class Piece:
 def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
     """Skin and garments of the body, and its rig."""
     person, bones = rig.make_rig()
-    person = slope_shoulders(person, bones)
+    person = rig.slope_shoulders(person, bones)
     weights = _skull_weights(person, bones)
     body = clothes.Body(person, weights)
     made = {
@@ -144,7 +141,7 @@ def _skull_weights(person: Person, bones: rig.Rig) -> Float64:
     return weights
 
 
-def _neck(whole: Cloth, of_head: npt.NDArray[np.bool_], bones: rig.Rig) -> Cloth:
+def _neck(whole: Cloth, of_head: Bool, bones: rig.Rig) -> Cloth:
     """The head's surface from below the collar up to where the skull moves it alone."""
     head = whole.select(of_head)
     head = head.cut_above(clothes.depth_below_collar(head.vertices) * -1 + TUCKED)

@@ -8,28 +8,29 @@ refined about eyes, mouth and skull (`subdivide.py`); eyeballs, teeth, tongue ad
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import eyeballs
 import figure
 import garment
-import hair
 import landmarks
 import lashes
 import mouth
 import numpy as np
-import numpy.typing as npt
 import paint
 import sculpt
+from meshes import Mesh, mirror
 from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
 from subdivide import Refined, refine
 
+from fba.arrays import Float64, Int32
+from fba.easing import smoothstep
 from fba.face.authoring import author
 from fba.face.compact import compact
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.meshes import vertex_normals
 
-Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
 TEETH = np.array([0.0, -0.0713, 0.0823])
@@ -38,10 +39,10 @@ TONGUE = TEETH + np.array([0.0, 0.0002, -0.0022])
 
 
 def make_skin() -> tuple[Refined, sculpt.Marks]:
-    """(the refined skin in the final frame, the marks of the coarse one)."""
+    """(the refined skin in the final frame, its marks)."""
     base = figure.head()
-    where = sculpt.find_marks(base)
-    formed = sculpt.sculpt_head(base, where)
+    coarse = sculpt.find_marks(base)
+    formed = sculpt.sculpt_head(base, coarse)
     centre = formed.vertices[formed.quads].mean(axis=1)
     x, y, z = centre.T
     from_eye = np.linalg.norm(np.stack([np.abs(x), y, z], axis=1) - EYE_CENTRE, axis=1)
@@ -49,14 +50,11 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     eyes = (from_eye < 0.026) & (z > 0.066)
     lips = (np.abs(x) < 0.034) & (y < -0.025) & (y > -0.098) & (z > 0.07)
     refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
-    vertices = sculpt.lay_on_eyeballs(refined.vertices, sculpt.interpolate_rings(refined, where.eye)) - ORIGIN
+    marks = sculpt.refine_marks(refined, coarse)
+    vertices = sculpt.lay_on_eyeballs(refined.vertices, marks.eye) - ORIGIN
     normals = vertex_normals(vertices, refined.triangles)
-    vertices = vertices + normals * (hair.THICKNESS * hair.scalp(vertices, 0.012))[:, None]
-    vertices = symmetrise(vertices)
-    return (
-        Refined(vertices, refined.triangles, refined.corners, refined.uvs, refined.quads, refined.blend),
-        where,
-    )
+    vertices = vertices + normals * (paint.THICKNESS * paint.scalp(vertices, 0.012))[:, None]
+    return replace(refined, vertices=symmetrise(vertices)), marks
 
 
 def symmetrise(vertices: Float64) -> Float64:
@@ -69,23 +67,22 @@ def symmetrise(vertices: Float64) -> Float64:
     return (vertices + vertices[mate] * (-1.0, 1.0, 1.0)) / 2
 
 
-def make_inner_parts() -> tuple[dict[str, mouth.Mesh], dict[str, int]]:
+def make_inner_parts() -> tuple[dict[str, Mesh], dict[str, int]]:
     """Eyes, teeth and tongue in the final frame, and the vertices of their feature points."""
     ball = eyeballs.eyeball(EYE_CENTRE, EYE_RADIUS, IRIS)
-    other = (ball[0] * (-1.0, 1.0, 1.0), ball[1][:, ::-1].copy(), ball[2])
     upper, upper_points = mouth.teeth(TEETH, upper=True)
     lower, lower_points = mouth.teeth(TEETH, upper=False)
     tongue, tongue_points = mouth.tongue(TONGUE)
     meshes = {
         "eye_left": ball,
-        "eye_right": other,
+        "eye_right": mirror(ball),
         "teeth_upper": upper,
         "teeth_lower": lower,
         "tongue": tongue,
     }
-    found = {"3.5": 0, "3.6": 0, "9.8": upper_points["root"], "9.10": upper_points["edge"],
-             "9.9": lower_points["root"], "9.11": lower_points["edge"], **tongue_points}  # fmt: skip
-    return {name: (mesh[0] - ORIGIN, mesh[1], mesh[2]) for name, mesh in meshes.items()}, found
+    points = {"3.5": 0, "3.6": 0, "9.8": upper_points["root"], "9.10": upper_points["edge"],
+              "9.9": lower_points["root"], "9.11": lower_points["edge"], **tongue_points}  # fmt: skip
+    return {name: (mesh[0] - ORIGIN, mesh[1], mesh[2]) for name, mesh in meshes.items()}, points
 
 
 KINDS = {
@@ -95,15 +92,15 @@ KINDS = {
 ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.95}
 
 
-def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64, npt.NDArray[np.int32]]:
+def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64, Int32]:
     """(parts, feature points (84, 3), bound vertices (84,)): the head without its tables.
 
     painted: whether to paint the texture of the skin, which takes most of the time.
     """
-    surface, where = make_skin()
-    meshes, found = make_inner_parts()
-    parts = [_skin_part(surface, where, painted)]
-    meshes |= _lashes(surface, where)
+    surface, marks = make_skin()
+    meshes, inner_points = make_inner_parts()
+    parts = [_skin_part(surface, marks, painted)]
+    meshes |= _lashes(surface, marks)
     meshes["shirt"] = garment.make_shirt(ORIGIN)
     for name, (vertices, triangles, colours) in meshes.items():
         material = Material(KINDS[name], (1.0, 1.0, 1.0), ROUGHNESS[KINDS[name]])
@@ -111,13 +108,13 @@ def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64
     starts = dict(
         zip([p.name for p in parts], np.cumsum([0, *(len(p.vertices) for p in parts)]), strict=False)
     )
-    points, bound = landmarks.bound_points(surface, where, found, starts)
+    points, bound = landmarks.bound_points(surface, marks, inner_points, starts)
     for row in np.flatnonzero(bound >= 0):
         points[row] = np.concatenate([p.vertices for p in parts])[bound[row]]
     return tuple(parts), points, bound
 
 
-def _skin_part(surface: Refined, where: sculpt.Marks, painted: bool) -> Part:
+def _skin_part(surface: Refined, marks: sculpt.Marks, painted: bool) -> Part:
     """The skin, its vertices doubled along the seam of the texture."""
     pairs = np.stack([surface.triangles.ravel(), surface.corners.ravel()], axis=1)
     inner = np.repeat(surface.uvs[surface.corners].mean(axis=1)[:, 0] >= 1.0, 3)
@@ -135,50 +132,43 @@ def _skin_part(surface: Refined, where: sculpt.Marks, painted: bool) -> Part:
     uv_rows = np.concatenate([first, unique[:, 1]])
     source = np.concatenate([np.arange(len(surface.vertices)), unique[:, 0]])
     # Insides take the colour of their border: of the lips, or of the corners of the eyes.
-    lips = surface.uvs[first[np.flatnonzero(sculpt.interpolate_rings(surface, where.mouth) == 0)]].mean(
-        axis=0
-    )
-    corner = surface.vertices[:, 0] * 1000 - 50 * np.abs(sculpt.interpolate_rings(surface, where.eye) - 1)
+    lips = surface.uvs[first[np.flatnonzero(marks.mouth == 0)]].mean(axis=0)
+    corner = surface.vertices[:, 0] * 1000 - 50 * np.abs(marks.eye - 1)
     eye = surface.uvs[first[np.where(first >= 0, -np.abs(corner - 17), -np.inf).argmax()]]
     inner_uv = np.where((vertices[:, 1] > -0.03)[:, None], eye, lips)
     texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], inner_uv)
     texcoords = np.stack([texcoords[:, 0], 1 - texcoords[:, 1]], axis=1)
     triangles = np.array(flat).reshape(-1, 3)
-    texture = paint.encode_jpeg(paint.paint(_chart(surface, where))) if painted else None
+    texture = paint.encode_jpeg(paint.paint(_chart(surface, marks))) if painted else None
     return Part(
         "skin", "skin", vertices, triangles,
-        texcoords=texcoords, colours=_finish(surface, where)[source],
+        texcoords=texcoords, colours=_finish(surface, marks)[source],
         material=Material("skin", (1.0, 1.0, 1.0), 0.55, texture),
     )  # fmt: skip
 
 
-def _chart(surface: Refined, where: sculpt.Marks) -> paint.Chart:
+def _chart(surface: Refined, marks: sculpt.Marks) -> paint.Chart:
     outside = surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0
-    lip = surface.blend @ where.lip.astype(np.float64)
-    values = np.stack(
-        [sculpt.interpolate_rings(surface, where.mouth), sculpt.interpolate_rings(surface, where.eye), lip],
-        axis=1,
-    )
-    return paint.chart(
-        surface.vertices, values, surface.triangles[outside], surface.uvs[surface.corners[outside]]
-    )
+    values = np.stack([marks.mouth, marks.eye, marks.lip], axis=1)
+    uvs = surface.uvs[surface.corners[outside]]
+    return paint.chart(surface.vertices, values, surface.triangles[outside], uvs)
 
 
-def _finish(surface: Refined, where: sculpt.Marks) -> Float64:
+def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     """(V, 4) factors of the texture (3), and gloss of the skin (1)."""
-    ring, eye = sculpt.interpolate_rings(surface, where.mouth), sculpt.interpolate_rings(surface, where.eye)
+    ring, eye = marks.mouth, marks.eye
     near = ring != sculpt.FAR
     colours = np.ones((len(surface.vertices), 4))
     depth = np.where(near & (ring < 0), -ring, 0.0)
-    wet = np.where(near, 1 - sculpt.smooth((ring - 0.5) / 2.0), 0.0)
-    lips = np.where(near, 1 - sculpt.smooth((ring - 3.5) / 2.0), 0.0)
+    wet = np.where(near, 1 - smoothstep((ring - 0.5) / 2.0), 0.0)
+    lips = np.where(near, 1 - smoothstep((ring - 3.5) / 2.0), 0.0)
     lids = np.where((eye != sculpt.FAR) & (eye <= 2.6), 1.0, 0.0)
-    cropped = hair.scalp(surface.vertices, 0.01)
+    cropped = paint.scalp(surface.vertices, 0.01)
     y, z = surface.vertices[:, 1], surface.vertices[:, 2]
-    oily = 1 - sculpt.smooth(np.abs(surface.vertices[:, 0]) / 0.03)
-    oily = oily * sculpt.smooth((z + 0.01) / 0.02) * sculpt.smooth((y + 0.05) / 0.03)
+    oily = 1 - smoothstep(np.abs(surface.vertices[:, 0]) / 0.03)
+    oily = oily * smoothstep((z + 0.01) / 0.02) * smoothstep((y + 0.05) / 0.03)
     gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
-    gloss -= 0.2 * sculpt.smooth((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
+    gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.16 * cropped
     colours[:, :3] *= (1.0 / (1 + 0.35 * depth))[:, None]
     colours[(ring < -8) & near, :3] *= 0.5
@@ -194,21 +184,19 @@ def _nostrils(surface: Refined) -> Float64:
     normals = vertex_normals(v, surface.triangles)
     nose = (np.abs(v[:, 0]) < 0.02) & (v[:, 1] < -0.028) & (v[:, 1] > -0.055) & (v[:, 2] > 0.0)
     free = bake(v.astype(np.float32), normals, surface.triangles.astype(np.int32)).open
-    return np.where(nose, 0.12 + 0.88 * sculpt.smooth((free - 0.10) / 0.30), 1.0)
+    return np.where(nose, 0.12 + 0.88 * smoothstep((free - 0.10) / 0.30), 1.0)
 
 
-def _lashes(surface: Refined, where: sculpt.Marks) -> dict[str, mouth.Mesh]:
+def _lashes(surface: Refined, marks: sculpt.Marks) -> dict[str, Mesh]:
     """Lashes along the outer edge of each upper lid's margin."""
-    ring = sculpt.interpolate_rings(surface, where.eye)
     v = surface.vertices
-    edge = (np.abs(ring - sculpt.MARGIN_RING - 1) < 1e-6) & (v[:, 0] > 0)
+    edge = (np.abs(marks.eye - sculpt.MARGIN_RING - 1) < 1e-6) & (v[:, 0] > 0)
     inner, outer = v[edge, 0].argmin(), v[edge, 0].argmax()
     corners = v[edge][[inner, outer]]
     line = np.interp(v[:, 0], corners[:, 0], corners[:, 1])
     upper = edge & (v[:, 1] >= line)
     mesh = lashes.lashes(v[upper][np.argsort(v[upper, 0])], EYE_CENTRE - ORIGIN)
-    mirrored = (mesh[0] * (-1.0, 1.0, 1.0), mesh[1][:, ::-1].copy(), mesh[2])
-    return {"lashes_left": mesh, "lashes_right": mirrored}
+    return {"lashes_left": mesh, "lashes_right": mirror(mesh)}
 
 
 def head() -> FaceModel:

@@ -6,11 +6,9 @@ import csv
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
+from meshes import Mesh, join, mirror, tube
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-Mesh = tuple[Float64, Int64, Float64]
+from fba.arrays import Float64
 
 ENAMEL = np.array([0.80, 0.735, 0.60])
 """Linear light."""
@@ -40,23 +38,21 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
         width, height, thick = (float(row[name]) / 1000 for name in ("width", "height", "thick"))
         place, turn = _arch(along + width / 2, inset)
         tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
-        meshes += [
-            _place_tooth(tooth, place, turn, front, 1.0),
-            _place_tooth(tooth, place, turn, front, -1.0),
-        ]
+        placed = _place_tooth(tooth, place, turn)
+        meshes += [(mesh[0] + front, *mesh[1:]) for mesh in (placed, mirror(placed))]
         along += width + 0.00008
     # Of all lowest vertices of the first incisor the one nearest to the midline and the front.
     vertices = meshes[0][0]
     lowest = np.abs(vertices[:, 1] - front[1]) < 0.0004
     score = np.where(lowest, vertices[:, 2] - 2 * np.abs(vertices[:, 0]), -1.0)
-    found = {"edge": int(score.argmax())}
+    points = {"edge": int(score.argmax())}
     gum = _gum(front, sign, inset, rows)
     start = sum(len(mesh[0]) for mesh in meshes)
     meshes.append(gum)
     middle = np.flatnonzero(np.abs(gum[0][:, 0]) < 1e-9)
     high = middle[(gum[0][middle, 1] * sign).argmax()]
-    found["root"] = start + int(high)
-    return _join(meshes), found
+    points["root"] = start + int(high)
+    return join(meshes), points
 
 
 def _arch(length: float, inset: float) -> tuple[Float64, float]:
@@ -73,9 +69,7 @@ def _arch(length: float, inset: float) -> tuple[Float64, float]:
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
     """The mesh of a crown: outer face at z = 0, edge at y = 0, gum towards sign x y."""
     turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
-    square = 2.8
-    cx = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** (2 / square)
-    cz = np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** (2 / square)
+    cx, cz = _rounded_square(turn, 2.8)
     rows = np.array([0.0, 0.06, 0.32, 0.75, 1.12])  # edge to below the gum
     # Narrow at the neck, widest near the edge; the edge of a front tooth is thin.
     wide = np.interp(rows, [0, 0.05, 0.25, 0.7, 1.12], [0.86, 0.95, 1.0, 0.93, 0.76])
@@ -94,7 +88,8 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
         [0, sign * (0.0 if flat < 0.5 else 0.0006), 0]
     )
     flat_vertices = np.concatenate([vertices.reshape(-1, 3), cap[None]])
-    triangles = _tube(len(rows), AROUND, sign)
+    triangles = tube(len(rows), AROUND)
+    triangles = triangles if sign > 0 else triangles[:, ::-1]
     last = len(flat_vertices) - 1
     ring = np.arange(AROUND)
     lid = np.stack([np.full(AROUND, last), ring, np.roll(ring, -1)], axis=1)
@@ -109,24 +104,19 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 
-def _tube(rows: int, around: int, sign: float) -> Int64:
-    grid = np.arange(rows * around).reshape(rows, around)
-    after = np.roll(grid, -1, axis=1)
-    quads = np.stack([grid[:-1], grid[1:], after[1:], grid[:-1], after[1:], after[:-1]], axis=-1)
-    triangles = quads.reshape(-1, 3)
-    return triangles if sign > 0 else triangles[:, ::-1].copy()
+def _rounded_square(turn: Float64, power: float) -> tuple[Float64, Float64]:
+    """(x, y), each (N,), of a circle bulging towards a square, at angles (N,); power: 2 for a circle."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    return np.sign(cos) * np.abs(cos) ** (2 / power), np.sign(sin) * np.abs(sin) ** (2 / power)
 
 
-def _place_tooth(tooth: Mesh, place: Float64, turn: float, front: Float64, side: float) -> Mesh:
+def _place_tooth(tooth: Mesh, place: Float64, turn: float) -> Mesh:
+    """A tooth of the left side turned about y and moved to its place on the arch."""
     vertices, triangles, colours = tooth
     cos, sin = np.cos(turn), np.sin(turn)
     x = vertices[:, 0] * cos + vertices[:, 2] * sin
     z = -vertices[:, 0] * sin + vertices[:, 2] * cos
-    moved = np.stack([x, vertices[:, 1], z], axis=1) + place
-    if side < 0:
-        moved = moved * (-1.0, 1.0, 1.0)
-        triangles = triangles[:, ::-1].copy()
-    return moved + front, triangles, colours
+    return np.stack([x, vertices[:, 1], z], axis=1) + place, triangles, colours
 
 
 def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) -> Mesh:
@@ -155,9 +145,7 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
     columns = band.shape[1]
     grid = np.arange(len(profile) * columns).reshape(len(profile), columns)
     a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-    triangles = np.concatenate(
-        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
-    )
+    triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
     if sign < 0:
         triangles = triangles[:, ::-1].copy()
     shade = 1 - 0.55 * np.abs(np.linspace(-1, 1, columns)) ** 1.5
@@ -182,9 +170,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     knots = np.linspace(0, 1, len(spine))
     z, top, half, tall = PchipInterpolator(knots, spine / 1000)(t).T
     turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
-    square = 2.6
-    cx = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** (2 / square)
-    cy = np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** (2 / square)
+    cx, cy = _rounded_square(turn, 2.6)
     vertices = np.zeros((rings, around, 3))
     vertices[..., 0] = half[:, None] * cx
     vertices[..., 1] = top[:, None] + tall[:, None] * (cy - 1) / 2
@@ -194,7 +180,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     vertices[..., 1] -= groove * np.clip((1 - t[:, None]) * 6, 0, 1)
     vertices[..., 2] = z[:, None]
     flat = np.concatenate([vertices.reshape(-1, 3), [[0, top[0] - tall[0] / 2, z[0]]], [[0, 0.0, 0.0]]])
-    triangles = _tube(rings, around, 1.0)[:, ::-1].copy()
+    triangles = tube(rings, around)[:, ::-1]
     ring = np.arange(around)
     root, point = rings * around, rings * around + 1
     after = np.roll(ring, -1)
@@ -211,18 +197,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
     body = int(np.abs(t - 0.52).argmin())
     upward = around // 4
-    found = {"6.1": point, "6.2": body * around + upward, "6.3": body * around + 0, "6.4": 0}
-    side = int(np.abs(t - 0.60).argmin())
-    found["6.3"], found["6.4"] = side * around, side * around + around // 2
+    side = int(np.abs(t - 0.60).argmin()) * around
+    points = {"6.1": point, "6.2": body * around + upward, "6.3": side, "6.4": side + around // 2}
     mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.7)])
-    return mesh, found
-
-
-def _join(meshes: list[Mesh]) -> Mesh:
-    starts = np.cumsum([0, *(len(mesh[0]) for mesh in meshes)])
-    triangles = [mesh[1] + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
-    return (
-        np.concatenate([mesh[0] for mesh in meshes]),
-        np.concatenate(triangles),
-        np.concatenate([mesh[2] for mesh in meshes]),
-    )
+    return mesh, points

@@ -1,17 +1,22 @@
-"""The skin's texture: complexion, lips, brows and cropped hair, painted by position on the head."""
+"""The skin's texture: complexion, lips, brows and cropped hair, painted by position on the head.
+
+`scalp` and `brow` are the density of hair.
+"""
 
 from __future__ import annotations
 
+import csv
 import io
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
-from hair import CROWN, brow, scalp
 from PIL import Image, ImageDraw, ImageFilter
-from sculpt import smooth
+from scipy.interpolate import PchipInterpolator
 
-Float64 = npt.NDArray[np.float64]
+from fba.arrays import Bool, Float64, Integer
+from fba.easing import smoothstep
+
 SIZE = 2048
 
 # sRGB, 0..255
@@ -26,6 +31,15 @@ MOUTH = np.array([96, 34, 34.0])
 NECK = np.array([206, 158, 131.0])
 HAIR = np.array([52, 38, 30.0])
 SCALP = np.array([112, 86, 73.0])
+AXIS = -0.085
+"""z of the vertical axis about which the hairline is given."""
+CROWN = np.array([0.004, 0.104, -0.118])
+THICKNESS = 0.0035
+BROW = np.array([
+    # along the left brow: x, y, how far it reaches down and up (mm)
+    (12.5, 14.5, 3.4, 3.2), (18, 17.6, 4.0, 3.6), (26, 20.8, 3.9, 3.4), (35, 23.0, 3.2, 3.0),
+    (44, 22.6, 2.4, 2.4), (52, 19.0, 1.6, 1.7), (59, 13.6, 0.7, 0.8),
+]) / 1000  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +51,10 @@ class Chart:
 
     place: Float64
     value: Float64
-    known: npt.NDArray[np.bool_]
+    known: Bool
 
 
-def chart(
-    vertices: Float64, values: Float64, triangles: npt.NDArray[np.integer], uvs: Float64, size: int = SIZE
-) -> Chart:
+def chart(vertices: Float64, values: Float64, triangles: Integer, uvs: Float64, size: int = SIZE) -> Chart:
     """The chart of triangles (F, 3) with uvs (F, 3, 2) at their corners, origin at the bottom left."""
     data = np.concatenate([vertices, values], axis=1)
     out = np.zeros((size, size, data.shape[1]))
@@ -69,6 +81,35 @@ def chart(
     return Chart(out[..., :3], out[..., 3:], known)
 
 
+def scalp(places: Float64, soft: float = 0.004) -> Float64:
+    """(N,) density of hair at points (N, 3): 0 on the face, 1 on the scalp.
+
+    soft: width of the edge, metres.
+    """
+    with (Path(__file__).parent / "hairline.csv").open(encoding="utf-8") as file:
+        line = np.array([[float(row["degrees"]), float(row["y"]) / 1000] for row in csv.DictReader(file)])
+    around = np.degrees(np.arctan2(np.abs(places[:, 0]), places[:, 2] - AXIS))
+    height = PchipInterpolator(line[:, 0], line[:, 1])
+    slope = height.derivative()(around) * 180 / np.pi / 0.08
+    above = (places[:, 1] - height(around)) / np.sqrt(1 + slope**2)
+    ear = (np.abs(places[:, 0]) > 0.0765) & (places[:, 1] < 0.006)
+    ear &= (places[:, 2] > -0.122) & (places[:, 2] < -0.100)
+    return np.where(ear, 0.0, smoothstep(above / soft + 0.5))
+
+
+def brow(places: Float64) -> tuple[Float64, Float64]:
+    """(position along the brow (N,): 0 inner, 1 outer end; density of its hair (N,), 0..1)."""
+    x = np.abs(places[:, 0])
+    middle, low, high = (np.interp(x, BROW[:, 0], BROW[:, column]) for column in (1, 2, 3))
+    offset = places[:, 1] - middle
+    reach = np.where(offset < 0, low, high)
+    across = 1 - smoothstep((np.abs(offset) / reach - 0.35) / 0.75)
+    along = (x - BROW[0, 0]) / (BROW[-1, 0] - BROW[0, 0])
+    ends = smoothstep((along + 0.03) / 0.14) * (1 - smoothstep((along - 0.90) / 0.12))
+    front = places[:, 2] > -0.03
+    return along, np.where(front, across * ends, 0.0)
+
+
 def noise(places: Float64, scale: float, seed: int) -> Float64:
     """(N,) smooth noise in -1..1 at points (N, 3); scale: size of its grains, metres."""
     from scipy.ndimage import map_coordinates
@@ -86,20 +127,17 @@ def paint(lay: Chart) -> Image.Image:
     colour = _mouth(colour, p, ring_mouth, lip_side)
     hair = scalp(p, 0.011)
     speckle = 0.5 + 0.5 * noise(p, 0.0009, 31)
-    cover = smooth(hair * 1.25 - 0.55 * speckle * (1 - hair))
+    cover = smoothstep(hair * 1.25 - 0.55 * speckle * (1 - hair))
     # Hairs end at the seam of the texture, at the back of the head: a darker ground hides it.
     seam = np.exp(-((p[:, 0] / 0.003) ** 2)) * (p[:, 2] < -0.12)
     colour = _blend(colour, HAIR, hair * seam * 0.25)
-    colour = (
-        colour * (1 - 0.72 * (cover * (1 - 0.3 * seam))[:, None])
-        + SCALP * 0.72 * (cover * (1 - 0.3 * seam))[:, None]
-    )
-    _, density = brow(p)
-    colour = colour * (1 - 0.30 * density[:, None]) + HAIR * 0.30 * density[:, None]
+    ground = 0.72 * (cover * (1 - 0.3 * seam))[:, None]
+    colour = colour * (1 - ground) + SCALP * ground
+    hairs = 0.30 * brow(p)[1][:, None]
+    colour = colour * (1 - hairs) + HAIR * hairs
     image = np.zeros((*lay.known.shape, 3))
-    image[:] = SKIN
     image[lay.known] = colour
-    _fill_unknown(image, lay.known)
+    image = _fill_unknown(image, lay.known)
     picture = Image.fromarray(np.clip(image, 0, 255).astype(np.uint8))
     _strokes(picture, lay)
     return picture
@@ -119,12 +157,12 @@ def _blend(colour: Float64, other: Float64, share: Float64) -> Float64:
 def _spot(p: Float64, centre: tuple[float, float, float], radius: float) -> Float64:
     """(N,) 1 in the middle of a spot on both sides of the face, 0 at its edge; centre, radius: mm."""
     folded = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1) * 1000
-    return 1 - smooth(np.linalg.norm(folded - centre, axis=1) / radius)
+    return 1 - smoothstep(np.linalg.norm(folded - centre, axis=1) / radius)
 
 
 def _complexion(p: Float64) -> Float64:
     colour = np.tile(SKIN, (len(p), 1))
-    colour = _blend(colour, NECK, smooth((-0.095 - p[:, 1]) / 0.05) * 0.9)
+    colour = _blend(colour, NECK, smoothstep((-0.095 - p[:, 1]) / 0.05) * 0.9)
     broad = 0.75 + 0.5 * noise(p, 0.011, 1)
     for centre, radius, share in (
         ((40, -40, -4), 40, 0.55), ((0, -38, 33), 24, 0.45), ((14, -40, 14), 14, 0.35),
@@ -138,7 +176,7 @@ def _complexion(p: Float64) -> Float64:
     pores = np.clip(noise(p, 0.00065, 6) - 0.45, 0, 1)[:, None]
     nose = np.clip(_spot(p, (6, -34, 24), 26) + _spot(p, (28, -34, 6), 26) * 0.7, 0, 1)[:, None]
     colour += red + fine - pores * (6 + 26 * nose) * np.array([0.8, 1.0, 1.0])
-    freckle = smooth((noise(p, 0.0021, 7) - 0.62) / 0.2) * smooth((noise(p, 0.010, 8) + 0.2) / 0.8)
+    freckle = smoothstep((noise(p, 0.0021, 7) - 0.62) / 0.2) * smoothstep((noise(p, 0.010, 8) + 0.2) / 0.8)
     return _blend(colour, np.array([178, 118, 92.0]), freckle * 0.30 * _spot(p, (24, -26, 8), 42))
 
 
@@ -150,11 +188,11 @@ def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
     inner = _spot(p, (17, 1, 2), 13)
     colour = _blend(colour, SOCKET, upper * 0.42 + lower * 0.30 + inner * 0.25)
     lid = near & (ring < 5.0)
-    colour = _blend(colour, WATERLINE, np.where(lid, smooth((4.2 - ring) / 2.4) * 0.75, 0))
+    colour = _blend(colour, WATERLINE, np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0))
     # The root of the lashes draws a line along the margin's outer edge.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
-    line *= smooth((x - 19.0) / 5.0)
+    line *= smoothstep((x - 19.0) / 5.0)
     colour = _blend(colour, HAIR, line)
     caruncle = near & (ring < 1.6) & (x < 24)
     return np.where(caruncle[:, None], CARUNCLE + noise(p, 0.001, 9)[:, None] * 10, colour)
@@ -162,27 +200,27 @@ def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
 
 def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64) -> Float64:
     near = ring < 90
-    corner = smooth((np.abs(p[:, 0]) - 0.015) / 0.012)
+    corner = smoothstep((np.abs(p[:, 0]) - 0.015) / 0.012)
     border = np.where(side > 0, 5.0, 5.1) - 1.9 * corner  # vermilion ends nearer in the corners
-    red = np.where(near, smooth((border + 0.55 - ring) / 1.0), 0.0)
+    red = np.where(near, smoothstep((border + 0.55 - ring) / 1.0), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
     lip = LIP + lines[:, None] * np.array([9, 9, 8.0]) + (side > 0)[:, None] * np.array([-8, -7, -6.0])
     colour = _blend(colour, lip, red * 0.88)
-    seam = np.where(near, smooth((2.1 - ring) / 1.2), 0.0)
+    seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0)
     colour = _blend(colour, LIP_LINE, seam * 0.8)
-    inside = np.where(near, smooth((0.6 - ring) / 1.2), 0.0)
+    inside = np.where(near, smoothstep((0.6 - ring) / 1.2), 0.0)
     colour = _blend(colour, MOUTH, inside)
     # A light edge above the upper lip.
     edge = np.where(near & (side > 0), np.exp(-(((ring - border - 0.9) / 0.5) ** 2)), 0.0) * (1 - corner)
     return _blend(colour, SKIN + 12, edge * 0.35)
 
 
-def _fill_unknown(image: Float64, known: npt.NDArray[np.bool_]) -> None:
-    """Fill texels that no triangle covers with the nearest colour, in place, so that seams do not show."""
+def _fill_unknown(image: Float64, known: Bool) -> Float64:
+    """The image with the nearest colour on texels that no triangle covers, so that seams do not show."""
     from scipy.ndimage import distance_transform_edt
 
     _, (row, column) = distance_transform_edt(~known, return_indices=True)
-    image[:] = image[row, column]
+    return image[row, column]
 
 
 def _strokes(picture: Image.Image, lay: Chart) -> None:

@@ -12,11 +12,10 @@ from typing import Any
 
 import figure
 import numpy as np
-import numpy.typing as npt
 from subdivide import refine
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
+from fba.arrays import Bool, Float64, Int64
+from fba.easing import smoothstep
 
 WIDER = 0.024
 """Metres by which each shoulder is moved out: joints 0.37 m apart, average for adults of this height."""
@@ -48,11 +47,11 @@ class Person:
     vertices: Float64
     triangles: Int64
     tile: Int64
-    inner: npt.NDArray[np.bool_]
+    inner: Bool
     blend: Any
     arms: Float64
 
-    def vertices_of(self, faces: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    def vertices_of(self, faces: Bool) -> Bool:
         """(V,) mask of the vertices that any of the faces uses."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.triangles[faces]] = True
@@ -86,17 +85,12 @@ def make_person(surface: figure.Surface, places: dict[str, Float64], arms: Float
 def reproportion(places: Float64, arms: Float64) -> Float64:
     """Points (N, 3) of the figure in the person's proportions. arms (N,): weight of the arms."""
     x, height = np.abs(places[:, 0]), places[:, 1]
-    chest = CHEST_LEAST + (1 - CHEST_LEAST) * _smooth((height - CHEST[0]) / (CHEST[1] - CHEST[0]))
-    chest *= _smooth((height - 0.95) / 0.15)
-    trunk = _smooth((x - NECK) / (GIRDLE - NECK)) * chest
+    chest = CHEST_LEAST + (1 - CHEST_LEAST) * smoothstep((height - CHEST[0]) / (CHEST[1] - CHEST[0]))
+    chest *= smoothstep((height - 0.95) / 0.15)
+    trunk = smoothstep((x - NECK) / (GIRDLE - NECK)) * chest
     out = WIDER * (arms + (1 - arms) * trunk)
     level = np.exp(-(((height - THIGH) / THIGH_HIGH) ** 2))
-    out -= SLIMMER * (1 - arms) * level * _smooth((x - 0.06) / 0.12)
+    out -= SLIMMER * (1 - arms) * level * smoothstep((x - 0.06) / 0.12)
     moved = places.copy()
     moved[:, 0] += np.sign(places[:, 0]) * out
     return moved
-
-
-def _smooth(value: Float64) -> Float64:
-    t = np.clip(value, 0.0, 1.0)
-    return t * t * (3 - 2 * t)

@@ -7,15 +7,15 @@ relative to the standard's default posture (arms at the sides, palms to the thig
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bending
 import figure
 import numpy as np
-import numpy.typing as npt
 from person import Person, make_person, reproportion
 
+from fba.arrays import Float64, Int64
 from fba.body import Skeleton
 from fba.body.solve.bind_pose import (
     FINGERS,
@@ -25,8 +25,8 @@ from fba.body.solve.bind_pose import (
     skeleton_in_default_posture,
     vertebrae_between,
 )
+from fba.easing import smoothstep
 
-Float64 = npt.NDArray[np.float64]
 HERE = Path(__file__).parent
 SKULLBASE = np.array([0.0, 1.6182, -0.0177])
 """Centre of the head's rotation: feature point 7.1 of the built-in head."""
@@ -34,6 +34,13 @@ TORSO = ("Root", "Hips", "Spine1", "Spine2", "Chest")
 NECK = ("Neck1", "Neck2")
 ARM = ("shoulder", "elbow", "wrist", "thumb", *FINGERS)
 HEAD = ("Head", "HeadEnd", "Jaw", "LeftEye", "RightEye")
+
+CAP = (-0.11, 0.05)
+"""Heights from the joint over which moving in the cap fades in, metres."""
+LEFT = 0.45
+"""Share that remains of its distance beyond SIDE, at the upper of these heights."""
+SIDE = -0.010
+"""Metres out from the joint from which that distance is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +52,7 @@ class Rig:
     """
 
     names: tuple[str, ...]
-    parents: npt.NDArray[np.int64]
+    parents: Int64
     centres: Float64
     bind: Float64
     weights: Float64
@@ -121,7 +128,7 @@ def _weights(
         _share_forward(weights, default, surface, f"{side}_ankle", f"{side}_midtarsal", places)
         # The shoulder girdle: weight near the arm goes to the blade.
         out = np.abs(surface.vertices[:, 0])
-        far = _smooth((out - 0.07) / 0.06)
+        far = smoothstep((out - 0.07) / 0.06)
         inner, outer = (
             default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular")
         )
@@ -135,11 +142,28 @@ def _share_forward(
 ) -> None:
     """Give part of the rear joint's weight to the front joint, in place, by how far forward vertices are."""
     a, b = default.number(rear), default.number(front)
-    ahead = _smooth((surface.vertices[:, 2] - places[b, 2] + 0.02) / 0.04)
+    ahead = smoothstep((surface.vertices[:, 2] - places[b, 2] + 0.02) / 0.04)
     weights[:, b] += weights[:, a] * ahead
     weights[:, a] *= 1 - ahead
 
 
-def _smooth(value: Float64) -> Float64:
-    t = np.clip(value, 0.0, 1.0)
-    return t * t * (3 - 2 * t)
+def slope_shoulders(person: Person, bones: Rig) -> Person:
+    """The person with the caps of both shoulders moved in, for hanging arms.
+
+    With the arms down, the cap of the figure's shoulder would stick out as a corner beside the joint; a
+    person's slopes from the neck into the arm. The cap is moved in there, and the correction transformed back
+    into the posture of the figure.
+    """
+    upright = np.tile(np.eye(4), (len(bones.names), 1, 1))
+    upright[:, :3, 3] = bones.centres
+    hanging = upright @ np.linalg.inv(bones.bind)  # from the posture of the figure to the default one
+    turned = np.einsum("vj,jab->vab", bones.weights, hanging)
+    places = np.einsum("vab,vb->va", turned, np.pad(person.vertices, ((0, 0), (0, 1)), constant_values=1.0))
+    shift = np.zeros_like(places[:, :3])
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        joint = bones.centres[bones.names.index(f"{side}_shoulder")]
+        out = sign * (places[:, 0] - joint[0]) - SIDE
+        high = smoothstep((places[:, 1] - joint[1] - CAP[0]) / (CAP[1] - CAP[0]))
+        shift[:, 0] -= sign * np.maximum(out, 0.0) * (1 - LEFT) * high
+    back = np.einsum("vab,va->vb", turned[:, :3, :3], shift)  # by the inverse rotations
+    return replace(person, vertices=person.vertices + back)

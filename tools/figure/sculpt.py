@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from figure import Surface
 from subdivide import Refined
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
+from fba.arrays import Bool, Float64, Int64
+from fba.easing import smoothstep
 
 EYE_CENTRE = np.array([0.0312, -0.0018, 0.0620])
 """Centre of the left eyeball in the frame of `figure.head`."""
@@ -43,9 +42,9 @@ class Marks:
     upper lip and above it, -1 on the lower lip and below, 0 elsewhere and between both.
     """
 
-    eye: Int64
-    mouth: Int64
-    lip: Int64
+    eye: Int64 | Float64
+    mouth: Int64 | Float64
+    lip: Int64 | Float64
 
 
 FAR = 99
@@ -53,11 +52,17 @@ ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
 """Origin of the finished head, between the pupils, in the frame of `figure.head`."""
 
 
-def interpolate_rings(refined: Refined, ring: npt.NDArray[np.int64]) -> Float64:
+def interpolate_rings(refined: Refined, ring: Int64) -> Float64:
     """Ring numbers of the coarse vertices interpolated to the fine ones."""
     value = refined.blend @ ring.astype(np.float64)
     far = refined.blend @ (ring == FAR).astype(np.float64)
     return np.where(far > 0, FAR, value)
+
+
+def refine_marks(refined: Refined, coarse: Marks) -> Marks:
+    """The marks of the coarse vertices interpolated to the fine ones."""
+    eye, mouth = (interpolate_rings(refined, rings) for rings in (coarse.eye, coarse.mouth))
+    return Marks(eye, mouth, refined.blend @ coarse.lip.astype(np.float64))
 
 
 def find_marks(head: Surface) -> Marks:
@@ -69,7 +74,7 @@ def find_marks(head: Surface) -> Marks:
     return Marks(eye, mouth, _lips(head, mouth))
 
 
-def _signed_rings(head: Surface, border: npt.NDArray[np.bool_], inside: npt.NDArray[np.bool_]) -> Int64:
+def _signed_rings(head: Surface, border: Bool, inside: Bool) -> Int64:
     rings = head.rings(np.flatnonzero(border), 16)
     return np.where(rings < 0, FAR, np.where(inside, -rings, rings))
 
@@ -92,18 +97,12 @@ def _both_sides(vertices: Float64) -> tuple[Float64, Float64]:
     return vertices * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1), sign
 
 
-def smooth(value: Float64) -> Float64:
-    """0 below 0, 1 above 1, smooth between."""
-    t = np.clip(value, 0.0, 1.0)
-    return t * t * (3 - 2 * t)
-
-
 def _wider_eyes(vertices: Float64, where: Marks) -> Float64:
     left, sign = _both_sides(vertices)
     near = (where.eye != FAR) & (left[:, 2] > 0.045)
     offset = left - EYE_CENTRE
     away = np.hypot(offset[:, 0] / 1.3, offset[:, 1])
-    weight = np.where(near, 1 - smooth((away - 0.010) / 0.014), 0.0)
+    weight = np.where(near, 1 - smoothstep((away - 0.010) / 0.014), 0.0)
     stretch = np.where(offset[:, 0] < 0, 0.25, 0.10)
     ball = where.eye < 0  # the socket stays about the eyeball
     # The nose bridge between the eyes must not be crossed.
@@ -130,7 +129,7 @@ def opening_profile(x: Float64) -> Float64:
     return np.sin(np.pi * warped) ** 0.85
 
 
-def upper_side(x: Float64, y: Float64) -> npt.NDArray[np.bool_]:
+def upper_side(x: Float64, y: Float64) -> Bool:
     """(N,) mask of points near the left eye above the line through its corners."""
     inner, outer = eye_corners()
     return y > np.interp(x, [inner[0], outer[0]], [inner[1], outer[1]])
@@ -148,19 +147,20 @@ def _open_lids(vertices: Float64, where: Marks) -> Float64:
         edge = margin & (upper == side)
         # One vertex of each margin stands over the middle of the pupil.
         nearest = left[edge, 0][np.abs(left[edge, 0] - EYE_CENTRE[0]).argmin()]
-        bump = np.exp(-(((left[:, 0] - nearest) / 0.005) ** 2)) * (1 - smooth((np.abs(ring) - 3) / 5.0))
+        bump = np.exp(-(((left[:, 0] - nearest) / 0.005) ** 2)) * (1 - smoothstep((np.abs(ring) - 3) / 5.0))
         left[:, 0] += (EYE_CENTRE[0] - nearest) * bump * mine
         order = np.argsort(left[edge, 0])
         x, y = left[edge, 0][order], left[edge, 1][order]
         move = wanted[side] - np.interp(EYE_CENTRE[0], x, y)
-        fade = np.where(ring >= 0, 1 - smooth((ring - 4) / 8.0), 1 - smooth(-ring / 3.0))
+        fade = np.where(ring >= 0, 1 - smoothstep((ring - 4) / 8.0), 1 - smoothstep(-ring / 3.0))
         shift = move * opening_profile(left[:, 0]) * fade * mine
         left[:, 1] += shift
     left = _onto_eyeball(left, ring, region)
-    return left * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1)
+    left[:, 0] *= sign
+    return left
 
 
-def _onto_eyeball(left: Float64, ring: Int64, region: npt.NDArray[np.bool_]) -> Float64:
+def _onto_eyeball(left: Float64, ring: Int64, region: Bool) -> Float64:
     """Vertices with the lids and their surroundings laid on the eyeball, and the socket clear of it."""
     offset = left - EYE_CENTRE
     away = np.linalg.norm(offset, axis=1)
@@ -173,7 +173,7 @@ def _onto_eyeball(left: Float64, ring: Int64, region: npt.NDArray[np.bool_]) -> 
     towards = np.where(caruncle, np.clip(towards, -0.001, None), towards)
     sorted_angles = angle[edge][order]
     pull = np.interp(angle, sorted_angles, towards, period=2 * np.pi)
-    fade = 1 - smooth((ring - 3) / 6.0)
+    fade = 1 - smoothstep((ring - 3) / 6.0)
     outside = region & (ring >= 1)
     moved = left + offset / away[:, None] * (pull * fade * outside)[:, None]
     within = region & (ring <= 1)
@@ -194,14 +194,15 @@ def lay_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
     least = np.where(ring < 0, EYE_RADIUS + 0.0009, least)
     out = np.where(region & (ring <= 8), np.maximum(away, least), away)
     moved = EYE_CENTRE + offset / away[:, None] * out[:, None]
-    return moved * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1)
+    moved[:, 0] *= sign
+    return moved
 
 
 def _mouth(vertices: Float64, where: Marks) -> Float64:
     """Vertices with a wider mouth, whose lips touch along a level line."""
     ring, lip = where.mouth, where.lip
     away = np.hypot(vertices[:, 0] / 1.25, vertices[:, 1] - MOUTH[1])
-    weight = np.where(vertices[:, 2] > 0.02, 1 - smooth((away - 0.016) / 0.022), 0.0)
+    weight = np.where(vertices[:, 2] > 0.02, 1 - smoothstep((away - 0.016) / 0.022), 0.0)
     vertices = vertices.copy()
     vertices[:, 0] *= 1 + 0.11 * weight
     contact = ring == CONTACT_RING
@@ -211,16 +212,12 @@ def _mouth(vertices: Float64, where: Marks) -> Float64:
         lines[side] = vertices[mine[np.argsort(vertices[mine, 0])]]
     x = vertices[:, 0]
     corner = vertices[contact][np.abs(vertices[contact, 0]).argmax()]
+    ends = sorted([corner, corner * (-1.0, 1.0, 1.0)], key=lambda end: float(end[0]))
     for side, line in lines.items():  # both lines end in the corners
-        ends = (
-            np.array([corner * (-1.0, 1.0, 1.0), corner])
-            if corner[0] > 0
-            else np.array([corner, corner * (-1.0, 1.0, 1.0)])
-        )
         lines[side] = np.concatenate([ends[:1], line, ends[1:]])
     y = {side: np.interp(x, line[:, 0], line[:, 1]) for side, line in lines.items()}
     z = {side: np.interp(x, line[:, 0], line[:, 2]) for side, line in lines.items()}
-    fade = np.where(ring == FAR, 0.0, 1 - smooth((np.abs(ring - CONTACT_RING) - 1) / 9.0))
+    fade = np.where(ring == FAR, 0.0, 1 - smoothstep((np.abs(ring - CONTACT_RING) - 1) / 9.0))
     # Between both lips, in the corners, either line serves: they meet there.
     label = np.where((lip == 0) & (ring != FAR), 1, lip)
     for side in (1, -1):
@@ -234,7 +231,7 @@ def _fuller_lips(vertices: Float64, where: Marks) -> Float64:
     """Vertices with the red of the lips a little higher and rounder; the line of contact stays."""
     out = np.where(where.mouth == FAR, 0, np.maximum(where.mouth - CONTACT_RING, 0)).astype(np.float64)
     fade = np.where(out > 0, np.exp(-(((out - 3.0) / 2.2) ** 2)), 0.0)
-    middle = 1 - smooth((np.abs(vertices[:, 0]) - 0.006) / 0.018)
+    middle = 1 - smoothstep((np.abs(vertices[:, 0]) - 0.006) / 0.018)
     vertices = vertices.copy()
     lift = np.where(where.lip > 0, 0.0011, -0.0013)
     vertices[:, 1] += np.where(where.lip != 0, lift, 0.0) * fade * (0.25 + 0.75 * middle)
@@ -246,7 +243,7 @@ def _nose(vertices: Float64) -> Float64:
     """Vertices with the tip of the nose a little lower, so that the nostrils face down, not ahead."""
     tip = np.array([0.0, -0.0385, 0.106])
     away = np.linalg.norm((vertices - tip) * (0.75, 1.0, 0.8), axis=1)
-    weight = 1 - smooth((away - 0.004) / 0.020)
+    weight = 1 - smoothstep((away - 0.004) / 0.020)
     vertices = vertices.copy()
     vertices[:, 1] -= 0.0024 * weight
     return vertices

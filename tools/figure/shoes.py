@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from clothes import MIRROR, Garment
+from meshes import tube
 
+from fba.arrays import Float64, Int64
+from fba.easing import smoothstep
 from fba.mesh.meshes import vertex_normals
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 LEATHER = np.array([0.030, 0.026, 0.024])
 SOLE = np.array([0.42, 0.41, 0.39])
@@ -57,7 +56,7 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
     around = np.arctan2(outline[:, 0] - middle[0], outline[:, 1] - middle[1])
     top = middle + half * np.stack([np.sin(around), np.cos(around)], axis=1)
     forward = (outline[:, 1] - outline[:, 1].min()) / np.ptp(outline[:, 1])
-    lift = SPRING * _smooth((forward - 0.70) / 0.30) ** 1.5
+    lift = SPRING * smoothstep((forward - 0.70) / 0.30) ** 1.5
     rings = [_level(outline * 1.0, lift, -0.004), _level(outline, lift, 0.0), _level(outline, lift, THICK)]
     rings[0][:, :2] = outline - 0.004 * _outward(outline)
     rings[0][:, 2] = lift
@@ -67,7 +66,7 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
     rings.append(_level(welt, lift, THICK))
     colours.append(LEATHER)
     reach = np.linalg.norm(top - welt, axis=1)
-    front = _smooth((forward - 0.55) / 0.40)
+    front = smoothstep((forward - 0.55) / 0.40)
     # Handles of a cubic curve: up from the welt, and inwards from the side of the ankle.
     rise = 0.034 + 0.006 * front
     slope = np.minimum(0.55 * reach, 0.085)
@@ -85,7 +84,7 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
     stacked = np.concatenate(rings)
     vertices = origin + stacked[:, :1] * aside + stacked[:, 1:2] * ahead + stacked[:, 2:] * (0.0, 1.0, 0.0)
     shown = np.repeat(np.array(colours), AROUND, axis=0)
-    triangles = _tube(len(rings))
+    triangles = tube(len(rings), AROUND)[:, ::-1]
     # The bottom: a fan about the middle of the lowest ring.
     bottom = len(vertices)
     centre = vertices[:AROUND].mean(axis=0) * (1, 0, 1)
@@ -163,20 +162,6 @@ def _level(outline: Float64, lift: Float64, height: float) -> Float64:
     return np.stack([outline[:, 0], outline[:, 1], lift + height], axis=1)
 
 
-def _tube(rings: int) -> Int64:
-    """Triangles that join successive rings."""
-    k = np.arange(AROUND)
-    after = (k + 1) % AROUND
-    found = []
-    for ring in range(rings - 1):
-        a, b = ring * AROUND, (ring + 1) * AROUND
-        found += [
-            np.stack([a + k, a + after, b + after], axis=1),
-            np.stack([a + k, b + after, b + k], axis=1),
-        ]
-    return np.concatenate(found)
-
-
 def _nearest_weights(places: Float64, foot: Float64, weights: Float64) -> Float64:
     """(N, J) weights averaged over the nearest vertices of the foot."""
     from scipy.spatial import cKDTree
@@ -185,8 +170,3 @@ def _nearest_weights(places: Float64, foot: Float64, weights: Float64) -> Float6
     share = 1 / (away + 0.01) ** 2
     share /= share.sum(axis=1, keepdims=True)
     return np.einsum("nk,nkj->nj", share, weights[rows])
-
-
-def _smooth(value: Float64) -> Float64:
-    t = np.clip(value, 0.0, 1.0)
-    return t * t * (3 - 2 * t)

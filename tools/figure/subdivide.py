@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from figure import Surface
+from meshes import sides
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
+from fba.arrays import Bool, Float64, Int64
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +32,15 @@ class Refined:
     blend: object
 
 
-def refine(surface: Surface, chosen: npt.NDArray[np.bool_], fit: int = 4) -> Refined:
+def refine(surface: Surface, chosen: Bool, fit: int = 4) -> Refined:
     """The surface with the chosen quads (mask (F,)) subdivided once.
 
     fit: rounds of adjusting the cage so that the result passes through the surface's vertices.
     """
-    from scipy.sparse import csr_matrix, eye
+    from scipy.sparse import csr_matrix, eye, vstack
 
     count = len(surface.vertices)
-    scheme = _Scheme(surface)
+    scheme = _make_scheme(surface)
     cage = surface.vertices.copy()
     for _ in range(fit):
         cage += 0.9 * (surface.vertices - scheme.vertex_points(cage))
@@ -54,73 +53,70 @@ def refine(surface: Surface, chosen: npt.NDArray[np.bool_], fit: int = 4) -> Ref
     vertices = np.concatenate([
         scheme.vertex_points(cage), scheme.edge_points(cage)[uses_edge], scheme.face_points(cage)[chosen],
     ])  # fmt: skip
-    pairs = scheme.edges[uses_edge]
-    rows = np.repeat(np.arange(len(pairs)), 2)
-    halves = csr_matrix((np.full(len(rows), 0.5), (rows, pairs.ravel())), (len(pairs), count))
-    faces = surface.quads[chosen]
-    rows = np.repeat(np.arange(len(faces)), 4)
-    quarters = csr_matrix((np.full(len(rows), 0.25), (rows, faces.ravel())), (len(faces), count))
-    from scipy.sparse import vstack
-
-    blend = vstack([eye(count, format="csr"), halves, quarters], format="csr")
+    averages = [eye(count, format="csr")]
+    for corners in (scheme.edges[uses_edge], surface.quads[chosen]):
+        number, size = corners.shape
+        rows = np.repeat(np.arange(number), size)
+        averages.append(csr_matrix((np.full(len(rows), 1 / size), (rows, corners.ravel())), (number, count)))
+    blend = vstack(averages, format="csr")
     triangles, corners, uvs, owner = _cut(surface, scheme, chosen, edge_row, face_row, vertices)
     return Refined(vertices, triangles, corners, uvs, owner, blend)
 
 
+@dataclass(frozen=True, eq=False)
 class _Scheme:
-    """The masks of Catmull and Clark, with creases along open borders."""
+    """The masks of Catmull and Clark, with creases along open borders; made by `_make_scheme`.
 
-    def __init__(self, surface: Surface) -> None:
-        self.quads = surface.quads
-        self.edges = surface.edges
-        count = len(surface.vertices)
-        key = {tuple(edge): row for row, edge in enumerate(self.edges.tolist())}
-        sides = np.stack([self.quads, np.roll(self.quads, -1, axis=1)], axis=-1)
-        self.face_edges = np.array([[key[min(a, b), max(a, b)] for a, b in face] for face in sides.tolist()])
-        self.uses = np.bincount(self.face_edges.ravel(), minlength=len(self.edges))
-        self.open = self.uses == 1
-        self.border = np.zeros(count, dtype=bool)
-        self.border[self.edges[self.open]] = True
-        self.valence = np.bincount(self.quads.ravel(), minlength=count)
+    quads: (F, 4). edges: (E, 2). face_edges: (F, 4), edges of each quad. uses: (E,) quads at each edge.
+    """
+
+    quads: Int64
+    edges: Int64
+    face_edges: Int64
+    uses: Int64
 
     def face_points(self, cage: Float64) -> Float64:
         return cage[self.quads].mean(axis=1)
 
     def edge_points(self, cage: Float64) -> Float64:
-        total = np.zeros((len(self.edges), 3))
-        faces = self.face_points(cage)
-        for side in range(4):
-            np.add.at(total, self.face_edges[:, side], faces)
+        total, _ = _sum_at(self.face_edges, self.face_points(cage), len(self.edges))
         middle = cage[self.edges].mean(axis=1)
         inner = (total / np.maximum(self.uses, 1)[:, None] + middle) / 2
-        return np.where(self.open[:, None], middle, inner)
+        return np.where((self.uses == 1)[:, None], middle, inner)
 
     def vertex_points(self, cage: Float64) -> Float64:
         count = len(cage)
-        n = np.maximum(self.valence, 1)[:, None]
-        faces = np.zeros((count, 3))
-        for side in range(4):
-            np.add.at(faces, self.quads[:, side], self.face_points(cage))
-        middles = np.zeros((count, 3))
-        number = np.zeros((count, 1))
-        middle = cage[self.edges].mean(axis=1)
-        for end in range(2):
-            np.add.at(middles, self.edges[:, end], middle)
-            np.add.at(number, self.edges[:, end], 1)
-        inner = (faces / n + 2 * middles / np.maximum(number, 1) + (n - 3) * cage) / n
-        rim = np.zeros((count, 3))
-        rims = np.zeros((count, 1))
-        for end in range(2):
-            np.add.at(rim, self.edges[self.open, end], middle[self.open])
-            np.add.at(rims, self.edges[self.open, end], 1)
-        edge = rim / np.maximum(rims, 1) / 2 + cage / 2
-        return np.where(self.border[:, None], edge, inner)
+        faces, valence = _sum_at(self.quads, self.face_points(cage), count)
+        middles = cage[self.edges].mean(axis=1)
+        around, edges = _sum_at(self.edges, middles, count)
+        n = np.maximum(valence, 1)
+        inner = (faces / n + 2 * around / np.maximum(edges, 1) + (n - 3) * cage) / n
+        is_open = self.uses == 1
+        rim, rims = _sum_at(self.edges[is_open], middles[is_open], count)
+        return np.where(rims > 0, rim / np.maximum(rims, 1) / 2 + cage / 2, inner)
+
+
+def _sum_at(rows: Int64, values: Float64, count: int) -> tuple[Float64, Float64]:
+    """((count, 3) sums of values (N, 3) over their rows (N, K), (count, 1) how many each sums)."""
+    total, number = np.zeros((count, 3)), np.zeros((count, 1))
+    for k in range(rows.shape[1]):
+        np.add.at(total, rows[:, k], values)
+        np.add.at(number, rows[:, k], 1)
+    return total, number
+
+
+def _make_scheme(surface: Surface) -> _Scheme:
+    key = {tuple(edge): row for row, edge in enumerate(surface.edges.tolist())}
+    pairs = np.sort(sides(surface.quads), axis=1).tolist()
+    face_edges = np.array([key[a, b] for a, b in pairs]).reshape(-1, 4)
+    uses = np.bincount(face_edges.ravel(), minlength=len(surface.edges))
+    return _Scheme(surface.quads, surface.edges, face_edges, uses)
 
 
 def _cut(
     surface: Surface,
     scheme: _Scheme,
-    chosen: npt.NDArray[np.bool_],
+    chosen: Bool,
     edge_row: Int64,
     face_row: Int64,
     vertices: Float64,
@@ -139,35 +135,25 @@ def _cut(
             uvs.append(np.mean([uvs[row] for row in rows], axis=0).tolist())
         return between[key]  # type: ignore[index]
 
-    for face, (quad, uv, sides) in enumerate(
+    for face, (quad, uv, edges) in enumerate(
         zip(surface.quads.tolist(), surface.corners.tolist(), scheme.face_edges.tolist(), strict=True)
     ):
-        middles = [int(edge_row[side]) for side in sides]
+        middles = [int(edge_row[edge]) for edge in edges]
         mid_uvs = [uv_between(uv[k], uv[(k + 1) % 4]) if middles[k] >= 0 else -1 for k in range(4)]
-        polygons: list[tuple[list[int], list[int]]]
+        # polygons of pairs (vertex, uv)
+        own, middle = list(zip(quad, uv, strict=True)), list(zip(middles, mid_uvs, strict=True))
         if chosen[face]:
-            centre, centre_uv = int(face_row[face]), uv_between(*uv)
-            polygons = [
-                (
-                    [quad[k], middles[k], centre, middles[k - 1]],
-                    [uv[k], mid_uvs[k], centre_uv, mid_uvs[k - 1]],
-                )
-                for k in range(4)
-            ]
+            centre = (int(face_row[face]), uv_between(*uv))
+            polygons = [[own[k], middle[k], centre, middle[k - 1]] for k in range(4)]
         else:
-            ring, ring_uv = [], []
-            for k in range(4):
-                ring.append(quad[k])
-                ring_uv.append(uv[k])
-                if middles[k] >= 0:
-                    ring.append(middles[k])
-                    ring_uv.append(mid_uvs[k])
-            polygons = [(ring, ring_uv)]
-        for ring, ring_uv in polygons:
+            pairs = (pair for k in range(4) for pair in (own[k], middle[k]))
+            polygons = [[pair for pair in pairs if pair[0] >= 0]]
+        for polygon in polygons:
+            ring = [vertex for vertex, _ in polygon]
             straight = [not chosen[face] and vertex in middles for vertex in ring]
-            for a, b, c in _triangulate(ring, vertices, straight):
-                triangles.append([ring[a], ring[b], ring[c]])
-                corners.append([ring_uv[a], ring_uv[b], ring_uv[c]])
+            for triangle in _triangulate(ring, vertices, straight):
+                triangles.append([polygon[k][0] for k in triangle])
+                corners.append([polygon[k][1] for k in triangle])
                 owner.append(face)
     return np.array(triangles), np.array(corners), np.array(uvs), np.array(owner)
 
@@ -178,18 +164,15 @@ def _triangulate(ring: list[int], vertices: Float64, straight: list[bool]) -> li
     straight: corners in the middle of a side; cutting these off would leave slivers.
     """
     left = list(range(len(ring)))
-    found = []
+    triangles = []
+
+    def diagonal(k: int) -> float:
+        ends = vertices[ring[left[k - 1]]], vertices[ring[left[(k + 1) % len(left)]]]
+        return round(float(np.linalg.norm(ends[0] - ends[1])), 9)
+
     while len(left) > 3:
-        best = min(
-            [k for k in range(len(left)) if not straight[left[k]]] or range(len(left)),
-            key=lambda k: round(
-                float(
-                    np.linalg.norm(vertices[ring[left[k - 1]]] - vertices[ring[left[(k + 1) % len(left)]]])
-                ),
-                9,
-            ),
-        )
-        found.append((left[best - 1], left[best], left[(best + 1) % len(left)]))
+        candidates = [k for k in range(len(left)) if not straight[left[k]]] or range(len(left))
+        best = min(candidates, key=diagonal)
+        triangles.append((left[best - 1], left[best], left[(best + 1) % len(left)]))
         left.pop(best)
-    found.append((left[0], left[1], left[2]))
-    return found
+    return [*triangles, (left[0], left[1], left[2])]
