@@ -52,6 +52,8 @@ TIMELINE = "player/fba_player/playback/timeline.py"
 LIVE = "player/fba_player/playback/live.py"
 MIXER = "player/fba_player/sound/_mixer.py"
 DEVICE_CLOCK = "player/fba_player/sound/_device_clock.py"
+GROUND = "fba/capture/limbs/ground.py"
+RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
 REPORT = "fba/capture/_report.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
@@ -68,6 +70,7 @@ CAPTURE_TEST = (
 )
 WEIGHTS_TEST = "tests/body/skin/test_skin_weights.py"
 TRANSPORT_TEST = "tests/player/playback/test_transport.py"
+RENDER_TEST = "tests/player/export/test_render_files.py"
 GLTF_TEST = "tests/formats/gltf/test_gltf_skeletons.py"
 OTHER_BODIES_TEST = "tests/capture/test_other_bodies.py"
 LIVE_TEST = "tests/player/playback/test_live.py"
@@ -160,6 +163,17 @@ MUTANTS = (
     Mutant(STANDARD, "np.radians(1.0)", "np.radians(30.0)", OTHER_BODIES_TEST),
     Mutant(MATCHING, "PREFIX_NAMES = 8", "PREFIX_NAMES = 7", CAPTURE_TEST),
     Mutant(MATCHING, "PREFIX_NAMES = 8", "PREFIX_NAMES = 9", CAPTURE_TEST),
+    Mutant(GROUND, "LOWEST = 20", "LOWEST = 15", CAPTURE_TEST),
+    Mutant(GROUND, "FAR = 0.15", "FAR = 0.13", CAPTURE_TEST),
+    Mutant(GROUND, "FAR = 0.15", "FAR = 0.17", CAPTURE_TEST),
+    Mutant(GROUND, "STEEPEST = 0.08", "STEEPEST = 0.06", CAPTURE_TEST),
+    Mutant(GROUND, "STEEPEST = 0.08", "STEEPEST = 0.1", CAPTURE_TEST),
+    Mutant(GROUND, "LONG = 1.0", "LONG = 0.7", CAPTURE_TEST),
+    Mutant(GROUND, "LONG = 1.0", "LONG = 1.2", CAPTURE_TEST),
+    Mutant(GROUND, "SLIGHT = 0.015", "SLIGHT = 0.008", CAPTURE_TEST),
+    Mutant(GROUND, "SLIGHT = 0.015", "SLIGHT = 0.02", CAPTURE_TEST),
+    Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.0", RENDER_TEST),
+    Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.1", RENDER_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),
     Mutant(DECODER, "_DOUBTFUL = 8", "_DOUBTFUL = 0", "tests/codec/test_damage.py"),
 )

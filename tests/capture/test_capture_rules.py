@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fba.body import BapSolver
 from fba.capture import matching, retarget
+from fba.capture.limbs import ground
 from fba.capture.limbs.foot_planting import turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
@@ -89,3 +90,38 @@ def test_a_prefix_is_one_of_the_first_eight_names() -> None:
     assert matching.match([*others, "Bob", *joints])[1]["l_hip"] == 9
     with pytest.raises(ModelError, match="no known skeleton family"):
         matching.match([*others, "camera7", "Bob", *joints])
+
+
+def ground_under(heights: np.ndarray, along: np.ndarray) -> ground.Ground:
+    """The ground found for a foot at these heights and positions along z, the other one 20 cm above."""
+    points = np.stack([np.zeros_like(along), heights, along], axis=-1)
+    feet = np.stack([points, points + np.array([0.0, 0.2, 0.0])])
+    return ground.find(feet[..., 1], feet)
+
+
+def test_the_ground_is_at_the_lowest_fifth_of_the_heights() -> None:
+    """A fifth may be below it, by noise; the rest are steps."""
+    assert ground_under(np.linspace(0, 0.1, 101), np.zeros(101)).height == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("height", "found"), [(0.14, 0.14), (0.16, 0.0), (-0.14, -0.14), (-0.16, 0.0)])
+def test_ground_far_from_zero_is_none(height: float, found: float) -> None:
+    """A chair, or a leap that the capture begins in."""
+    assert ground_under(np.full(50, height), np.zeros(50)).height == pytest.approx(found)
+
+
+@pytest.mark.parametrize(
+    ("metres", "rise", "slopes"),
+    [
+        (4.0, 0.07, True),
+        (4.0, 0.09, False),  # steeper than 8 %: stairs
+        (1.1, 0.05, True),
+        (0.9, 0.05, False),  # shorter than 1 m: not enough to tell
+        (4.0, 0.005, True),  # 1.8 cm between most of the feet
+        (4.0, 0.003, False),  # 1.1 cm: level but for errors
+    ],
+)
+def test_ground_slopes_where_feet_walk_far_and_rise_little(metres: float, rise: float, slopes: bool) -> None:
+    along = np.linspace(-metres / 2, metres / 2, 400)
+    found = ground_under(rise * along, along).slope
+    assert found[1] == (pytest.approx(rise, rel=0.3) if slopes else 0.0)

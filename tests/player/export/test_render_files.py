@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from fba.animation import Animation
 from fba.errors import DisplayError, FbaError, FormatError, RangeError, UnsupportedError
 from fba.player import Offscreen, Scene, render
 from fba_player.export._gif import gif_rate
-from fba_player.export.render import film_rate
+from fba_player.export.render import check_inside, film_rate
 from player_tracks import face_track
 
 av = pytest.importorskip("av")
@@ -146,3 +148,12 @@ def test_pyav_missing_is_named(talking: Animation, tmp_path: Path, monkeypatch: 
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(DisplayError, match="pip install av"):
         render(talking, tmp_path / "a.mp4")
+
+
+@pytest.mark.parametrize(
+    ("time", "inside"), [(2.0009, True), (2.0011, False), (0.9991, True), (0.9989, False)]
+)
+def test_a_time_may_be_rounded_to_milliseconds(time: float, inside: bool) -> None:
+    scene = SimpleNamespace(timeline=SimpleNamespace(start=1.0, end=2.0))
+    with nullcontext() if inside else pytest.raises(RangeError, match="goes from 1 s to 2 s"):
+        check_inside(scene, "time", time)  # type: ignore[arg-type]
