@@ -9,7 +9,7 @@ from fba.arrays import Bool, Float32, Float64
 from fba.body._neck_blending import blend_with_neck
 from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights
-from fba.body.skin.skinning import Skinner
+from fba.body.skin.skinning import build_skinner
 from fba.errors import ModelError
 from fba.mesh.meshes import checked_rows
 
@@ -22,14 +22,14 @@ SAME_SIZE = 0.005
 class HeadOnBody:
     """Moves a face with a body's joints.
 
-    body: a model with a place for pupils. vertices: (V, 3), the neutral face, in its own frame and unit.
+    body: a model with positions of pupils. vertices: (V, 3), the neutral face, in its own frame and unit.
     eyes: (2, 3), its pupils, feature points 3.5 and 3.6. skull: (V,), vertices that always move with the
     skull alone (eyes, teeth, tongue), none by default.
 
     The face is set between the pupils of the body, sized by their distance. Its vertices near the body's
     neck (its part of kind "neck", as modelled) take that neck's weights, others move with the skull.
 
-    Raises ModelError for a body without pupils or a face whose eyes are no two places.
+    Raises ModelError for a body without pupils or a face whose eyes coincide.
     """
 
     def __init__(
@@ -39,47 +39,47 @@ class HeadOnBody:
         eyes: npt.ArrayLike,
         skull: Bool | None = None,
     ) -> None:
-        places = checked_rows(vertices, (-1, 3), "a face on a body: vertices")
+        points = checked_rows(vertices, (-1, 3), "a face on a body: vertices")
         self._skull = skull_of(body)
         self.place = placement(body, eyes)
         """float64 (4, 4): the face's frame into the body's, as modelled."""
         self.size = float(self.place[0, 0])
         """Scale of the face on the body."""
-        placed = places.astype(np.float64) * self.size + self.place[:3, 3]
+        placed = points.astype(np.float64) * self.size + self.place[:3, 3]
         neck = [part for part in body.parts if part.kind == "neck" and len(part.vertices)]
-        joints = np.zeros((len(places), INFLUENCES), dtype=np.int32)
-        weights = np.zeros((len(places), INFLUENCES), dtype=np.float32)
+        joints = np.zeros((len(points), INFLUENCES), dtype=np.int32)
+        weights = np.zeros((len(points), INFLUENCES), dtype=np.float32)
         joints[:, 0], weights[:, 0] = self._skull, 1.0
-        self.hidden: Bool = np.zeros(len(places), dtype=bool)
+        self.hidden: Bool = np.zeros(len(points), dtype=bool)
         """(V,) mask of vertices beyond the lower edge of the body's neck, which its clothes hide."""
         self.brings_neck = not neck
         """Whether the face has a neck that meets the body; the body's own must then not be shown."""
         if neck:
-            free = np.ones(len(places), dtype=bool) if skull is None else ~np.asarray(skull)
-            found = blend_with_neck(neck, len(body.skeleton), self._skull, placed, free)
-            self.place[:3, 3] += found.offset
-            placed += found.offset
-            joints[free], weights[free] = found.joints, found.weights
-            self.hidden, self.brings_neck = found.hidden, found.brings_neck
+            free = np.ones(len(points), dtype=bool) if skull is None else ~np.asarray(skull)
+            blend = blend_with_neck(neck, len(body.skeleton), self._skull, placed, free)
+            self.place[:3, 3] += blend.offset
+            placed += blend.offset
+            joints[free], weights[free] = blend.joints, blend.weights
+            self.hidden, self.brings_neck = blend.hidden, blend.brings_neck
         self.shift = self.place[:3, 3].astype(np.float32)
         """float32 (3,) position of the face's origin on the body, metres."""
         self._from_place = np.linalg.inv(self.place)
-        self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(places))
-        self._below = _descendants(body, self._skull)
+        self.joints, self.weights = checked_weights("a face on a body", joints, weights, len(points))
+        self._below = body.skeleton.descendants(self._skull)
         self._bind = body.bind
         self._inverse = np.linalg.inv(body.bind)
-        self.skinner = Skinner(
+        self.skinner = build_skinner(
             placed.astype(np.float32),
-            np.tile(np.array([0, 0, 1], dtype=np.float32), (len(places), 1)),
+            np.tile(np.array([0, 0, 1], dtype=np.float32), (len(points), 1)),
             self.joints,
             self.weights,
             body.bind,
             body.skeleton,
         )
-        self._placed = np.empty((len(places), 3), dtype=np.float32)
+        self._placed = np.empty((len(points), 3), dtype=np.float32)
 
     def matrices(self, matrices: npt.ArrayLike, turn: npt.ArrayLike) -> Float64:
-        """Joint matrices (J, 4, 4) of the body with the head turned on its skull base.
+        """Return joint matrices (J, 4, 4) of the body with the head turned on its skull base.
 
         turn: (4, 4), as `fba.face.Deformer.head_matrices` returns it, in the face's frame. FAPs turn the head
         relative to the pose that BAPs give the skull base.
@@ -94,7 +94,7 @@ class HeadOnBody:
         return turned
 
     def frame(self, matrices: npt.ArrayLike) -> Float64:
-        """(4, 4) matrix from the face's frame to the world, for what moves with the skull alone."""
+        """Return the matrix (4, 4) from the face's frame to the world, for parts that move with the skull."""
         skull = np.asarray(matrices, dtype=np.float64)[self._skull]
         frame: Float64 = skull @ self._inverse[self._skull] @ self.place
         return frame
@@ -109,7 +109,7 @@ class HeadOnBody:
         normals: Float32 | None = None,
         method: str = "dual",
     ) -> Float32:
-        """The face on the body: float32 (V, 3), metres.
+        """Return the face on the body: float32 (V, 3), metres.
 
         local: float32 (V, 3), the face moved by its FAPs in its own frame without the head's turn
         (`Deformer.local`). matrices: (J, 4, 4), with the head's turn (`matrices`). out: written to and
@@ -125,14 +125,14 @@ class HeadOnBody:
 
 
 def skull_of(body: BodyModel) -> int:
-    """Number of the joint that carries the head: the skull base, or the highest joint where there is none."""
+    """Return the number of the joint that carries the head: the skull base, else the highest joint."""
     if SKULL in body.skeleton:
         return body.skeleton.number(SKULL)
     return int(body.bind[:, 1, 3].argmax())
 
 
 def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
-    """float64 (4, 4): from a face's frame to the body's as modelled. eyes: (2, 3), the face's pupils."""
+    """Return float64 (4, 4), from a face's frame to the body's as modelled. eyes: (2, 3), its pupils."""
     if body.eyes is None:
         raise ModelError(f"the body {body.name!r} has no pupils, so there is no place for a face on it")
     given = np.array(eyes, dtype=np.float64)
@@ -147,11 +147,3 @@ def placement(body: BodyModel, eyes: npt.ArrayLike) -> Float64:
     place = np.diag([size, size, size, 1.0])
     place[:3, 3] = body.eyes.mean(axis=0) - size * given.mean(axis=0)
     return place
-
-
-def _descendants(body: BodyModel, joint: int) -> list[int]:
-    below = [joint]
-    for number, parent in enumerate(body.skeleton.parents.tolist()):
-        if parent in below:
-            below.append(number)
-    return below

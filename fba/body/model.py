@@ -172,16 +172,10 @@ class BodyModel(Meshes[BodyPart]):
     @cached_property
     def skinner(self) -> Skinner:
         """The `Skinner` that `skin` uses; made on first use."""
-        from fba.body.skin.skinning import Skinner
+        from fba.body.skin.skinning import build_skinner
 
-        return Skinner(
-            self.vertices,
-            self.normals,
-            self.joints,
-            self.weights,
-            self.bind,
-            self.skeleton,
-            self.triangles,
+        return build_skinner(
+            self.vertices, self.normals, self.joints, self.weights, self.bind, self.skeleton, self.triangles
         )
 
     @cached_property

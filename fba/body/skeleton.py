@@ -65,8 +65,8 @@ class Skeleton:
                     "there is one root, and every other joint comes after its parent"
                 )
         if not np.isfinite(centres).all():
-            at = int(np.argmin(np.isfinite(centres).all(axis=1)))
-            raise ModelError(f"Skeleton: the centre of {names[at]!r} is not finite: {centres[at].tolist()}")
+            bad = int(np.argmin(np.isfinite(centres).all(axis=1)))
+            raise ModelError(f"Skeleton: the centre of {names[bad]!r} is not finite: {centres[bad].tolist()}")
         parents.flags.writeable = False
         centres.flags.writeable = False
         for name, value in (
@@ -79,16 +79,17 @@ class Skeleton:
 
     @staticmethod
     def default() -> Skeleton:
-        """The default body: 87 joints of H-Anim, 1.64 m at the skull base. One shared instance."""
+        """Return the default body: 87 joints of H-Anim, 1.64 m at the skull base. One shared instance."""
         return _default()
 
     @classmethod
     def from_parents(
         cls, parents: Mapping[str, str | None], centres: Mapping[str, Sequence[float]]
     ) -> Skeleton:
-        """A skeleton from each joint's parent (None for the root) and centre (metres), by name, in any order.
+        """Return a skeleton from each joint's parent and centre, by name, in any order.
 
-        Raises ModelError where a parent is unknown, or joints form a cycle.
+        parents: None for the root. centres: metres. Raises ModelError for an unknown parent or a cycle of
+        joints.
         """
         order: list[str] = []
         children: dict[str | None, list[str]] = {}
@@ -118,8 +119,16 @@ class Skeleton:
         return name in self._numbers
 
     def number(self, name: str) -> int:
-        """Number of a joint by name; KeyError where there is none."""
+        """Return the number of a joint; KeyError for an unknown name."""
         return self._numbers[name]
+
+    def descendants(self, joint: int) -> list[int]:
+        """Return the numbers of a joint and all joints below it, parents first."""
+        below = [joint]
+        for number, parent in enumerate(self.parents.tolist()):
+            if parent in below:
+                below.append(number)
+        return below
 
     @property
     def offsets(self) -> Float64:

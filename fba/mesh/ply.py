@@ -44,22 +44,68 @@ def read_ply(path: str | os.PathLike[str]) -> Polygons:
     `MAX_VERTICES` vertices.
     """
     name = os.fspath(path)
-    return _Reader(name, read_bytes(name, MAX_BYTES)).read()
+    data = read_bytes(name, MAX_BYTES)
+    order, elements, start = _read_header(name, data)
+    if not order and len(data) > MAX_ASCII:
+        raise ModelError(f"{name}: is {len(data)} bytes of ASCII, more than {MAX_ASCII}; save it as binary")
+    words = [] if order else data[start:].split()
+    return _Reader(name, data, order, elements, words, start).read()
 
 
+def _read_header(path: str, data: bytes) -> tuple[str, list[_Element], int]:
+    """Return the order of bytes ("" for ASCII), the elements, and where the data begins."""
+    end = data.find(b"end_header", 0, MAX_HEADER)
+    if not data.startswith(b"ply") or end < 0:
+        raise ModelError(f"{path}: a PLY file begins with 'ply' and a header up to 'end_header'")
+    start = data.find(b"\n", end, end + 16) + 1
+    if not start:
+        raise ModelError(f"{path}: nothing follows its header")
+    order: str | None = None
+    elements: list[_Element] = []
+    for line, text in enumerate(data[:end].decode("latin-1").splitlines(), start=1):
+        where, tokens = f"{path}:{line}", text.split()
+        if not tokens or tokens[0] in ("ply", "comment", "obj_info"):
+            continue
+        if tokens[0] == "format" and len(tokens) > 1 and tokens[1] in ORDERS:
+            order = ORDERS[tokens[1]]
+        elif tokens[0] == "element" and len(tokens) == 3:
+            count = parse_integer(tokens[2], where, f"the number of {tokens[1][:20]}")
+            most = {"vertex": MAX_VERTICES, "face": MAX_FACES}.get(tokens[1], MAX_FACES)
+            if not 0 <= count <= most:
+                raise ModelError(f"{where}: {count} of element {tokens[1][:20]}; at most {most} are read")
+            elements.append(_Element(tokens[1], count))
+        elif tokens[0] == "property" and elements:
+            elements[-1].properties.append(_read_property(tokens, where))
+            if len(elements[-1].properties) > MAX_PROPERTIES:
+                raise ModelError(f"{where}: more than {MAX_PROPERTIES} properties")
+        else:
+            raise ModelError(f"{where}: {text.strip()[:60]!r} is no line of a PLY header")
+    if order is None:
+        raise ModelError(f"{path}: the header has no line 'format', ascii or binary")
+    return order, elements, start
+
+
+def _read_property(tokens: list[str], where: str) -> tuple[str, str, str]:
+    if len(tokens) == 3 and tokens[1] in TYPES:
+        return tokens[2], TYPES[tokens[1]], ""
+    if len(tokens) == 5 and tokens[1] == "list" and tokens[2] in TYPES and tokens[3] in TYPES:
+        if TYPES[tokens[2]].startswith("f"):
+            raise ModelError(f"{where}: the length of a list cannot be a fraction")
+        return tokens[4], TYPES[tokens[3]], TYPES[tokens[2]]
+    raise ModelError(f"{where}: {' '.join(tokens)[:60]!r} is no property that is known")
+
+
+@dataclass
 class _Reader:
-    def __init__(self, path: str, data: bytes) -> None:
-        self.path = path
-        self.data = data
-        self.at = 0
-        self.order, self.elements = self._header()
-        if not self.order:
-            if len(data) > MAX_ASCII:
-                raise ModelError(
-                    f"{path}: is {len(data)} bytes of ASCII, more than {MAX_ASCII}; save it as binary"
-                )
-            self.words = data[self.at :].split()
-            self.word = 0
+    """Reads the elements of a file. order: of bytes, "" for ASCII, whose words are read instead."""
+
+    path: str
+    data: bytes
+    order: str
+    elements: list[_Element]
+    words: list[bytes]
+    at: int
+    word: int = 0
 
     def read(self) -> Polygons:
         columns: dict[str, Float64] = {}
@@ -101,47 +147,6 @@ class _Reader:
             texcoords,
             self._colours(columns),
         )
-
-    def _header(self) -> tuple[str, list[_Element]]:
-        end = self.data.find(b"end_header", 0, MAX_HEADER)
-        if not self.data.startswith(b"ply") or end < 0:
-            raise ModelError(f"{self.path}: a PLY file begins with 'ply' and a header up to 'end_header'")
-        self.at = self.data.find(b"\n", end, end + 16) + 1
-        if not self.at:
-            raise ModelError(f"{self.path}: nothing follows its header")
-        order: str | None = None
-        elements: list[_Element] = []
-        for line, text in enumerate(self.data[:end].decode("latin-1").splitlines(), start=1):
-            where, tokens = f"{self.path}:{line}", text.split()
-            if not tokens or tokens[0] in ("ply", "comment", "obj_info"):
-                continue
-            if tokens[0] == "format" and len(tokens) > 1 and tokens[1] in ORDERS:
-                order = ORDERS[tokens[1]]
-            elif tokens[0] == "element" and len(tokens) == 3:
-                count = parse_integer(tokens[2], where, f"the number of {tokens[1][:20]}")
-                most = {"vertex": MAX_VERTICES, "face": MAX_FACES}.get(tokens[1], MAX_FACES)
-                if not 0 <= count <= most:
-                    raise ModelError(f"{where}: {count} of element {tokens[1][:20]}; at most {most} are read")
-                elements.append(_Element(tokens[1], count))
-            elif tokens[0] == "property" and elements:
-                elements[-1].properties.append(self._property(tokens, where))
-                if len(elements[-1].properties) > MAX_PROPERTIES:
-                    raise ModelError(f"{where}: more than {MAX_PROPERTIES} properties")
-            else:
-                raise ModelError(f"{where}: {text.strip()[:60]!r} is no line of a PLY header")
-        if order is None:
-            raise ModelError(f"{self.path}: the header has no line 'format', ascii or binary")
-        return order, elements
-
-    @staticmethod
-    def _property(tokens: list[str], where: str) -> tuple[str, str, str]:
-        if len(tokens) == 3 and tokens[1] in TYPES:
-            return tokens[2], TYPES[tokens[1]], ""
-        if len(tokens) == 5 and tokens[1] == "list" and tokens[2] in TYPES and tokens[3] in TYPES:
-            if TYPES[tokens[2]].startswith("f"):
-                raise ModelError(f"{where}: the length of a list cannot be a fraction")
-            return tokens[4], TYPES[tokens[3]], TYPES[tokens[2]]
-        raise ModelError(f"{where}: {' '.join(tokens)[:60]!r} is no property that is known")
 
     def _element(self, element: _Element) -> tuple[dict[str, Float64], dict[str, tuple[Int64, Int64]]]:
         if not element.properties and element.count:

@@ -5,6 +5,7 @@ Phases are fractions of the cycle, from the contact of the right foot on. The bo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -41,43 +42,51 @@ _TINY = 1e-4
 """A step of phase, for slopes."""
 
 
+@dataclass(frozen=True, eq=False)
 class Plan:
-    """The plan of one cycle. stride: metres; raises ModelError where it is too long for the legs."""
+    """The plan of one cycle; `make_plan` makes it. stride: metres."""
 
-    def __init__(
-        self,
-        anatomy: Anatomy,
-        character: Character,
-        stride: float,
-        interpolation: Interpolation = "smooth",
-    ) -> None:
-        self.anatomy, self.character, self.stride = anatomy, character, stride
-        self.interpolation: Interpolation = interpolation
-        self.size = stride / (character.stride * anatomy.scale)
+    anatomy: Anatomy
+    character: Character
+    stride: float
+    interpolation: Interpolation
+
+    @cached_property
+    def size(self) -> float:
         """The stride relative to the character's own."""
+        return self.stride / (self.character.stride * self.anatomy.scale)
+
+    @cached_property
+    def _foot(self) -> Float64:
+        """(8,) pitch of the foot in the poses, radians."""
         share = np.clip(self.size, 0.0, 1.3)
-        foot = np.array(character.curve("foot"))
+        foot = np.array(self.character.curve("foot"))
         foot[0] *= share
         foot[4:6] *= 0.3 + 0.7 * share
         foot[6:] *= 0.6 + 0.4 * share
-        self._foot = np.radians(foot)
-        # between its contact and lying flat, a foot falls freely; the other poses lead to the contact
-        self._foot_knots = np.array([0.0, FLAT, *KNOTS[1:]])
-        self._foot_values = np.array([self._foot[0], min(self._foot[0], self._foot[1]), *self._foot[1:]])
-        knee = np.array(character.curve("knee"))
-        knee[5:7] *= 0.55 + 0.45 * share
-        self._knee = np.radians(knee)
-        self._yaw = np.radians(character.toes_out)
-        self._ahead = self._front_foot_ahead()
-        if self._largest_hold_down() > _STRAIN * anatomy.sides["r"].leg.reach:
-            raise self._too_long()
+        result: Float64 = np.radians(foot)
+        return result
+
+    @cached_property
+    def _knee(self) -> Float64:
+        """(8,) bend of the knee in the poses, radians."""
+        knee = np.array(self.character.curve("knee"))
+        knee[5:7] *= 0.55 + 0.45 * np.clip(self.size, 0.0, 1.3)
+        result: Float64 = np.radians(knee)
+        return result
+
+    @property
+    def _yaw(self) -> float:
+        return float(np.radians(self.character.toes_out))
 
     def pitch(self, phase: Float64) -> Float64:
         """(T,) pitch of a foot at phases of its own leg, radians."""
         phase = np.mod(phase, 1.0)
-        flat = self._foot_values[1]
+        # between its contact and lying flat, a foot falls freely; the other poses lead to the contact
+        flat = min(self._foot[0], self._foot[1])
         landing = flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / FLAT, 0.0) ** 1.5
-        later = periodic_curve(self._foot_knots, self._foot_values, phase, self.interpolation)
+        knots, values = np.array([0.0, FLAT, *KNOTS[1:]]), np.array([self._foot[0], flat, *self._foot[1:]])
+        later = periodic_curve(knots, values, phase, self.interpolation)
         return np.where(phase < FLAT, landing, later)
 
     def knee(self, phase: Float64) -> Float64:
@@ -144,10 +153,12 @@ class Plan:
         bend = self.knee(own) if bend is None else bend
         return ground.hip_height(side, hip, ankle, bend) - (hip[..., 1] - root[..., 1])
 
-    def _front_foot_ahead(self) -> float:
+    @cached_property
+    def _ahead(self) -> float:
         """Metres that the front foot is ahead of the root in the extended pose.
 
-        Both feet are on the ground, so both legs must give the root the same height.
+        Both feet are on the ground, so both legs must give the root the same height. ModelError if
+        the stride is too long.
         """
         right, left = self.anatomy.sides["r"], self.anatomy.sides["l"]
         at = np.zeros(1)
@@ -161,17 +172,18 @@ class Plan:
 
         low, high = -0.25 * legs, 0.5 * self.stride + 0.25 * legs
         if not gap(low) > 0.0 > gap(high):
-            raise self._too_long()
+            raise self.too_long()
         for _ in range(60):
             middle = (low + high) / 2.0
             low, high = (middle, high) if gap(middle) > 0.0 else (low, middle)
         root = self._root_along(at) - (0.0, 0.0, low)
         root[..., 1] = self._root_height(right, root, at)
         if float(root[0, 1]) < 0.45 * self.anatomy.skeleton.centres[0][1]:
-            raise self._too_long()
+            raise self.too_long()
         return low
 
-    def _too_long(self) -> ModelError:
+    def too_long(self) -> ModelError:
+        """Return the error of a stride that is too long for the legs."""
         return ModelError(
             f"gait: a stride of {self.stride:g} m is too long for {self.character.name!r} on legs of "
             f"{self.anatomy.sides['r'].leg.reach:.2f} m; a stride is two steps, from the contact of a foot "
@@ -200,7 +212,7 @@ class Plan:
         rear = np.where(right_leads, heights["l"], heights["r"])
         return root, share * front + (1.0 - share) * rear, np.minimum(*limits)
 
-    def _largest_hold_down(self) -> float:
+    def largest_hold_down(self) -> float:
         """Largest lowering of the body, metres, by legs that are too short for the stride."""
         _, wanted, limit = self._heights(np.arange(2 * CYCLE) / (2 * CYCLE))
         return float((wanted - limit).max())
@@ -248,9 +260,8 @@ class Plan:
         return knots, np.stack(values), off, 0.5 * (natural + on)
 
     def _usual_landing(self, side: Side) -> float:
-        plan = Plan(
-            self.anatomy, self.character, self.character.stride * self.anatomy.scale, self.interpolation
-        )
+        usual = self.character.stride * self.anatomy.scale
+        plan = make_plan(self.anatomy, self.character, usual, self.interpolation)
         start = np.array([0.0 if side.letter == "r" else 0.5])
         return float(-np.degrees(limb_angles(plan.standing_leg(side, start).thigh)[0][0]))
 
@@ -280,4 +291,12 @@ class Plan:
         return ground.solve_leg(side, hip, footing, yaw, side.way * self._level_roll)
 
 
-__all__ = ["CYCLE", "KNOTS", "SHORTEST", "Plan"]
+def make_plan(anatomy: Anatomy, character: Character, stride: float, interpolation: Interpolation) -> Plan:
+    """Return the plan of one cycle. stride: metres; ModelError if it is too long for the legs."""
+    plan = Plan(anatomy, character, stride, interpolation)
+    if plan.largest_hold_down() > _STRAIN * anatomy.sides["r"].leg.reach:
+        raise plan.too_long()
+    return plan
+
+
+__all__ = ["CYCLE", "KNOTS", "SHORTEST", "Plan", "make_plan"]

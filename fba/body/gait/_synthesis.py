@@ -12,7 +12,7 @@ from fba.body.gait import _ground as ground
 from fba.body.gait._anatomy import Anatomy, Writer
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import Interpolation, check_interpolation
-from fba.body.gait._plan import SHORTEST, Plan
+from fba.body.gait._plan import SHORTEST, Plan, make_plan
 from fba.body.gait._posture import swing_arms, write_posture
 from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
@@ -63,7 +63,7 @@ def walk(
             f"{character.seconds:g} s; needs at least {FEWEST}, and a plausible rate"
         )
     count = _frame_count(cycles, seconds, rate, period)
-    one = write_cycle(Plan(anatomy, character, stride, check_interpolation(interpolation)), period)
+    one = write_cycle(make_plan(anatomy, character, stride, check_interpolation(interpolation)), period)
     frames = np.arange(count)
     values = one.values[frames % period]
     forward = one.forward_column

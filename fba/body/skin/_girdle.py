@@ -31,7 +31,7 @@ LEAST = 0.02
 def find_girdle(
     skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32
 ) -> Girdle:
-    """Tables of both shoulder girdles for the compiled loop; empty if the skeleton has none.
+    """Return tables of both shoulder girdles for the compiled loop; empty if the skeleton has none.
 
     Its first fields have a row for each side. joints: the joint that carries the girdle, those of collar
     bone and blade, and the shoulder. centre: where the collar bone turns. arm: unit vector along the upper
@@ -52,7 +52,7 @@ def find_girdle(
         chains.append((trunk, inner, outer, shoulder))
         centres.append(bind[inner, :3, 3])
         arms.append(way / length)
-        carried = (weights * np.isin(joints, _descendants(skeleton, shoulder))).sum(axis=1)
+        carried = (weights * np.isin(joints, skeleton.descendants(shoulder))).sum(axis=1)
         low = bind[shoulder, 1, 3] - vertices[:, 1].astype(np.float64)
         between = (carried > LEAST) & (carried < 1 - LEAST)
         taut = np.maximum(taut, TAUT * between * smoothstep((low - BELOW[0]) / (BELOW[1] - BELOW[0])))
@@ -64,12 +64,3 @@ def find_girdle(
         rows.astype(np.int64),
         taut[rows].astype(np.float32),
     )
-
-
-def _descendants(skeleton: Skeleton, joint: int) -> list[int]:
-    """A joint and all its descendants."""
-    found = [joint]
-    for number, parent in enumerate(skeleton.parents.tolist()):
-        if parent in found:
-            found.append(number)
-    return found

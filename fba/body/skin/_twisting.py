@@ -26,7 +26,7 @@ SMALL = 1e-3
 def find_twists(
     skeleton: Skeleton, bind: Float64, vertices: Float32, joints: Int32, weights: Float32
 ) -> Twisting:
-    """Tables of the arms' twists for the compiled loop; empty if the skeleton has no arms.
+    """Return tables of the arms' twists for the compiled loop; empty if the skeleton has no arms.
 
     Of its fields, each bone has rows `starts[b]` to `starts[b + 1]`: the vertices (`rows`) along it, and by
     how much of the twists of its joint and of the next one they are turned beforehand (`shares`, two
@@ -74,18 +74,14 @@ def _axis(bind: Float64, joint: int, child: int) -> Float64:
 
 
 def _carried_share(skeleton: Skeleton, joint: int, joints: Int32, weights: Float32) -> Float64:
-    """(V,) total weight of a joint and its descendants for each vertex."""
-    below = np.zeros(len(skeleton), dtype=bool)
-    below[joint] = True
-    for number, parent in enumerate(skeleton.parents.tolist()):
-        if parent >= 0 and below[parent]:
-            below[number] = True
-    total: Float64 = (weights * below[joints]).sum(axis=1, dtype=np.float64)
+    """Return (V,), the total weight of a joint and its descendants for each vertex."""
+    below = np.isin(joints, skeleton.descendants(joint))
+    total: Float64 = (weights * below).sum(axis=1, dtype=np.float64)
     return total
 
 
 def _along(bind: Float64, pair: tuple[int, int], vertices: Float32) -> Float64:
-    """(V,) positions of vertices along a bone: 0 at its joint, 1 at the next."""
+    """Return (V,), positions of vertices along a bone: 0 at its joint, 1 at the next."""
     start, end = bind[pair[0], :3, 3], bind[pair[1], :3, 3]
     way = end - start
     place: Float64 = (vertices - start) @ way / max(float(way @ way), 1e-12)

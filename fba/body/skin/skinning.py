@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float32, Float64, Int32
+from fba.arrays import Float32, Float64, Int32, Int64
 from fba.body.skeleton import Skeleton
+from fba.body.skin import loops
 from fba.body.skin._girdle import find_girdle
+from fba.body.skin._girdle_loops import Girdle
 from fba.body.skin._moving_normals import normal_rings
 from fba.body.skin._twisting import find_twists
+from fba.body.skin.loops import Twisting
 from fba.mesh.meshes import result_array
 
 METHODS = ("dual", "linear")
@@ -20,49 +24,34 @@ BLOCK = 64
 """Frames per call of the compiled loop: an interrupt can only get through between calls."""
 
 
+@dataclass(eq=False)
 class Skinner:
-    """Moves vertices with joints.
+    """Moves vertices with joints; `build_skinner` makes it.
 
-    vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows
-    sum to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32
-    (F, 3), by which normals follow the surface (`fba.body.skin._moving_normals`); without them
-    normals only rotate with their vertices.
+    vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), largest
+    first, rows sum to 1. counts: int32 (V,), of weights above 0. inverse: float64 (J, 4, 4), of the joints as
+    modelled. parents: int64 (J,). neighbours: int32 (V, 4), coefficients: float32 (V, 3), see
+    `fba.body.skin._moving_normals`.
 
-    Arrays are taken as `BodyModel` checks them. Calls allocate nothing but their result. May be used by
-    several threads, one after the other.
+    Calls allocate nothing but their result. May be used by several threads, one after the other.
     """
 
-    def __init__(
-        self,
-        vertices: Float32,
-        normals: Float32,
-        joints: Int32,
-        weights: Float32,
-        bind: Float64,
-        skeleton: Skeleton,
-        triangles: Int32 | None = None,
-    ) -> None:
-        # numba is imported here, with the first body that moves
-        from fba.body.skin import loops
+    vertices: Float32
+    normals: Float32
+    joints: Int32
+    weights: Float32
+    counts: Int32
+    inverse: Float64
+    parents: Int64
+    twists: Twisting
+    girdle: Girdle
+    neighbours: Int32
+    coefficients: Float32
 
-        self._loops = loops
-        order = np.argsort(-weights, axis=1, kind="stable")
-        self._joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
-        self._weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
-        self._counts = (self._weights > 0).sum(axis=1).astype(np.int32)
-        # copies: read-only arrays would make numba compile another version
-        self._modelled = np.array(vertices, dtype=np.float32, order="C")
-        self._upright_modelled = np.array(normals, dtype=np.float32, order="C")
-        self._vertices, self._upright = self._modelled.copy(), self._upright_modelled.copy()
-        self._inverse: Float64 = np.linalg.inv(bind).astype(np.float64)
-        self._parents = np.ascontiguousarray(skeleton.parents, dtype=np.int64)
-        self._twists = find_twists(skeleton, bind, self._modelled, self._joints, self._weights)
-        self._girdle = find_girdle(skeleton, bind, self._modelled, self._joints, self._weights)
-        self._twisted = self._vertices.copy()
-        self._twisted_is_modelled = True
-        faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
-        self._around, self._numbers = normal_rings(self._modelled, self._upright_modelled, faces)
-        self._scratch = np.empty((len(bind), 12), dtype=np.float32)
+    def __post_init__(self) -> None:
+        self._vertices, self._normals = self.vertices.copy(), self.normals.copy()
+        self._twisted, self._twisted_is_modelled = self.vertices.copy(), True
+        self._scratch = np.empty((len(self.inverse), 12), dtype=np.float32)
         self._lock = threading.Lock()
 
     def skin(
@@ -72,8 +61,8 @@ class Skinner:
         normals: Float32 | None = None,
         method: str = "dual",
     ) -> Float32:
-        """Vertices for joint matrices: see `BodyModel.skin`."""
-        return self._run(self._modelled, self._upright_modelled, matrices, out, normals, method)
+        """Return vertices for joint matrices: see `BodyModel.skin`."""
+        return self._run(self.vertices, self.normals, matrices, out, normals, method)
 
     def carry(
         self,
@@ -84,13 +73,13 @@ class Skinner:
         normals: Float32 | None = None,
         method: str = "dual",
     ) -> Float32:
-        """The result of `skin` for other rest positions (V, 3) and, optionally, their normals (V, 3)."""
+        """Return the result of `skin` for other rest positions (V, 3) and, if given, their normals (V, 3)."""
         if normals is not None and upright is None:
             raise ValueError("normals are wanted, but not given as modelled")
         for array in (vertices, upright):
-            if array is not None and array.shape != self._modelled.shape:
+            if array is not None and array.shape != self.vertices.shape:
                 raise ValueError(
-                    f"vertices and normals must have shape {self._modelled.shape}, not {array.shape}"
+                    f"vertices and normals must have shape {self.vertices.shape}, not {array.shape}"
                 )
         return self._run(vertices, upright, matrices, out, normals, method)
 
@@ -112,40 +101,42 @@ class Skinner:
         turned = placed[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
             vertices = _as_writable(vertices, self._vertices)
-            upright = self._upright if upright is None else _as_writable(upright, self._upright)
-            mesh = (vertices, upright, self._joints, self._weights, self._counts, self._around, self._numbers)
+            upright = self._normals if upright is None else _as_writable(upright, self._normals)
+            mesh = (
+                vertices, upright, self.joints, self.weights, self.counts, self.neighbours,
+                self.coefficients,
+            )  # fmt: skip
             twisted = vertices
-            if method == "dual" and len(self._twists.rows):
+            if method == "dual" and len(self.twists.rows):
                 twisted = self._twisted
-                if not (
-                    self._twisted_is_modelled and vertices is self._modelled
-                ):  # else every twisted vertex is overwritten
+                # where nothing else was written, every twisted vertex is overwritten below
+                if not (self._twisted_is_modelled and vertices is self.vertices):
                     np.copyto(twisted, vertices)
-                self._twisted_is_modelled = vertices is self._modelled
+                self._twisted_is_modelled = vertices is self.vertices
             for start in range(0, len(frames), BLOCK):
                 part = slice(start, start + BLOCK)
                 if method == "dual":
-                    self._loops.dual_frames(
+                    loops.dual_frames(
                         frames[part],
-                        self._inverse,
-                        self._parents,
+                        self.inverse,
+                        self.parents,
                         *mesh,
                         self._scratch,
-                        self._twists,
-                        self._girdle,
+                        self.twists,
+                        self.girdle,
                         twisted,
                         placed[part],
                         turned[part],
                     )
                 else:
-                    self._loops.linear_frames(
-                        frames[part], self._inverse, *mesh, self._scratch, placed[part], turned[part]
+                    loops.linear_frames(
+                        frames[part], self.inverse, *mesh, self._scratch, placed[part], turned[part]
                     )
         return out
 
     def _frames(self, matrices: npt.ArrayLike) -> tuple[Float64, bool]:
         array = np.asarray(matrices)
-        count = len(self._inverse)
+        count = len(self.inverse)
         if array.ndim not in (3, 4) or array.shape[-3:] != (count, 4, 4):
             raise ValueError(
                 f"joint matrices must have shape ({count}, 4, 4) or (T, {count}, 4, 4), not {array.shape}"
@@ -154,16 +145,52 @@ class Skinner:
             raise ValueError(f"joint matrices must be real numbers, not {array.dtype}")
         frames = np.ascontiguousarray(array, dtype=np.float64).reshape(-1, count, 4, 4)
         if not frames.flags.writeable:
-            frames = frames.copy()  # see the copies in __init__
+            frames = frames.copy()  # read-only arrays would make numba compile another version
         if not np.isfinite(frames).all():
-            frame, joint = (int(place) for place in np.argwhere(~np.isfinite(frames))[0, :2])
+            frame, joint = (int(index) for index in np.argwhere(~np.isfinite(frames))[0, :2])
             raise ValueError(f"joint matrix {joint} of frame {frame} is not finite")
         return frames, array.ndim == 3
 
 
-def _as_writable(array: Float32, room: Float32) -> Float32:
-    """The array itself if compiled code can take it, else a copy in `room`."""
+def _as_writable(array: Float32, buffer: Float32) -> Float32:
+    """Return the array itself if compiled code can take it, else a copy in a buffer."""
     if array.dtype == np.float32 and array.flags.c_contiguous and array.flags.writeable:
         return array
-    np.copyto(room, array)
-    return room
+    np.copyto(buffer, array)
+    return buffer
+
+
+def build_skinner(
+    vertices: Float32,
+    normals: Float32,
+    joints: Int32,
+    weights: Float32,
+    bind: Float64,
+    skeleton: Skeleton,
+    triangles: Int32 | None = None,
+) -> Skinner:
+    """Return a skinner for arrays that are checked as those of `BodyModel`.
+
+    vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), rows sum
+    to 1. bind: float64 (J, 4, 4), the joints as modelled. skeleton: its joints. triangles: int32 (F, 3), by
+    which normals follow the surface (`fba.body.skin._moving_normals`); without them normals only rotate with
+    their vertices.
+    """
+    order = np.argsort(-weights, axis=1, kind="stable")
+    joints = np.ascontiguousarray(np.take_along_axis(joints, order, axis=1), dtype=np.int32)
+    weights = np.ascontiguousarray(np.take_along_axis(weights, order, axis=1), dtype=np.float32)
+    # copies: read-only arrays would make numba compile another version
+    vertices = np.array(vertices, dtype=np.float32, order="C")
+    normals = np.array(normals, dtype=np.float32, order="C")
+    faces = np.zeros((0, 3), dtype=np.int32) if triangles is None else triangles
+    neighbours, coefficients = normal_rings(vertices, normals, faces)
+    return Skinner(
+        vertices, normals, joints, weights,
+        counts=(weights > 0).sum(axis=1).astype(np.int32),
+        inverse=np.linalg.inv(bind).astype(np.float64),
+        parents=np.ascontiguousarray(skeleton.parents, dtype=np.int64),
+        twists=find_twists(skeleton, bind, vertices, joints, weights),
+        girdle=find_girdle(skeleton, bind, vertices, joints, weights),
+        neighbours=neighbours,
+        coefficients=coefficients,
+    )  # fmt: skip

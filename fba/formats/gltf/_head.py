@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,45 +26,40 @@ BENDING_KINDS = ("skin", "mouth", "hair", "other")
 """Kinds of parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
 
+@dataclass(eq=False)
 class HeadParts:
-    """Writes a face into a document.
+    """Writes a face into a document; `start_head` makes it.
 
-    shown: float32 (T, 68), FAPs as `resolve` returns them. body: the one that carries it, or None for a face
-    by itself, in its own frame.
+    shown: float32 (T, 68), FAPs as `resolve` returns them. all_targets: of those FAPs. on: the face on a
+    body, or None for a face by itself, in its own frame. place: (4, 4), from the face's frame to the body's.
+    bound: nodes made here that carry vertices, and their matrices (4, 4) in the bind pose. fap_joints: nodes
+    made here that FAPs move, and the FAPs (T,) that follow from their motion.
     """
 
-    def __init__(
-        self, builder: Builder, clip: Clip, model: FaceModel, shown: Float32, body: BodyModel | None
-    ) -> None:
-        self._builder, self._clip, self.model = builder, clip, model
-        self._deformer = Deformer(model)
-        self._shown = shown
-        self._targets = list(make_targets(model, shown))
-        self.on: HeadOnBody | None = None
-        self.place = np.eye(4)
-        if body is not None:
-            skull = np.concatenate(
-                [np.full(len(p.vertices), p.kind not in BENDING_KINDS) for p in model.parts]
-            )
-            eyes = model.points[[point_row("3.5"), point_row("3.6")]]
-            self.on = HeadOnBody(body, model.vertices, eyes, skull)
-            self.place = self.on.place
-        self.bound: list[tuple[int, Float64]] = []
-        """Nodes made here that carry vertices, and their matrices (4, 4) in the bind pose."""
-        self.fap_joints: list[tuple[FapJoint, dict[int, Float64]]] = []
-        """Nodes made here that FAPs move, and the FAPs (T,) that follow from their motion."""
-        self._written: set[str] = set()
+    builder: Builder
+    clip: Clip
+    model: FaceModel
+    deformer: Deformer
+    shown: Float32
+    all_targets: list[Targets]
+    on: HeadOnBody | None
+    place: Float64
+    bound: list[tuple[int, Float64]] = field(default_factory=list)
+    fap_joints: list[tuple[FapJoint, dict[int, Float64]]] = field(default_factory=list)
+    _written: set[str] = field(default_factory=set)
 
     @property
     def targets(self) -> list[Targets]:
         """Morph targets that `meshes` wrote, of FAPs of which all targets were written."""
-        return [fap_targets for fap_targets in self._targets if self._written.issuperset(fap_targets.names)]
+        return [
+            fap_targets for fap_targets in self.all_targets if self._written.issuperset(fap_targets.names)
+        ]
 
     @property
     def is_turned(self) -> bool:
         """Whether FAPs turn the head in this animation."""
         moved = {table.fap for table in self.model.tables if any(t.part == HEAD for t in table.transforms)}
-        return any(self._shown[:, fap - 1].any() for fap in moved)
+        return any(self.shown[:, fap - 1].any() for fap in moved)
 
     def add_head_node(self, parent: int | None, bind: Float64, always: bool = False) -> int:
         """Add the node that FAPs turn, animate it, and return it.
@@ -72,10 +67,10 @@ class HeadParts:
         parent: its parent joint, and bind, (4, 4), the matrix of that in the bind pose. always: with channels
         even if it does not move.
         """
-        node = self._builder.add("nodes", {"name": HEAD_NODE})
+        node = self.builder.add("nodes", {"name": HEAD_NODE})
         if parent is not None:
-            adopt(self._builder, parent, node)
-        motion = self._to_body(self._deformer.head_matrices(self._shown))
+            adopt(self.builder, parent, node)
+        motion = self._to_body(self.deformer.head_matrices(self.shown))
         to_parent: Float64 = np.linalg.inv(bind).astype(np.float64)
         local = to_parent @ motion @ bind
         self._animate(HEAD, node, local, to_parent, np.eye(4), always)
@@ -90,7 +85,7 @@ class HeadParts:
         parent. rest: (4, 4), the node when all FAPs are 0.
         """
         turned = nearest_rotation(local[:, :3, :3])
-        move(self._builder, self._clip, node, turned, local[:, :3, 3], always=always)
+        move(self.builder, self.clip, node, turned, local[:, :3, 3], always=always)
         joint = FapJoint.for_part(self.model, part, node, to_parent @ self.place, rest)
         if joint is not None:
             self.fap_joints.append((joint, joint.values(turned, local[:, :3, 3])))
@@ -102,7 +97,7 @@ class HeadParts:
         """
         nodes: dict[str, int] = {}
         for part, matrices in zip(
-            self.model.parts, np.moveaxis(self._deformer.part_matrices(self._shown), 1, 0), strict=True
+            self.model.parts, np.moveaxis(self.deformer.part_matrices(self.shown), 1, 0), strict=True
         ):
             centre = self._centre(part)
             if centre is None:
@@ -111,8 +106,8 @@ class HeadParts:
             rest[:3, 3] = (self.place @ [*centre, 1.0])[:3]
             to_parent: Float64 = np.linalg.inv(bind).astype(np.float64)
             local = to_parent @ self._to_body(matrices) @ rest
-            node = self._builder.add("nodes", {"name": f"{part.name}_joint"})
-            adopt(self._builder, parent, node)
+            node = self.builder.add("nodes", {"name": f"{part.name}_joint"})
+            adopt(self.builder, parent, node)
             self._animate(part.name, node, local, to_parent, to_parent @ rest)
             nodes[part.name] = node
             self.bound.append((node, rest))
@@ -128,7 +123,7 @@ class HeadParts:
         parts.
         """
         roots = []
-        taken = {node["name"] for node in self._builder.root["nodes"]}
+        taken = {node["name"] for node in self.builder.root["nodes"]}
         ends = np.cumsum([0, *(len(part.vertices) for part in self.model.parts)])
         for number, part in enumerate(self.model.parts):
             rows = slice(int(ends[number]), int(ends[number + 1]))
@@ -138,21 +133,21 @@ class HeadParts:
             primitive = materials.primitive(shape)
             if skin:
                 joints, weights = self._weights(part, rows, slots)
-                primitive["attributes"]["JOINTS_0"] = self._builder.attribute(joints)
-                primitive["attributes"]["WEIGHTS_0"] = self._builder.attribute(weights)
+                primitive["attributes"]["JOINTS_0"] = self.builder.attribute(joints)
+                primitive["attributes"]["WEIGHTS_0"] = self.builder.attribute(weights)
             name = f"face_{part.name}" if part.name in taken else part.name
             mesh: dict[str, Any] = {"name": name, "primitives": [primitive]}
             weights_shown = self._add_morphs(primitive, mesh, rows)
-            entry: dict[str, Any] = {"name": name, "mesh": self._builder.add("meshes", mesh)}
+            entry: dict[str, Any] = {"name": name, "mesh": self.builder.add("meshes", mesh)}
             if skin:
                 entry["skin"] = 0
-            node = self._builder.add("nodes", entry)
+            node = self.builder.add("nodes", entry)
             if skin:
                 roots.append(node)
             else:
-                adopt(self._builder, parents.get(part.name, parents[""]), node)
+                adopt(self.builder, parents.get(part.name, parents[""]), node)
             if weights_shown is not None:
-                self._clip.animate(node, "weights", weights_shown)
+                self.clip.animate(node, "weights", weights_shown)
         return roots
 
     def _transform(self, part: Part, rows: slice, skin: bool) -> Part | None:
@@ -185,7 +180,7 @@ class HeadParts:
         """Add the targets that move a part to its mesh; return their weights (T, K), or None."""
         own: list[tuple[Targets, int]] = [
             (group, k)
-            for group in self._targets
+            for group in self.all_targets
             for k in range(len(group.names))
             if group.shifts[k, rows].any()
         ]
@@ -193,7 +188,7 @@ class HeadParts:
             return None
         size = np.float32(self.place[0, 0])
         primitive["targets"] = [
-            {"POSITION": self._builder.displacements(group.shifts[k, rows] * size)} for group, k in own
+            {"POSITION": self.builder.displacements(group.shifts[k, rows] * size)} for group, k in own
         ]
         self._written |= {group.names[k] for group, k in own}
         weights = np.stack([group.weights[:, k] for group, k in own], axis=1)
@@ -213,3 +208,17 @@ class HeadParts:
         """Convert motions (T, 4, 4) from the face's frame to the body's."""
         result: Float64 = self.place @ matrices @ np.linalg.inv(self.place)
         return result
+
+
+def start_head(
+    builder: Builder, clip: Clip, model: FaceModel, shown: Float32, body: BodyModel | None
+) -> HeadParts:
+    """Return the writer of a face. shown, body: see `HeadParts`; body None for a face by itself."""
+    on = None
+    if body is not None:
+        skull = np.concatenate([np.full(len(p.vertices), p.kind not in BENDING_KINDS) for p in model.parts])
+        eyes = model.points[[point_row("3.5"), point_row("3.6")]]
+        on = HeadOnBody(body, model.vertices, eyes, skull)
+    place = np.eye(4) if on is None else on.place
+    targets = list(make_targets(model, shown))
+    return HeadParts(builder, clip, model, Deformer(model), shown, targets, on, place)

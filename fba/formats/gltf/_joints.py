@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,33 +17,40 @@ STILL = 1e-7
 """Numbers that change by no more count as still: 32-bit floats are not more exact."""
 
 
+@dataclass(eq=False)
 class Clip:
-    """The animation of a file, whose channels share their key times.
+    """The animation of a file, whose channels share their key times; `start_clip` makes it.
 
-    times: float64 (T,), seconds from the first key. Raises FormatError if the keys are too close to be
-    distinct as 32-bit floats.
+    key_times: the accessor of these times.
     """
 
-    def __init__(self, builder: Builder, times: Float64, path: Path) -> None:
-        keys = times.astype(np.float32)
-        if len(keys) > 1 and not (np.diff(keys) > np.diff(times).min() / 2).all():
-            raise FormatError(
-                f"the animation is {times[-1]:.0f} s long; glTF's times, 32-bit floats, do not tell its "
-                "frames apart; write pieces of it",
-                path=path,
-            )
-        self._builder = builder
-        self._input = builder.data(keys, bounds=True)
-        self.samplers: list[dict[str, Any]] = []
-        self.channels: list[dict[str, Any]] = []
+    builder: Builder
+    key_times: int
+    samplers: list[dict[str, Any]] = field(default_factory=list)
+    channels: list[dict[str, Any]] = field(default_factory=list)
 
     def animate(self, node: int, path: str, values: Float64 | Float32) -> None:
         """Add a channel of a node. path: "rotation", "translation" or "weights". values: (T, width)."""
         flat = np.ascontiguousarray(values, dtype=np.float32)
-        output = self._builder.data(flat.reshape(-1, 1) if path == "weights" else flat)
-        self.samplers.append({"input": self._input, "output": output, "interpolation": "LINEAR"})
+        output = self.builder.data(flat.reshape(-1, 1) if path == "weights" else flat)
+        self.samplers.append({"input": self.key_times, "output": output, "interpolation": "LINEAR"})
         target = {"node": node, "path": path}
         self.channels.append({"sampler": len(self.samplers) - 1, "target": target})
+
+
+def start_clip(builder: Builder, times: Float64, path: Path) -> Clip:
+    """Return a clip without channels. times: float64 (T,), seconds from the first key.
+
+    Raises FormatError if the keys are too close to be distinct as 32-bit floats.
+    """
+    keys = times.astype(np.float32)
+    if len(keys) > 1 and not (np.diff(keys) > np.diff(times).min() / 2).all():
+        raise FormatError(
+            f"the animation is {times[-1]:.0f} s long; glTF's times, 32-bit floats, do not tell its "
+            "frames apart; write pieces of it",
+            path=path,
+        )
+    return Clip(builder, builder.data(keys, bounds=True))
 
 
 def move(

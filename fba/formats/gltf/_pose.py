@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
@@ -17,54 +18,62 @@ ALIKE = 0.05
 """Radians within which joints agree on how the bind pose is turned in the scene."""
 
 
+@dataclass(frozen=True, eq=False)
 class BindPose:
-    """Rotations and positions of the joints in the bind pose, in the scene's frame.
+    """Joints in the bind pose, in the scene's frame.
 
-    nodes: those of the joints, parents first. parents: position of each joint's parent in nodes, -1 for a
-    root. A joint of no skin has the transform of its node, relative to its parent.
+    rotations: float64 (J, 3, 3). positions: float64 (J, 3). parents: position of each joint's parent, -1 for
+    a root.
     """
 
-    def __init__(self, gltf: Gltf, nodes: Sequence[int], parents: Sequence[int]) -> None:
-        inverse: dict[int, Float64] = {}
-        for skin in gltf.skins:
-            for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
-                if joint in set(nodes):
-                    inverse.setdefault(joint, np.asarray(matrix, dtype=np.float64))
-        bound = {joint: _invert(gltf, joint, matrix) for joint, matrix in inverse.items()}
-        if bound and np.ptp([matrix[:3, 3] for matrix in bound.values()], axis=0).max() <= 0:
-            bound = {}  # without inverse bind matrices, the bind pose is unknown
-        turn, size = _to_scene(gltf, bound)
-        self._turns = np.zeros((len(nodes), 3, 3))
-        self.positions = np.zeros((len(nodes), 3))
-        self._parents = parents
-        for number, node in enumerate(nodes):
-            parent = parents[number]
-            if node in bound:
-                self._turns[number] = turn @ nearest_rotation(bound[node][:3, :3])
-                self.positions[number] = size * (turn @ bound[node][:3, 3])
-                continue
-            local = gltf.nodes[node].local
-            if parent < 0:
-                world = gltf.nodes[node].world
-                self._turns[number] = nearest_rotation(world[:3, :3])
-                self.positions[number] = world[:3, 3]
-            else:
-                above = gltf.nodes[nodes[parent]].world
-                scale = float(np.cbrt(abs(np.linalg.det(above[:3, :3]))))
-                self._turns[number] = self._turns[parent] @ nearest_rotation(local[:3, :3])
-                self.positions[number] = self.positions[parent] + scale * (self._turns[parent] @ local[:3, 3])
+    rotations: Float64
+    positions: Float64
+    parents: Sequence[int]
 
     def offsets(self) -> Float64:
         """Return float64 (J, 3): positions relative to the parent in the bind pose; absolute for roots."""
         result = self.positions.copy()
-        for number, parent in enumerate(self._parents):
+        for number, parent in enumerate(self.parents):
             if parent >= 0:
                 result[number] -= self.positions[parent]
         return result
 
     def turned(self, number: int, linear: Float64) -> Float64:
         """Return quaternions (T, 4), w first, from the bind pose to world rotations (T, 3, 3) of a joint."""
-        return rotations.quaternions(nearest_rotation(linear) @ self._turns[number].T)
+        return rotations.quaternions(nearest_rotation(linear) @ self.rotations[number].T)
+
+
+def find_bind_pose(gltf: Gltf, nodes: Sequence[int], parents: Sequence[int]) -> BindPose:
+    """Return the bind pose of joints. A joint of no skin has its node's transform relative to its parent.
+
+    nodes: those of the joints, parents first. parents: position of each joint's parent in nodes, -1 for a
+    root.
+    """
+    inverse: dict[int, Float64] = {}
+    for skin in gltf.skins:
+        for joint, matrix in zip(skin.joints, skin.inverse_bind, strict=True):
+            if joint in set(nodes):
+                inverse.setdefault(joint, np.asarray(matrix, dtype=np.float64))
+    bound = {joint: _invert(gltf, joint, matrix) for joint, matrix in inverse.items()}
+    if bound and np.ptp([matrix[:3, 3] for matrix in bound.values()], axis=0).max() <= 0:
+        bound = {}  # without inverse bind matrices, the bind pose is unknown
+    turn, size = _to_scene(gltf, bound)
+    turns, positions = np.zeros((len(nodes), 3, 3)), np.zeros((len(nodes), 3))
+    for number, node in enumerate(nodes):
+        parent = parents[number]
+        if node in bound:
+            turns[number] = turn @ nearest_rotation(bound[node][:3, :3])
+            positions[number] = size * (turn @ bound[node][:3, 3])
+        elif parent < 0:
+            world = gltf.nodes[node].world
+            turns[number] = nearest_rotation(world[:3, :3])
+            positions[number] = world[:3, 3]
+        else:
+            local, above = gltf.nodes[node].local, gltf.nodes[nodes[parent]].world
+            scale = float(np.cbrt(abs(np.linalg.det(above[:3, :3]))))
+            turns[number] = turns[parent] @ nearest_rotation(local[:3, :3])
+            positions[number] = positions[parent] + scale * (turns[parent] @ local[:3, 3])
+    return BindPose(turns, positions, parents)
 
 
 class Sampler:

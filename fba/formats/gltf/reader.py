@@ -19,7 +19,7 @@ from fba.capture import SkeletonMotion, from_skeleton, matching
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError, Remedy
 from fba.formats.gltf._own_files import find_note, read_note
-from fba.formats.gltf._pose import BindPose, Sampler, key_times
+from fba.formats.gltf._pose import Sampler, find_bind_pose, key_times
 from fba.gltf import Animation as Clip
 from fba.gltf import Gltf, read_gltf
 from fba.source import Path
@@ -111,7 +111,7 @@ def sample_motion(
         )
     sample_times = first + np.arange(count) / float(frames)
     parents = [nodes.index(p) if (p := gltf.nodes[node].parent) in nodes else -1 for node in nodes]
-    bind = BindPose(gltf, nodes, parents)
+    bind = find_bind_pose(gltf, nodes, parents)
     sampler = Sampler(gltf, channels, sample_times)
 
     # the transforms of all nodes of the skeleton in the scene's frame

@@ -16,7 +16,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import FbaWarning, FormatError
-from fba.formats.gltf._joints import Clip, move, nest
+from fba.formats.gltf._joints import Clip, move, nest, start_clip
 from fba.gltf.writer import Builder
 from fba.source import Path
 from fba.tracks import hold
@@ -69,7 +69,7 @@ def write(
     builder.root["scene"] = 0
     first = int(animation.index[0])
     times = (animation.index - first).astype(np.float64) / float(animation.rate)
-    clip = Clip(builder, times, path)
+    clip = start_clip(builder, times, path)
     note: dict[str, Any] = {"version": 1, "rate": str(animation.rate), "first": first}
     if animation.body is not None:
         roots = _add_person(builder, clip, animation, note, mesh, model, body, axes)
@@ -163,7 +163,7 @@ def _make_head(
 ) -> HeadParts | None:
     """Return a person's head, without meshes yet; None with a warning if the body has no place for it."""
     from fba.face.model import FaceModel
-    from fba.formats.gltf._head import HeadParts
+    from fba.formats.gltf._head import start_head
 
     if person.eyes is None:
         if animation.face is not None or model is not None:
@@ -174,7 +174,7 @@ def _make_head(
             )
         return None
     face = model or FaceModel.default()
-    return HeadParts(builder, clip, face, _shown(animation, face), person)
+    return start_head(builder, clip, face, _shown(animation, face), person)
 
 
 def _add_head(
@@ -182,11 +182,11 @@ def _add_head(
 ) -> list[int]:
     """Add a face by itself, in its own frame, and complete the note; return the scene's root nodes."""
     from fba.face.model import FaceModel
-    from fba.formats.gltf._head import HeadParts
+    from fba.formats.gltf._head import start_head
     from fba.gltf.part_materials import PartWriter
 
     face = model or FaceModel.default()
-    head = HeadParts(builder, clip, face, _shown(animation, face), None)
+    head = start_head(builder, clip, face, _shown(animation, face), None)
     node = head.add_head_node(None, np.eye(4), always=True)
     parents = {"": node, **head.add_joints(node, np.eye(4))}
     head.add_meshes({}, PartWriter(builder), False, parents)
