@@ -64,15 +64,15 @@ def contact_sheet(
     kinds = COLUMNS if what == "all" else (what,)
     scene = Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model or FaceModel.default())
     sheets = [_sheet(scene, kind, tile or TILE[kind]) for kind in kinds]
-    wide = max(sheet.shape[1] for sheet in sheets)
-    whole = np.full((sum(sheet.shape[0] for sheet in sheets), wide, 3), PAPER, dtype=np.uint8)
+    widest = max(sheet.shape[1] for sheet in sheets)
+    joined = np.full((sum(sheet.shape[0] for sheet in sheets), widest, 3), PAPER, dtype=np.uint8)
     row = 0
     for sheet in sheets:
         height, width = sheet.shape[:2]
-        left = (wide - width) // 2
-        whole[row : row + height, left : left + width] = sheet
+        left = (widest - width) // 2
+        joined[row : row + height, left : left + width] = sheet
         row += height
-    return whole
+    return joined
 
 
 def tiles(kind: str, scene: Scene) -> list[Tile]:
@@ -89,7 +89,7 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
 
 @cache
 def _fap_tiles() -> tuple[Tile, ...]:
-    found = []
+    tiles = []
     with (files(__package__) / "contact_sheet.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             number, value = int(row["fap"]), int(row["value"])
@@ -101,8 +101,8 @@ def _fap_tiles() -> tuple[Tile, ...]:
             vector.flags.writeable = False
             label = f"{number} {faps()[number - 1].name}"
             yaw, pitch = float(row["yaw"]), float(row["pitch"])
-            found.append(Tile(label, f"{value:+d}", vector, row["view"], yaw, pitch))
-    return tuple(found)
+            tiles.append(Tile(label, f"{value:+d}", vector, row["view"], yaw, pitch))
+    return tuple(tiles)
 
 
 def close_up(view: str, scene: Scene) -> Subject:
@@ -110,10 +110,10 @@ def close_up(view: str, scene: Scene) -> Subject:
 
     Without those points it is the face.
     """
-    whole = scene.face_subject
+    face = scene.face_subject
     unit = scene.model.fapu
     eyes, mouth, nose = unit.ES * 1024, unit.MW * 1024, unit.ENS * 1024
-    places: dict[str, tuple[tuple[str, ...], tuple[float, float, float], float, float]] = {
+    close_ups: dict[str, tuple[tuple[str, ...], tuple[float, float, float], float, float]] = {
         "eyes": (("3.5", "3.6"), (0.0, 0.0, 0.0), 0.62 * eyes, 0.95 * eyes),
         "left eye": (("3.5",), (0.0, 0.0, 0.0), 0.42 * eyes, 0.42 * eyes),
         "right eye": (("3.6",), (0.0, 0.0, 0.0), 0.42 * eyes, 0.42 * eyes),
@@ -125,26 +125,24 @@ def close_up(view: str, scene: Scene) -> Subject:
         "mouth": (("8.1", "8.2", "8.3", "8.4"), (0.0, -0.12 * mouth, 0.0), 0.75 * mouth, 0.85 * mouth),
         "jaw": (("8.3", "8.4", "2.1"), (0.0, 0.0, 0.0), 1.45 * mouth, 1.5 * mouth),
     }
-    if view not in places:
-        x, y, z = whole.centre
-        return Subject(
-            (x, y + 0.05 * whole.half_height, z), 0.86 * whole.half_height, 0.86 * whole.half_width
-        )
-    names, offset, high, wide = places[view]
+    if view not in close_ups:
+        x, y, z = face.centre
+        return Subject((x, y + 0.05 * face.half_height, z), 0.86 * face.half_height, 0.86 * face.half_width)
+    names, offset, half_height, half_width = close_ups[view]
     points = scene.model.points
     middle: Float64 = np.mean([points[point_row(name)] for name in names], axis=0) + offset
     if not np.isfinite(middle).all():
-        return whole
+        return face
     x, y, z = (float(v) for v in middle)
-    return Subject((x, y, z), high, wide)
+    return Subject((x, y, z), half_height, half_width)
 
 
 def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> UInt8:
     from PIL import Image, ImageDraw
 
-    wanted = tiles(kind, scene)
+    shown = tiles(kind, scene)
     columns = COLUMNS[kind]
-    rows = -(-len(wanted) // columns)
+    rows = -(-len(shown) // columns)
     width, height = size
     letters = max(min(width // 12, 16), 7)
     line = round(letters * 1.35)
@@ -153,7 +151,7 @@ def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> UInt8:
     draw = ImageDraw.Draw(sheet)
     font, small = label_font(letters), label_font(letters * 0.9)
     with Offscreen(scene, size, samples=4) as view:
-        for number, one in enumerate(wanted):
+        for number, one in enumerate(shown):
             x, y = SPACE + number % columns * step[0], SPACE + number // columns * step[1]
             subject = close_up(one.view, scene)
             view.camera = Camera(yaw=one.yaw, pitch=one.pitch).fit(subject, width / height)

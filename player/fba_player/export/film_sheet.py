@@ -98,8 +98,8 @@ def choose_frames(scene: Showable, count: int, start: float | None, end: float |
 def choose_columns(count: int, step: tuple[int, int]) -> int:
     """Number of columns for a sheet a little wider than high, with few empty cells. step: size of a cell."""
     ideal = math.sqrt(count * SHAPE * step[1] / step[0])
-    near = range(max(math.floor(ideal * 0.8), 1), min(math.ceil(ideal * 1.3), count) + 1)
-    return min(near or (count,), key=lambda columns: (-count % columns / count, abs(columns - ideal)))
+    candidates = range(max(math.floor(ideal * 0.8), 1), min(math.ceil(ideal * 1.3), count) + 1)
+    return min(candidates or (count,), key=lambda columns: (-count % columns / count, abs(columns - ideal)))
 
 
 def _draw_sheet(

@@ -107,7 +107,7 @@ class Numbered:
         except OSError as error:
             raise write_error(self.folder, error, "cannot be looked into") from error
         pattern = re.compile(f"{re.escape(self._before)}(\\d+){re.escape(self._after)}")
-        numbers = [int(found[1]) for name in names if (found := pattern.fullmatch(name))]
+        numbers = [int(match[1]) for name in names if (match := pattern.fullmatch(name))]
         return sorted(number for number in numbers if self.path(number).exists())
 
 
@@ -136,12 +136,12 @@ class Sequence:
         self, names: Numbered, count: int, *, transparent: bool = False, replace: bool = False
     ) -> None:
         check_picture(Path(names.name), transparent=transparent)
-        there = names.existing()
-        if there and not replace:
+        existing = names.existing()
+        if existing and not replace:
             raise FormatError(
-                f"{_range_text(names, there)} there already; choose another folder", path=names.folder
+                f"{_range_text(names, existing)} there already; choose another folder", path=names.folder
             ).with_remedies(Remedy("replace", "or have them replaced with {}", "True"))
-        if beyond := [number for number in there if number >= count]:
+        if beyond := [number for number in existing if number >= count]:
             raise FormatError(
                 f"{_range_text(names, beyond)} left from a longer sequence, and would follow the {count} new "
                 "pictures; delete them, or choose another folder",

@@ -73,11 +73,11 @@ def to_pyrender(
         eye = camera if isinstance(camera, Camera) else shown.camera(camera, aspect)
         scene = pyrender.Scene(bg_color=(0.5, 0.5, 0.5, 0.0), ambient_light=_ambient())
         for face in view.faces:
-            _add(pyrender, scene, face.shape.name or face.shape.kind, *_of_face(pyrender, face))
+            _add(pyrender, scene, face.shape.name or face.shape.kind, *_face_primitive(pyrender, face))
         for mesh in view.meshes:
-            _add(pyrender, scene, "mesh", *_of_mesh(pyrender, mesh))
+            _add(pyrender, scene, "mesh", *_mesh_primitive(pyrender, mesh))
         for number, ball in enumerate(view.eyes):
-            _add(pyrender, scene, ("left eye", "right eye")[number % 2], *_of_eye(pyrender, ball))
+            _add(pyrender, scene, ("left eye", "right eye")[number % 2], *_eye_primitive(pyrender, ball))
         _add_camera(pyrender, scene, follow_camera(eye, shown, t), aspect)
         _add_lights(pyrender, scene)
         return scene
@@ -116,7 +116,7 @@ def _add(pyrender: Any, scene: Any, name: str, attributes: dict[str, Any], mater
     scene.add(mesh, name=name)
 
 
-def _of_face(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
+def _face_primitive(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
     shape = face.shape
     positions = turn_partly(face.positions, shape.sway, face.turn, face.centre)
     normals = turn_partly(face.normals, shape.sway, face.turn, np.zeros(3))
@@ -135,7 +135,7 @@ def _of_face(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]:
     return attributes, material
 
 
-def _of_mesh(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
+def _mesh_primitive(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
     shape = mesh.shape
     attributes = _world_attributes(mesh.positions, mesh.normals, mesh.matrix, shape.triangles, shape.colours)
     rough = _roughness(shape.colours)
@@ -143,7 +143,7 @@ def _of_mesh(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
     return attributes, material
 
 
-def _of_eye(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
+def _eye_primitive(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
     points, triangles = sphere_mesh(EYE_ROWS, EYE_AROUND)
     across = np.hypot(points[:, 0], points[:, 1])
     front = points[:, 2] > 0
@@ -211,8 +211,8 @@ def _ambient() -> Float64:
 def _studio() -> dict[str, tuple[float, float, float]]:
     """The studio's lights as the shaders define them: linear colours and directions by name."""
     text = (files("fba_player.gl") / "shaders" / "lighting.glsl").read_text(encoding="utf-8")
-    found = re.findall(r"const vec3 ([A-Z_]+) = (?:normalize\()?vec3\(([^)]*)\)", text)
-    return {name: tuple(float(v) for v in values.split(",")) for name, values in found}  # type: ignore[misc]
+    constants = re.findall(r"const vec3 ([A-Z_]+) = (?:normalize\()?vec3\(([^)]*)\)", text)
+    return {name: tuple(float(v) for v in values.split(",")) for name, values in constants}  # type: ignore[misc]
 
 
 def _shining_from(direction: Float64) -> Float64:

@@ -61,7 +61,7 @@ class ShadowCaster:
 
     def __init__(self) -> None:
         self._points: WeakKeyDictionary[FaceShape, Points | None] = WeakKeyDictionary()
-        self._thrown = np.empty((0, 6), dtype=np.float32)
+        self._rows = np.empty((0, 6), dtype=np.float32)
         self._darkness = np.zeros((CELLS, CELLS), dtype=np.uint8)
 
     def cast(self, meshes: list[FaceMesh], middle: tuple[float, float]) -> CastShadow | None:
@@ -79,11 +79,11 @@ class ShadowCaster:
             points = self._points_of(mesh.shape)
             if points is None or mesh.turn.any():
                 continue
-            if count + len(points.area) > len(self._thrown):
+            if count + len(points.area) > len(self._rows):
                 more = np.empty((2 * len(points.area), 6), dtype=np.float32)
-                self._thrown = np.concatenate([self._thrown, more])
-            count = _place(mesh.positions, mesh.matrix, points, low[0], low[1], self._thrown, count)
-        left, bottom, right, top = _throw(self._thrown[:count], _rays(), self._darkness)
+                self._rows = np.concatenate([self._rows, more])
+            count = _place_points(mesh.positions, mesh.matrix, points, low[0], low[1], self._rows, count)
+        left, bottom, right, top = _cast_shadow(self._rows[:count], _rays(), self._darkness)
         if right <= left:
             return None
         return CastShadow(
@@ -102,8 +102,8 @@ def _spread(shape: FaceShape) -> Points | None:
     """Points spread over a shape's surface in its rest pose; None for a shape that casts no shadow."""
     if shape.coarser is None or shape.kind in WITHIN:
         return None
-    found = shape.coarser.triangles_within(COARSE)
-    triangles = shape.triangles if found is None else found
+    coarse = shape.coarser.triangles_within(COARSE)
+    triangles = shape.triangles if coarse is None else coarse
     if not len(triangles):
         return None
     a, b, c = (shape.coarser.points[triangles[:, k], :3].astype(np.float64) for k in range(3))
@@ -131,27 +131,26 @@ def _rays() -> Float64:
     aside /= np.linalg.norm(aside)
     up = np.cross(aside, key)
     golden = np.pi * (3 - 5**0.5)
-    found = []
+    rays = []
     for k in range(KEY_RAYS):
         reach = KEY_WIDTH * np.sqrt((k + 0.5) / KEY_RAYS)
-        found.append(key + reach * (np.cos(golden * k) * aside + np.sin(golden * k) * up))
+        rays.append(key + reach * (np.cos(golden * k) * aside + np.sin(golden * k) * up))
     for k in range(SKY_RAYS):
         high = STEEPEST - (STEEPEST - FLATTEST) * (k + 0.5) / SKY_RAYS
         flat = np.sqrt(1 - high * high)
-        found.append(np.array([flat * np.cos(golden * k + 1), high, flat * np.sin(golden * k + 1)]))
-    rays = np.array(found)
-    unit: Float64 = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        rays.append(np.array([flat * np.cos(golden * k + 1), high, flat * np.sin(golden * k + 1)]))
+    unit: Float64 = np.array(rays) / np.linalg.norm(rays, axis=1, keepdims=True)
     return unit
 
 
 @compiled
-def _place(
+def _place_points(
     positions: Float32,
     matrix: Float64,
     points: Points,
     low_x: float,
     low_z: float,
-    thrown: Float32,
+    rows: Float32,
     count: int,
 ) -> int:
     """Write points from row `count` on: column, height (m), row; normal, as long as the area in cells.
@@ -173,23 +172,23 @@ def _place(
             continue
         a, b, c = shares[i, 0], shares[i, 1], shares[i, 2]
         piece = area[i] / (CELL * CELL) / length
-        thrown[count, 0] = (a * p[0, 0] + b * p[1, 0] + c * p[2, 0] - low_x) / CELL - 0.5
-        thrown[count, 1] = max(a * p[0, 1] + b * p[1, 1] + c * p[2, 1], 0.0)
-        thrown[count, 2] = (a * p[0, 2] + b * p[1, 2] + c * p[2, 2] - low_z) / CELL - 0.5
-        thrown[count, 3], thrown[count, 4], thrown[count, 5] = piece * nx, piece * ny, piece * nz
+        rows[count, 0] = (a * p[0, 0] + b * p[1, 0] + c * p[2, 0] - low_x) / CELL - 0.5
+        rows[count, 1] = max(a * p[0, 1] + b * p[1, 1] + c * p[2, 1], 0.0)
+        rows[count, 2] = (a * p[0, 2] + b * p[1, 2] + c * p[2, 2] - low_z) / CELL - 0.5
+        rows[count, 3], rows[count, 4], rows[count, 5] = piece * nx, piece * ny, piece * nz
         count += 1
     return count
 
 
 @compiled
-def _throw(thrown: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, int, int]:
+def _cast_shadow(rows: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, int, int]:
     """Write the darkness of each cell; return the bounds of the shadow: left, bottom, right, top."""
     cells = len(darkness)
     key, sky = np.zeros((cells, cells), dtype=np.float32), np.zeros((cells, cells), dtype=np.float32)
     layer = np.empty((cells, cells), dtype=np.float32)  # one ray at a time: it stays in the cache
     for ray in range(len(rays)):
         layer[:] = np.float32(0.0)
-        _cover(thrown, rays[ray, 0], rays[ray, 1], rays[ray, 2], layer)
+        _cover(rows, rays[ray, 0], rays[ray, 1], rays[ray, 2], layer)
         grid = key if ray < KEY_RAYS else sky
         for row in range(cells):
             for column in range(cells):
@@ -200,17 +199,17 @@ def _throw(thrown: Float32, rays: Float64, darkness: UInt8) -> tuple[int, int, i
 
 
 @compiled
-def _cover(thrown: Float32, rx: float, ry: float, rz: float, layer: Float32) -> None:
+def _cover(rows: Float32, rx: float, ry: float, rz: float, layer: Float32) -> None:
     """Add to a layer the share of each cell that the points cover along a ray."""
     cells = len(layer)
     limit, half, quarters = np.float32(cells - 2), np.float32(0.5), np.float32(0.75)
     longer = 1.0 / ry
     x, y, z = np.float32(rx * longer), np.float32(1.0), np.float32(rz * longer)
     aside, ahead = np.float32(rx * longer / CELL), np.float32(rz * longer / CELL)
-    for i in range(len(thrown)):
-        amount = thrown[i, 3] * x + thrown[i, 4] * y + thrown[i, 5] * z
-        column = thrown[i, 0] - aside * thrown[i, 1]
-        row = thrown[i, 2] - ahead * thrown[i, 1]
+    for i in range(len(rows)):
+        amount = rows[i, 3] * x + rows[i, 4] * y + rows[i, 5] * z
+        column = rows[i, 0] - aside * rows[i, 1]
+        row = rows[i, 2] - ahead * rows[i, 1]
         if not (amount > np.float32(0.0) and 1.0 <= column < limit and 1.0 <= row < limit):
             continue
         # Spread over three cells each way by a quadratic spline, as the points are not quite even.
@@ -266,7 +265,7 @@ def _blur(grid: Float32, reach: int, room: Float32) -> None:
 
 @compiled
 def _darken(key: Float32, sky: Float32, darkness: UInt8) -> tuple[int, int, int, int]:
-    """Write the darkness of each cell from the number of hidden rays of both lights; returns as `_throw`."""
+    """Write the darkness of each cell from the hidden rays of both lights; returns as `_cast_shadow`."""
     cells = len(darkness)
     left, bottom, right, top = cells, cells, 0, 0
     for row in range(cells):

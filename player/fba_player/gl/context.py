@@ -89,12 +89,12 @@ def missing_text(names: Iterable[str]) -> str:
 
 def cure(error: Exception, package: str) -> str:
     """What to install against an error of an import: the library that it names, else the Python package."""
-    found = re.match(r"(lib\S+): cannot open shared object file", str(error))
-    if found is None:
+    library = re.match(r"(lib\S+): cannot open shared object file", str(error))
+    if library is None:
         return f"Install it with: pip install {package}"
-    if found[1] in PACKAGES:
-        return how_to_install([found[1]])
-    return f"Install the system library {found[1]}"
+    if library[1] in PACKAGES:
+        return how_to_install([library[1]])
+    return f"Install the system library {library[1]}"
 
 
 def _short(error: BaseException) -> str:

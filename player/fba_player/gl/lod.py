@@ -39,8 +39,8 @@ class Details:
     def choose(self, meshes: list[FaceMesh], eye: npt.ArrayLike, pixel: float) -> list[FaceMesh]:
         """The meshes at the levels of detail for a camera at `eye` (3,), with pixels of size `pixel` at a
         distance of 1."""
-        place = np.asarray(eye, dtype=np.float64)
-        return [self._choose(mesh, place, pixel) for mesh in meshes]
+        position = np.asarray(eye, dtype=np.float64)
+        return [self._choose(mesh, position, pixel) for mesh in meshes]
 
     def _choose(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
         coarser = mesh.shape.coarser
@@ -72,7 +72,7 @@ class Details:
 
 def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
     rows, corners = np.unique(triangles, return_inverse=True)
-    kept = replace(
+    coarser = replace(
         shape,
         triangles=np.ascontiguousarray(corners.reshape(-1, 3), dtype=np.int32),
         colours=np.ascontiguousarray(shape.colours[rows]),
@@ -80,7 +80,7 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         texcoords=None if shape.texcoords is None else np.ascontiguousarray(shape.texcoords[rows]),
         coarser=None,
     )
-    return _Level(kept, rows.astype(np.intp))
+    return _Level(coarser, rows.astype(np.intp))
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:

@@ -157,15 +157,15 @@ class Timeline:
     ) -> Array:
         """Rows of many frames. resolve_frame: resolves a frame with its block, which is then in `shown`."""
         blocks = frames // self.block
-        parts = {}
+        parts = []
         for block in np.unique(blocks).tolist():
-            chosen = blocks == block
-            resolve_frame(int(frames[chosen].max()))
-            parts[block] = (chosen, shown[block][frames[chosen] - block * self.block])
-        first = next(iter(parts.values()))[1]
+            in_block = blocks == block
+            resolve_frame(int(frames[in_block].max()))
+            parts.append((in_block, shown[block][frames[in_block] - block * self.block]))
+        first = parts[0][1]
         gathered = np.zeros((len(frames), first.shape[1]), dtype=first.dtype)
-        for chosen, rows in parts.values():
-            gathered[chosen] = rows
+        for in_block, rows in parts:
+            gathered[in_block] = rows
         return gathered
 
     def _face(self, frame: int) -> Float32:

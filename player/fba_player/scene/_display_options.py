@@ -17,7 +17,7 @@ from fba_player.scene._wireframe import Wireframe
 from fba_player.view.switches import Switches
 from fba_player.view.view import Colour, Dots, Extras, FaceMesh, FaceShape, Grid, View
 
-LEFT_OUT = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
+HIDDEN_KINDS = {"eyes": ("eye",), "teeth": ("teeth", "tongue"), "hair": ("hair", "brow", "lash")}
 """Kinds of parts that a switch hides."""
 UNSHADED = (0.9, 0.85, 0.0, 0.25)
 """The light at every vertex when shadows are off."""
@@ -51,8 +51,8 @@ class DisplayOptions:
         self._figure = figure
         self._bones = bones
         self._wires = Wireframe()
-        self._influence: FapHeatmap | None = None
-        self._full: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
+        self._heatmap: FapHeatmap | None = None
+        self._full_shapes: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
         self._scale = figure.scale
 
     @cached_property
@@ -73,18 +73,18 @@ class DisplayOptions:
         extras = Extras()
         number = switches["influence"]
         if number is not None:
-            paint = self._painter(int(number))
-            faces = paint.paint([mesh for mesh in view.faces if mesh.shape.kind not in HAIRS])
-            view = replace(view, faces=faces, meshes=[*view.meshes, *paint.eyes(view.eyes)], eyes=[])
-            extras = replace(extras, legend=paint.legend)
+            heatmap = self._fap_heatmap(int(number))
+            faces = heatmap.paint([mesh for mesh in view.faces if mesh.shape.kind not in HAIRS])
+            view = replace(view, faces=faces, meshes=[*view.meshes, *heatmap.eyes(view.eyes)], eyes=[])
+            extras = replace(extras, legend=heatmap.legend)
         lines = []
         if switches["wireframe"] or switches["normals"]:
-            view = replace(view, faces=[self._in_full(mesh) for mesh in view.faces])
+            view = replace(view, faces=[self._at_full_detail(mesh) for mesh in view.faces])
         if switches["wireframe"]:
             lines.append(self._wires.edges(view.faces, view.meshes, view.eyes, self._scale))
         if switches["normals"]:
-            smooth = [mesh for mesh in view.faces if mesh.shape.kind not in HAIRS]
-            lines.append(self._wires.normals(smooth, self._scale))
+            surfaces = [mesh for mesh in view.faces if mesh.shape.kind not in HAIRS]
+            lines.append(self._wires.normals(surfaces, self._scale))
         if switches["skeleton"] != "off":
             shells = (
                 tuple(mesh for mesh in view.faces if mesh.shape.kind not in INSIDE)
@@ -103,15 +103,15 @@ class DisplayOptions:
         return replace(view, extras=extras, background=background)
 
     def _hide_parts(self, view: View, switches: Switches) -> View:
-        hidden = {kind for name, kinds in LEFT_OUT.items() if not switches[name] for kind in kinds}
+        hidden = {kind for name, kinds in HIDDEN_KINDS.items() if not switches[name] for kind in kinds}
         if hidden:
             view = replace(view, faces=[mesh for mesh in view.faces if mesh.shape.kind not in hidden])
         if "eye" in hidden:
             view = replace(view, eyes=[])
         if not switches["shadows"]:
-            free = np.array(UNSHADED, dtype=np.float32)
+            unshaded = np.array(UNSHADED, dtype=np.float32)
             faces = [
-                replace(mesh, light=np.broadcast_to(free, (len(mesh.positions), len(free))))
+                replace(mesh, light=np.broadcast_to(unshaded, (len(mesh.positions), len(unshaded))))
                 for mesh in view.faces
             ]
             view = replace(view, faces=faces, blobs=view.blobs[:0])
@@ -124,18 +124,18 @@ class DisplayOptions:
         step = 10.0 ** round(np.log10(max(self._scale, 1e-9)) - 1)
         return Grid(lowest, step, (x, z), step * 2 * GRID_REACH)
 
-    def _in_full(self, mesh: FaceMesh) -> FaceMesh:
+    def _at_full_detail(self, mesh: FaceMesh) -> FaceMesh:
         """The mesh without levels of detail, as lines lie on all its triangles."""
         if mesh.shape.coarser is None:
             return mesh
-        if mesh.shape not in self._full:
-            self._full[mesh.shape] = replace(mesh.shape, coarser=None)
-        return replace(mesh, shape=self._full[mesh.shape])
+        if mesh.shape not in self._full_shapes:
+            self._full_shapes[mesh.shape] = replace(mesh.shape, coarser=None)
+        return replace(mesh, shape=self._full_shapes[mesh.shape])
 
-    def _painter(self, number: int) -> FapHeatmap:
-        if self._influence is None or self._influence.fap.number != number:
-            self._influence = FapHeatmap(self._figure, number)
-        return self._influence
+    def _fap_heatmap(self, number: int) -> FapHeatmap:
+        if self._heatmap is None or self._heatmap.fap.number != number:
+            self._heatmap = FapHeatmap(self._figure, number)
+        return self._heatmap
 
     def _skeleton(self, posture: Posture) -> Float32:
         """Capsules of all joints of the body and of the head."""

@@ -35,21 +35,21 @@ class Extent:
     @property
     def upper_half(self) -> Subject:
         """The subject from the hips up."""
-        whole = self.subject
-        top = whole.centre[1] + whole.half_height
+        subject = self.subject
+        x, y, z = subject.centre
+        top = y + subject.half_height
         bottom = min(HIPS, top - 0.8)
-        x, _, z = whole.centre
-        half_width = min(whole.half_width, 0.55)
-        return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, half_width, whole.half_depth)
+        half_width = min(subject.half_width, 0.55)
+        return Subject((x, (top + bottom) / 2, z), (top - bottom) / 2, half_width, subject.half_depth)
 
 
-def body_extent(places: Float64, names: tuple[str, ...]) -> Extent:
-    """The extent of joints at places (T, J, 3), metres, the root first, over T moments."""
-    legs = places[:, [names.index(name) for name in LEGS if name in names]]
+def body_extent(positions: Float64, names: tuple[str, ...]) -> Extent:
+    """The extent of joints at positions (T, J, 3), metres, the root first, over T moments."""
+    legs = positions[:, [names.index(name) for name in LEGS if name in names]]
     legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > STANDING)
-    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
     if not np.isfinite(high - low).all() or (high - low).max() > MOST_TRAVEL:
-        x, y, z = (float(v) for v in places[0, 0])
+        x, y, z = (float(v) for v in positions[0, 0])
         subject = Subject((x, y - 0.09, z), BODY_SUBJECT.half_height, BODY_SUBJECT.half_width)
         return Extent(subject, follows=True, legs_move=legs_move)
     low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, 0.14, 0.10])
@@ -57,7 +57,7 @@ def body_extent(places: Float64, names: tuple[str, ...]) -> Extent:
     x, y, z = (float(v) for v in (low + high) / 2)
     wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     tall = max(float(high[1] - low[1]) / 2 * 1.06, 0.9)
-    path = places[:, 0, [0, 2]]
+    path = positions[:, 0, [0, 2]]
     towards = float(np.linalg.norm(path - (x, z), axis=1).max())  # from any side
     subject = Subject((x, y, z), tall, max(wide, BODY_SUBJECT.half_width), max(towards - NEAR, 0.0))
     return Extent(subject, follows=False, legs_move=legs_move)

@@ -32,10 +32,10 @@ def move_view(view: View, offset: Float64) -> View:
         meshes=[replace(mesh, matrix=shift @ mesh.matrix) for mesh in view.meshes],
         faces=[replace(mesh, matrix=shift @ mesh.matrix) for mesh in view.faces],
         eyes=[replace(eye, matrix=shift @ eye.matrix) for eye in view.eyes],
-        capsules=_moved_capsules(view.capsules, offset),
-        marks=_moved_capsules(view.marks, offset),
+        capsules=_move_capsules(view.capsules, offset),
+        marks=_move_capsules(view.marks, offset),
         blobs=view.blobs + flat if len(view.blobs) else view.blobs,
-        extras=None if view.extras is None else _moved_extras(view.extras, offset),
+        extras=None if view.extras is None else _move_extras(view.extras, offset),
     )
 
 
@@ -81,14 +81,14 @@ class Drawing:
         long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > JOINT
         lines = Lines(ends[long], (*self._ink, 0.95), BONE_WIDTH, BONE_LIFT)
         return View(
-            meshes=[replace(mesh, shape=self._tinted(mesh.shape)) for mesh in view.meshes],
-            marks=self._painted(view.marks),
+            meshes=[replace(mesh, shape=self._tint(mesh.shape)) for mesh in view.meshes],
+            marks=self._paint(view.marks),
             blobs=view.blobs,
             ground=view.ground,
             extras=Extras(lines=(lines,)) if long.any() else None,
         )
 
-    def _tinted(self, shape: MeshShape) -> MeshShape:
+    def _tint(self, shape: MeshShape) -> MeshShape:
         if id(shape) not in self._shapes:
             colours = np.empty_like(shape.colours)
             colours[:] = (*self._colour, 0.0)
@@ -96,19 +96,19 @@ class Drawing:
             self._shapes[id(shape)] = (shape, tinted)
         return self._shapes[id(shape)][1]
 
-    def _painted(self, capsules: Float32) -> Float32:
+    def _paint(self, capsules: Float32) -> Float32:
         painted = capsules.copy()
         painted[:, 12:15] = self._colour
         return painted
 
 
-def caption(text: str, place: Float64) -> Extras:
+def make_caption(text: str, position: Float64) -> Dots:
     """A label at a point."""
-    at = np.asarray(place, dtype=np.float32)[None]
-    return Extras(dots=(Dots(at, (1.0, 1.0, 1.0, 1.0), 0.0, 1.0, (text,), np.zeros((1, 3), np.float32)),))
+    points = np.asarray(position, dtype=np.float32)[None]
+    return Dots(points, (1.0, 1.0, 1.0, 1.0), 0.0, 1.0, (text,), np.zeros((1, 3), np.float32))
 
 
-def _moved_capsules(capsules: Float32, offset: Float64) -> Float32:
+def _move_capsules(capsules: Float32, offset: Float64) -> Float32:
     if not len(capsules):
         return capsules
     shifted = capsules.copy()
@@ -117,7 +117,7 @@ def _moved_capsules(capsules: Float32, offset: Float64) -> Float32:
     return shifted
 
 
-def _moved_extras(extras: Extras, offset: Float64) -> Extras:
+def _move_extras(extras: Extras, offset: Float64) -> Extras:
     shift, by = translation(offset), offset.astype(np.float32)
     grid = extras.grid
     if grid is not None:

@@ -11,13 +11,13 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba_player.scene._compare_timeline import CompareTimeline
-from fba_player.scene._layout import Drawing, caption, join_views, move_view
+from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
 from fba_player.scene.differences import Differences, differences
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
-from fba_player.view.view import View, srgb
+from fba_player.view.view import Extras, View, srgb
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -62,8 +62,6 @@ class CompareScene(Timed[CompareTimeline]):
         self._drawings = [_drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
-
-    # ---- the protocol of a scene
 
     @property
     def arrangement(self) -> str:
@@ -134,8 +132,10 @@ class CompareScene(Timed[CompareTimeline]):
     @property
     def gesture_subject(self) -> Subject | None:
         """All figures from the hips up if that shows all that moves, else None."""
-        found = [scene.gesture_subject if scene.has_body else scene.subject for scene in self.scenes]
-        return self._all([one for one in found if one is not None]) if all(found) and self.has_body else None
+        subjects = [scene.gesture_subject if scene.has_body else scene.subject for scene in self.scenes]
+        if not self.has_body or not all(subjects):
+            return None
+        return self._all([subject for subject in subjects if subject is not None])
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """A camera that has all figures in view; from now on they stand side by side as it sees them.
@@ -144,10 +144,10 @@ class CompareScene(Timed[CompareTimeline]):
         """
         if preset is not None and preset not in PRESETS:
             raise ValueError(f"no camera preset {preset!r}; there are {', '.join(PRESETS)}")
-        own = self.scenes[0].camera(preset, aspect)
+        camera = self.scenes[0].camera(preset, aspect)
         if self._arrangement == "side" and len(self.scenes) > 1:
-            own = replace(own, field_of_view=FIELD_OF_VIEW)
-        self._yaw = own.yaw
+            camera = replace(camera, field_of_view=FIELD_OF_VIEW)
+        self._yaw = camera.yaw
         upper = [scene.gesture_subject or scene.face_subject for scene in self.scenes if scene.has_body]
         still = all(scene.gesture_subject for scene in self.scenes if scene.has_body)
         if not self.has_body or preset == "body" or (preset is None and not still):
@@ -159,7 +159,7 @@ class CompareScene(Timed[CompareTimeline]):
         else:
             subjects = [scene.face_subject for scene in self.scenes]
             self._apart = SHOULDERS
-        return own.fit(self._all(subjects), aspect)
+        return camera.fit(self._all(subjects), aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
         """Offset of a following camera at a time, metres: the first scene's."""
@@ -171,19 +171,18 @@ class CompareScene(Timed[CompareTimeline]):
         if self._arrangement == "over":
             return self._over(times)
         views = []
-        gone = np.array(self.scenes[0].travel(times[0]))
-        for number, (scene, own) in enumerate(zip(self.scenes, times, strict=True)):
-            view = move_view(scene.view_at(own), self._place(number) + gone - np.array(scene.travel(own)))
+        travelled = np.array(self.scenes[0].travel(times[0]))
+        for number, (scene, own_time) in enumerate(zip(self.scenes, times, strict=True)):
+            shift = self._shift(number) + travelled - np.array(scene.travel(own_time))
+            view = move_view(scene.view_at(own_time), shift)
             if self.names[number] and len(self.scenes) > 1:
-                view = _captioned(view, self.names[number], self._caption_place(number) + gone)
+                view = _add_caption(view, self.names[number], self._caption_position(number) + travelled)
             views.append(view)
         return join_views(views)
 
     def still(self, faps: Float32) -> View:
         """The first scene alone for FAPs (68,)."""
         return self.scenes[0].still(faps)
-
-    # ---- comparing
 
     def differences(self, second: int = 1) -> Differences:
         """Performance `second` minus the first; cached until more of a performance arrives.
@@ -192,23 +191,23 @@ class CompareScene(Timed[CompareTimeline]):
         """
         key = (second, self.timeline.arrived)
         if key not in self._differences:
-            found = differences(self.timeline, second)
-            self._differences = {k: v for k, v in self._differences.items() if k[1] == key[1]} | {key: found}
+            current = {old: value for old, value in self._differences.items() if old[1] == key[1]}
+            self._differences = current | {key: differences(self.timeline, second)}
         return self._differences[key]
-
-    # ---- inside
 
     def _over(self, times: list[float]) -> View:
         base = self.scenes[0].view_at(times[0])
-        gone = np.array(self.scenes[0].travel(times[0]))
+        travelled = np.array(self.scenes[0].travel(times[0]))
         views = [base]
-        for number, (scene, own) in enumerate(list(zip(self.scenes, times, strict=True))[1:], 1):
-            kept, scene.view = scene.view, "points"
+        for number, (scene, own_time) in enumerate(list(zip(self.scenes, times, strict=True))[1:], 1):
+            before, scene.view = scene.view, "points"
             try:
-                drawn = self._drawings[number - 1](scene.view_at(own), _eyes(scene))
+                drawn = self._drawings[number - 1](scene.view_at(own_time), len(scene.figure.eyeballs))
             finally:
-                scene.view = kept
-            views.append(move_view(drawn, self._height(number) + gone - np.array(scene.travel(own))))
+                scene.view = before
+            views.append(
+                move_view(drawn, self._height(number) + travelled - np.array(scene.travel(own_time)))
+            )
         return join_views(views)
 
     def _right(self) -> Float64:
@@ -216,7 +215,7 @@ class CompareScene(Timed[CompareTimeline]):
         yaw = math.radians(self._yaw)
         return np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
 
-    def _place(self, number: int) -> Float64:
+    def _shift(self, number: int) -> Float64:
         """(3,): the shift of a figure in the arrangement."""
         if self._arrangement == "over":
             return self._height(number)
@@ -228,37 +227,37 @@ class CompareScene(Timed[CompareTimeline]):
         """Half the width that each figure takes; heads take less than whole bodies."""
         if self._apart is not None:
             return self._apart
-        kin = [one.subject.half_width for one in self.scenes if one.has_body == scene.has_body]
-        return max(*kin, SHOULDERS) if self.has_body else max(kin)
+        alike = [one.subject.half_width for one in self.scenes if one.has_body == scene.has_body]
+        return max(*alike, SHOULDERS) if self.has_body else max(alike)
 
     def _height(self, number: int) -> Float64:
         """(3,): the shift that brings a head alone to the height of heads on bodies."""
         scene = self.scenes[number]
-        whole = next((one for one in self.scenes if one.has_body), None)
-        if scene.has_body or whole is None:
+        with_body = next((one for one in self.scenes if one.has_body), None)
+        if scene.has_body or with_body is None:
             return np.zeros(3)
-        return np.subtract(whole.face_subject.centre, scene.face_subject.centre)
+        return np.subtract(with_body.face_subject.centre, scene.face_subject.centre)
 
-    def _caption_place(self, number: int) -> Float64:
+    def _caption_position(self, number: int) -> Float64:
         head = self.scenes[number].face_subject
         x, y, z = head.centre
-        return np.asarray(np.array([x, y + head.half_height * ABOVE, z]) + self._place(number))
+        return np.asarray(np.array([x, y + head.half_height * ABOVE, z]) + self._shift(number))
 
     def _all(self, subjects: list[Subject]) -> Subject:
         """One subject around all subjects in their places."""
         right = self._right()
-        places = [np.array(one.centre) + self._place(n) for n, one in enumerate(subjects)]
-        along = [float(place @ right) for place in places]
+        centres = [np.array(one.centre) + self._shift(n) for n, one in enumerate(subjects)]
+        along = [float(centre @ right) for centre in centres]
         widths = [
             max(one.half_width, (self._apart or 0.0) * 0.7, SHOULDERS if self.has_body else 0.0)
             for one in subjects
         ]
         low = min(a - width for a, width in zip(along, widths, strict=True))
         high = max(a + width for a, width in zip(along, widths, strict=True))
-        bottom = min(float(p[1]) - s.half_height for p, s in zip(places, subjects, strict=True))
+        bottom = min(float(p[1]) - s.half_height for p, s in zip(centres, subjects, strict=True))
         room = 1.05 if any(self.names) and self._arrangement == "side" else 1.0  # for captions
-        top = max(float(p[1]) + s.half_height * room for p, s in zip(places, subjects, strict=True))
-        middle = np.mean(places, axis=0)
+        top = max(float(p[1]) + s.half_height * room for p, s in zip(centres, subjects, strict=True))
+        middle = np.mean(centres, axis=0)
         middle = middle + right * ((low + high) / 2 - float(middle @ right))
         centre = (float(middle[0]), (bottom + top) / 2, float(middle[2]))
         return Subject(centre, (top - bottom) / 2, (high - low) / 2)
@@ -269,12 +268,6 @@ def _drawing(colour: str) -> Drawing:
     return Drawing(srgb(colour), (red, green, blue))
 
 
-def _eyes(scene: Scene) -> int:
-    return len(scene.figure.eyes(np.zeros(68, dtype=np.float32), np.eye(4)))
-
-
-def _captioned(view: View, text: str, place: Float64) -> View:
-    words = caption(text, place)
-    if view.extras is None:
-        return replace(view, extras=words)
-    return replace(view, extras=replace(view.extras, dots=(*view.extras.dots, *words.dots)))
+def _add_caption(view: View, text: str, position: Float64) -> View:
+    extras = view.extras or Extras()
+    return replace(view, extras=replace(extras, dots=(*extras.dots, make_caption(text, position))))

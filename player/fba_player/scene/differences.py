@@ -54,7 +54,7 @@ class Differences:
 
     def largest(self, count: int = 10) -> list[Largest]:
         """The `count` parameters with the largest differences in quantiser steps, largest first."""
-        found = []
+        largest = []
         columns = [("fap", fap.number, fap.name, fap.step) for fap in faps()]
         columns += [("bap", bap.number, bap.name, bap.step_iso) for bap in baps()]
         for kind, number, name, step in columns:
@@ -62,14 +62,14 @@ class Differences:
             course = values[:, number - 1].astype(np.float64)
             if not course.any():
                 continue
-            at = int(np.abs(course).argmax())
+            row = int(np.abs(course).argmax())
             item = Largest(
-                kind, number, name, units[number - 1], float(abs(course[at])), float(self.times[at]),
+                kind, number, name, units[number - 1], float(abs(course[row])), float(self.times[row]),
                 float(np.sqrt(np.mean(course**2))),
             )  # fmt: skip
-            found.append((item.most / max(step, 1), item))
-        found.sort(key=lambda pair: -pair[0])
-        return [item for _, item in found[:count]]
+            largest.append((item.most / max(step, 1), item))
+        largest.sort(key=lambda pair: -pair[0])
+        return [item for _, item in largest[:count]]
 
 
 def differences(timeline: CompareTimeline, second: int = 1) -> Differences:

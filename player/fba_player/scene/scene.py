@@ -68,7 +68,7 @@ class Scene(Timed[Timeline]):
         self._person: Person | None = None
         self._options: DisplayOptions | None = None
         self._extent: Extent | None = None
-        self._fitted = 0  # number of frames when the extent was sampled
+        self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
             from fba.body import BapSolver
             from fba.body.model import BodyModel
@@ -128,14 +128,14 @@ class Scene(Timed[Timeline]):
     @property
     def subject(self) -> Subject:
         """What a camera should have in view over the whole performance."""
-        return self._framed().subject if self.has_body else self.figure.subject
+        return self._sampled_extent().subject if self.has_body else self.figure.subject
 
     @property
     def gesture_subject(self) -> Subject | None:
         """The body from the hips up if the legs stand still and the face is animated, else None."""
-        if not self.has_body or self.animation.face is None or self._framed().legs_move:
+        if not self.has_body or self.animation.face is None or self._sampled_extent().legs_move:
             return None
-        return self._framed().upper_half
+        return self._sampled_extent().upper_half
 
     @property
     def face_subject(self) -> Subject:
@@ -143,7 +143,7 @@ class Scene(Timed[Timeline]):
         face = self.figure.subject
         if not self.has_body:
             return face
-        faps, joints = self._posed(float(self.start))
+        faps, joints = self._pose_at(float(self.start))
         matrix = self._face_matrix(joints) @ self.figure.pose(faps).turn
         x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3]
         return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
@@ -156,28 +156,28 @@ class Scene(Timed[Timeline]):
         """
         if preset is None:
             return default_camera(self, aspect)
-        whole = self.has_body and preset == "body"
-        return Camera.preset(preset, self.subject if whole else self.face_subject, aspect)
+        subject = self.subject if self.has_body and preset == "body" else self.face_subject
+        return Camera.preset(preset, subject, aspect)
 
     def view_for(self, faps: Float32, baps: Float64) -> View:
         """The view for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), not the animation's.
 
         baps are ignored if the animation has no body.
         """
-        return self._shown(faps, self._solver.pose(baps) if self.has_body else None)
+        return self._make_view(faps, self._solver.pose(baps) if self.has_body else None)
 
     def still(self, faps: Float32) -> View:
         """The view for FAPs (68,), in the body's pose at the start."""
-        return self._shown(faps, self._posed(float(self.start))[1])
+        return self._make_view(faps, self._pose_at(float(self.start))[1])
 
     def view_at(self, time: float) -> View:
         """The view at a time in seconds; before the start or after the end, the first or last frame.
 
         Raises ValueError if the time is not finite.
         """
-        return self._shown(*self._posed(time))
+        return self._make_view(*self._pose_at(time))
 
-    def _shown(self, faps: Float32, joints: Float64 | None) -> View:
+    def _make_view(self, faps: Float32, joints: Float64 | None) -> View:
         view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
         if not self.switches.changed:
             return view
@@ -220,14 +220,14 @@ class Scene(Timed[Timeline]):
 
     def travel(self, time: float) -> tuple[float, float, float]:
         """Offset (x, y, z) of a following camera at a time, metres; zeros if it does not follow."""
-        if not self.has_body or not self._framed().follows:
+        if not self.has_body or not self._sampled_extent().follows:
             return (0.0, 0.0, 0.0)
-        joints = self._posed(time)[1]
+        joints = self._pose_at(time)[1]
         assert joints is not None
         centre = self.subject.centre
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
 
-    def _posed(self, time: float) -> tuple[Float32, Float64 | None]:
+    def _pose_at(self, time: float) -> tuple[Float32, Float64 | None]:
         faps = self.timeline.faps(time)
         if not self.has_body:
             return faps, None
@@ -237,12 +237,12 @@ class Scene(Timed[Timeline]):
         """(4, 4): from the face model's frame into the world, without the head's own turn."""
         return np.eye(4) if joints is None else self.person.frame(joints)
 
-    def _framed(self) -> Extent:
+    def _sampled_extent(self) -> Extent:
         frames = self.timeline.frames
-        if self._extent is None or frames >= 2 * self._fitted:  # a stream has grown by much
-            self._fitted = frames
-            chosen = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
-            baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in chosen])
+        if self._extent is None or frames >= 2 * self._sampled_frames:  # a stream has grown by much
+            self._sampled_frames = frames
+            sampled = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
+            baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in sampled])
             self._extent = body_extent(self._solver.pose(baps)[:, :, :3, 3], self._skeleton.names)
         return self._extent
 

@@ -42,7 +42,7 @@ class Viewpoint:
         self.aspect = aspect
         self.covered = 0.0
         self.follow = True
-        self._chosen = camera
+        self._first_view = camera
         self._clock = clock
         self._from = self._to = self.beginning
         self._until = -math.inf
@@ -71,7 +71,7 @@ class Viewpoint:
     @property
     def beginning(self) -> Camera:
         """The first view, fitted to the current shape of the picture."""
-        return self._chosen if isinstance(self._chosen, Camera) else self.fit(self._chosen)
+        return self._first_view if isinstance(self._first_view, Camera) else self.fit(self._first_view)
 
     def fit(self, preset: str | None) -> Camera:
         """The camera of a preset, fitted above what is covered; None: the view that suits the content."""
@@ -113,7 +113,7 @@ class Viewpoint:
         """Glide back to the first view."""
         self.follow = True
         self.glide(self.beginning)
-        self._preset = self._chosen if not isinstance(self._chosen, Camera) else ""
+        self._preset = self._first_view if not isinstance(self._first_view, Camera) else ""
 
     def camera_without_panels(self, time: float) -> Camera:
         """The camera at a time in seconds, for a picture without panels at the sides."""

@@ -41,7 +41,7 @@ def keys() -> tuple[Key, ...]:
             held=bool(row["held"]),
             group=row["group"],
             does=row["does"],
-            shown=", ".join(_shown(key) for key in row["keys"].split()),
+            shown=", ".join(_key_text(key) for key in row["keys"].split()),
         )
         for row in _rows("keys.csv")
     )
@@ -62,10 +62,10 @@ def by_name() -> dict[str, Key]:
 @cache
 def key_of(action: str) -> str:
     """The first key of an action, as shown to users; "" if it has none."""
-    return next((_shown(row.keys[0]) for row in keys() if row.action == action), "")
+    return next((_key_text(row.keys[0]) for row in keys() if row.action == action), "")
 
 
-def _shown(key: str) -> str:
+def _key_text(key: str) -> str:
     return key if len(key) == 1 else "+".join(part[:1].upper() + part[1:] for part in key.split("+"))
 
 

@@ -122,10 +122,11 @@ class Source:
         from fba.formats import format_of, probe
 
         try:
-            if self.path is not None and (found := format_of(self.path).name) == "fba":
+            name = format_of(self.path).name if self.path is not None else ""
+            if self.path is not None and name == "fba":
                 self._probed = probe(self.path, bap_steps=self.bap_steps)
             elif self.path is not None:  # described by the animation, whose rate the user may have set
-                self._format_and_size = (found, os.stat(self.path).st_size)
+                self._format_and_size = (name, os.stat(self.path).st_size)
                 self._scene_info = None
         except (FbaError, OSError) as error:
             self.warnings.append(f"the planes of the file cannot be read: {error}")

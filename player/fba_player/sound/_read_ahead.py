@@ -79,8 +79,8 @@ class SoundBlocks:
 
     def _run(self) -> None:
         while not self._closing.is_set():
-            found = False
+            loaded = False
             with contextlib.suppress(FbaError, OSError):  # a file that went away is silent
-                found = self.load()
-            if not found:
+                loaded = self.load()
+            if not loaded:
                 self._closing.wait(PAUSE)

@@ -90,7 +90,7 @@ class SoundFile:
         at = self._next
         if at is None or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP * self.rate:
             at = self._seek(start)
-        found: list[Int16] = []
+        pieces: list[Int16] = []
         while missing > 0:
             self._rest = self._rest[max(start - at + len(self._rest), 0) :]
             if not len(self._rest):
@@ -101,10 +101,10 @@ class SoundFile:
                 continue
             taken = self._rest[:missing]
             self._rest = self._rest[len(taken) :]
-            found.append(taken)
+            pieces.append(taken)
             start, missing = start + len(taken), missing - len(taken)
         self._next = at
-        return np.concatenate([np.zeros((0, CHANNELS), dtype=np.int16), *found])
+        return np.concatenate([np.zeros((0, CHANNELS), dtype=np.int16), *pieces])
 
     def close(self) -> None:
         """Close the file; safe to call twice."""
@@ -218,11 +218,11 @@ class _Converter:
             held = self._resampler.resample(None)
             self._resampler = self._new_resampler()
             pieces = held + self._resampler.resample(frame)
-        found = []
+        parts = []
         for piece in pieces:
             samples = np.asarray(piece.to_ndarray(), dtype=np.int16).reshape(-1, self._sides)
-            found.append(np.broadcast_to(samples, (len(samples), CHANNELS)))
-        return found
+            parts.append(np.broadcast_to(samples, (len(samples), CHANNELS)))
+        return parts
 
     def _new_resampler(self) -> Any:
         layout = "mono" if self._sides == 1 else "stereo"

@@ -38,9 +38,9 @@ def find_sound_beside(path: PathLike) -> Path | None:
     """The WAV file of the same name in the folder of a stream; None where there is none."""
     stream = Path(path)
     for suffix in (".wav", ".WAV", ".Wav"):
-        found = stream.with_suffix(suffix)
-        if found != stream and found.is_file():
-            return found
+        sound = stream.with_suffix(suffix)
+        if sound != stream and sound.is_file():
+            return sound
     return None
 
 

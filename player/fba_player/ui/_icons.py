@@ -6,11 +6,8 @@ Each is a function of (draw list, centre x, centre y, half size, colour).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from imgui_bundle import imgui
-
-Sign = Callable[[imgui.ImDrawList, float, float, float, int], None]
 
 
 def play(to: imgui.ImDrawList, x: float, y: float, r: float, colour: int) -> None:

@@ -32,7 +32,7 @@ class Buttons:
             self._clock(session, y, full=wide >= 860)
         centre = wide / 2
         size, gap, big = 30.0, 4.0, 38.0
-        signs = [
+        buttons = [
             ("first", icons.first, "first frame"),
             ("back", icons.back, "one frame back"),
             ("toggle", icons.pause if transport.playing else icons.play, "play, pause"),
@@ -40,23 +40,23 @@ class Buttons:
             ("last", icons.last, "last frame"),
         ]
         x = centre - (4 * size + big + 4 * gap) / 2
-        for action, sign, text in signs:
+        for action, icon, text in buttons:
             mine = big if action == "toggle" else size
             imgui.set_cursor_screen_pos((x, y - (mine - size) / 2))
-            if icon_button(action, sign, mine, filled=action == "toggle"):
+            if icon_button(action, icon, mine, filled=action == "toggle"):
                 act(session, action)
             tooltip(text, key_of(action))
             x += mine + gap
         if wide >= 460:
             x += 10
-            for action, sign, text, lit in (
+            for action, icon, text, lit in (
                 ("mark_in", icons.mark_in, "start of the loop here", transport.mark_in is not None),
                 ("mark_out", icons.mark_out, "end of the loop here", transport.mark_out is not None),
                 ("loop", icons.loop, "loop", transport.loop),
             ):
                 imgui.set_cursor_screen_pos((x, y))
                 colour = theme.WARM if lit and action != "loop" else None
-                if icon_button(action, sign, size, lit=lit, colour=colour):
+                if icon_button(action, icon, size, lit=lit, colour=colour):
                     act(session, action)
                 tooltip(text, key_of(action))
                 x += size + gap
@@ -78,7 +78,7 @@ class Buttons:
     def _right(self, session: Session, wide: float, y: float, taken: float) -> None:
         transport = session.transport
         size, gap = 30.0, 4.0
-        signs = [
+        buttons = [
             ("fullscreen", icons.full_screen, "full screen", False),
             ("record", icons.record, "record to an MP4 file", session.recording is not None),
             ("screenshot", icons.camera, "picture of the view", False),
@@ -95,14 +95,14 @@ class Buttons:
             if session.sound_offset:
                 way = "later" if session.sound_offset > 0 else "earlier"
                 text += f"\nbegins {abs(session.sound_offset):.2f} s {way}"
-            signs.append(("mute", icons.muted if quiet else icons.sound, text, False))
+            buttons.append(("mute", icons.muted if quiet else icons.sound, text, False))
         x = wide - MARGIN + gap
-        for action, sign, text, lit in signs:
+        for action, icon, text, lit in buttons:
             x -= size + gap
             if x < taken + 8:
                 return
             imgui.set_cursor_screen_pos((x, y))
-            if icon_button(action, sign, size, colour=theme.ALERT if lit else None):
+            if icon_button(action, icon, size, colour=theme.ALERT if lit else None):
                 act(session, action)
             if action == "mute" and session.audio is not None and imgui.is_item_hovered():
                 louder = session.audio.volume + 0.05 * imgui.get_io().mouse_wheel

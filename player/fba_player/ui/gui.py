@@ -106,11 +106,11 @@ class Gui:
     def _popups(self) -> None:
         """Tell the session whether a list is open, and close it if the session asks for that."""
         flags = imgui.PopupFlags_
-        there = imgui.is_popup_open("", flags.any_popup_id | flags.any_popup_level)
-        if there and self._listed and not self.session.popup:
+        is_open = imgui.is_popup_open("", flags.any_popup_id | flags.any_popup_level)
+        if is_open and self._listed and not self.session.popup:
             imgui.internal.close_popup_to_level(0, True)
-            there = False
-        self._listed = self.session.popup = there
+            is_open = False
+        self._listed = self.session.popup = is_open
 
     def _cover(self) -> None:
         """Tell the camera how much of the picture the bar covers."""
@@ -126,19 +126,19 @@ class Gui:
         if self.shown > 0:
             imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
             self.bar.draw(session, display)
-            there = [panel for panel in self.panels if panel.available(session)]
-            draw_name(session, display, taken, draw_buttons(session, there, display) - 20)
+            available = [panel for panel in self.panels if panel.available(session)]
+            draw_name(session, display, taken, draw_buttons(session, available, display) - 20)
             imgui.pop_style_var()
-        gone = self._open - session.open
-        self._panel_windows.forget(gone)
+        closed = self._open - session.open
+        self._panel_windows.forget(closed)
         for panel in self.panels:
-            if panel.name in gone:
+            if panel.name in closed:
                 panel.closed(session)
             elif panel.name in session.open and not panel.available(session):
                 session.open.discard(panel.name)
                 session.say(f"{panel.title}: there is nothing to show here", "warning")
-        there = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
-        self._panel_windows.draw(there, session, display, below)
+        shown = [panel for panel in self.panels if panel.name in session.open and panel.available(session)]
+        self._panel_windows.draw(shown, session, display, below)
         self._open = set(session.open)
 
     def _hide(self, io: imgui.IO) -> None:

@@ -58,7 +58,7 @@ def apply_theme() -> None:
     style.hover_stationary_delay = 0.35
     style.disabled_alpha = 0.45
     kinds = imgui.Col_
-    chosen: dict[imgui.Col_, Colour] = {
+    colours: dict[imgui.Col_, Colour] = {
         kinds.text: TEXT,
         kinds.text_disabled: FAINT,
         kinds.window_bg: GROUND,
@@ -102,7 +102,7 @@ def apply_theme() -> None:
         kinds.table_header_bg: (1, 1, 1, 0.05),
         kinds.nav_cursor: ACCENT,
     }
-    for kind, colour in chosen.items():
+    for kind, colour in colours.items():
         style.set_color_(kind, imgui.ImVec4(*colour))
     style.font_size_base = FONT_SIZE
     _load_font()

@@ -148,8 +148,8 @@ def main(arguments: list[str]) -> int:
     session.transport.seek(given.time)
     if given.marks:
         session.transport.mark_in, session.transport.mark_out = (float(m) for m in given.marks.split(","))
-    chosen = tuple(name for name in given.panels.split(",") if name)
-    Image.fromarray(picture(session, chosen)).convert("RGB").save(given.output)
+    panels = tuple(name for name in given.panels.split(",") if name)
+    Image.fromarray(picture(session, panels)).convert("RGB").save(given.output)
     return 0
 
 

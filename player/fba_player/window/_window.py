@@ -41,7 +41,7 @@ IDLE = 0.05
 """Seconds to wait for input while nothing moves."""
 FASTEST = 1 / 250
 """Least seconds per picture, for displays that do not limit the rate."""
-WARNED = 12.0
+WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
 IDLE_MOUSE = 3.0
 """Seconds after which the mouse cursor is hidden, in full screen while playing."""
@@ -112,7 +112,7 @@ class Window:
         timeline = self._timeline
         if isinstance(timeline, LiveTimeline) and timeline.animation.doubt and not self._doubted:
             self._doubted = True
-            self.session.say(timeline.animation.doubt, "warning", WARNED)
+            self.session.say(timeline.animation.doubt, "warning", WARNING_SECONDS)
 
     def update(self) -> bool:
         """Handle input and draw one picture, or wait if nothing moves. Returns False once closed."""

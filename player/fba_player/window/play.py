@@ -16,7 +16,7 @@ from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
 from fba_player.session.source import Source
 from fba_player.view.camera import Camera
-from fba_player.window._window import WARNED, Window
+from fba_player.window._window import WARNING_SECONDS, Window
 
 if TYPE_CHECKING:
     from fba_player.sound.player import Audio
@@ -71,7 +71,7 @@ def play(
         window.transport.interpolate = interpolate
         window.session.open |= set(panels)
         for text in warnings:
-            window.session.say(text, "warning", WARNED)
+            window.session.say(text, "warning", WARNING_SECONDS)
         with contextlib.ExitStack() as stack:
             if audio is not None:
                 sound = _add_sound(window.session, audio, audio_offset)

@@ -56,8 +56,8 @@ def measure_rates(info: StreamInfo) -> Rates | None:
     first = min(int(np.searchsorted(times, times[0] + WINDOW - 1 / float(info.rate) - 1e-9)), len(times) - 1)
     all_bits = max(8 * info.size, int(bits.sum()), 1)
     rows = [
-        Total(name, int(chosen.sum()), int(bits[chosen].sum()), float(bits[chosen].sum()) / all_bits)
-        for name, chosen in (("I planes", intra), ("P planes", ~intra))
+        Total(name, int(kind.sum()), int(bits[kind].sum()), float(bits[kind].sum()) / all_bits)
+        for name, kind in (("I planes", intra), ("P planes", ~intra))
     ]
     rest = 8 * info.size - int(bits.sum())
     if rest > 0:
@@ -90,7 +90,7 @@ def bars_of_planes(
     if not high > low:
         return tall, key
     seen = (times >= low - 1e-9) & (times <= high + 1e-9)
-    places = np.clip(((times[seen] - low) / (high - low) * count).astype(int), 0, count - 1)
-    np.maximum.at(tall, places, bits[seen])
-    key[places[intra[seen]]] = True
+    columns = np.clip(((times[seen] - low) / (high - low) * count).astype(int), 0, count - 1)
+    np.maximum.at(tall, columns, bits[seen])
+    key[columns[intra[seen]]] = True
     return tall, key

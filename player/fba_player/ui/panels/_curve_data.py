@@ -108,13 +108,13 @@ class Courses:
 
         Of FAPs that mirror each other, only one.
         """
-        found: list[tuple[float, str, int]] = []
+        spans: list[tuple[float, str, int]] = []
         animation, frames = self._timeline.animation, len(self._times)
         if animation.face is not None and self._done:
             shown = self._shown[: self._done]
             span = shown.max(axis=0) - shown.min(axis=0)
             weight = np.where(animation.face.mask[: self._done].any(axis=0), 1.0, FILLED_IN_WEIGHT)
-            found += [
+            spans += [
                 (float(span[number - 1] * weight[number - 1]) / reach(number), "fap", number)
                 for number in range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1)
             ]
@@ -124,13 +124,13 @@ class Courses:
             high = np.max(values, axis=0, where=mask, initial=-(2**31))
             for number in range(1, BAP_COUNT + 1):
                 span_here = max(float(high[number - 1]) - float(low[number - 1]), 0.0)
-                found.append((span_here / bap_reach(number), "bap", number))
-        found.sort(key=lambda one: (-one[0], one[1:]))
-        chosen: list[tuple[str, int]] = []
-        for most, kind, number in found:
-            if most > 0 and not _is_mate(kind, number, chosen):
-                chosen.append((kind, number))
-        return chosen[:count]
+                spans.append((span_here / bap_reach(number), "bap", number))
+        spans.sort(key=lambda one: (-one[0], one[1:]))
+        movers: list[tuple[str, int]] = []
+        for span_here, kind, number in spans:
+            if span_here > 0 and not _is_mate(kind, number, movers):
+                movers.append((kind, number))
+        return movers[:count]
 
     def _fap(self, number: int) -> Course:
         face, done = self._timeline.animation.face, self._done
@@ -173,14 +173,14 @@ def bap_reach(number: int) -> float:
     return float(np.radians(TYPICAL_ANGLE * (2 if root else 1)) * 1e5)
 
 
-def _is_mate(kind: str, number: int, chosen: list[tuple[str, int]]) -> bool:
-    """Whether a FAP is the mate of a chosen one, on the other side or on the other lip contour."""
+def _is_mate(kind: str, number: int, others: list[tuple[str, int]]) -> bool:
+    """Whether a FAP is the mate of one of these, on the other side or on the other lip contour."""
     if kind != "fap":
         return False
     fap = faps()[number - 1]
     mates = {fap.left_right_mate, fap.lip_mate} - {None}
     mates |= {faps()[mate - 1].left_right_mate for mate in mates if mate is not None}
-    return any(("fap", mate) in chosen for mate in mates)
+    return any(("fap", mate) in others for mate in mates)
 
 
 def _empty_course(kind: str, number: int) -> Course:
@@ -215,19 +215,19 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
         part = slice(max(int(first) - 1, 0), min(int(last) + 1, len(times)))
         return Envelope((times[part] - low) / (high - low), values[part], sent[part])
     edges = np.searchsorted(times, np.linspace(low, high, columns + 1)[:-1], side="left")
-    starts, places = np.unique(
+    starts, column_of = np.unique(
         edges, return_index=True
     )  # of columns that begin at the same frame, the last has it
-    places = np.r_[places[1:] - 1, columns - 1]
+    column_of = np.r_[column_of[1:] - 1, columns - 1]
     in_range = starts < last
-    starts, places = starts[in_range], places[in_range]
+    starts, column_of = starts[in_range], column_of[in_range]
     seen = values[: int(last)]
     least, largest = np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)
     any_sent = np.logical_or.reduceat(sent[: int(last)], starts)
     # up in one column, down in the next, so that neighbours are joined
     up = (np.arange(len(starts)) % 2).astype(bool)
     pairs = np.where(up, [largest, least], [least, largest]).T
-    return Envelope(np.repeat((places + 0.5) / columns, 2), pairs.ravel(), np.repeat(any_sent, 2))
+    return Envelope(np.repeat((column_of + 0.5) / columns, 2), pairs.ravel(), np.repeat(any_sent, 2))
 
 
 class TimeZoom:

@@ -20,7 +20,7 @@ COLOURS: tuple[theme.Colour, ...] = (
     (0.36, 0.68, 0.90, 1.0), (0.96, 0.72, 0.33, 1.0), (0.45, 0.80, 0.52, 1.0), (0.90, 0.50, 0.62, 1.0),
     (0.68, 0.58, 0.94, 1.0), (0.35, 0.80, 0.78, 1.0), (0.93, 0.58, 0.36, 1.0), (0.72, 0.78, 0.40, 1.0),
 )  # fmt: skip
-WORDS = 19.0
+LABEL_HEIGHT = 19.0
 """Height in points of the name and values above a curve."""
 CURVE = 36.0
 GAP = 7.0
@@ -86,11 +86,11 @@ class Lanes:
         visible = imgui.get_window_pos().y, imgui.get_window_pos().y + imgui.get_window_height()
         y = top
         for number, lane in enumerate(lanes):
-            if y + WORDS + CURVE >= visible[0] and y <= visible[1]:
+            if y + LABEL_HEIGHT + CURVE >= visible[0] and y <= visible[1]:
                 self._lane(session, lane, ruler, time_zoom, y, now.get(lane.key))
             if number == 0:
-                self.place = (left, y + WORDS, left + wide, y + WORDS + CURVE)
-            y += WORDS + CURVE + GAP
+                self.place = (left, y + LABEL_HEIGHT, left + wide, y + LABEL_HEIGHT + CURVE)
+            y += LABEL_HEIGHT + CURVE + GAP
         imgui.set_cursor_screen_pos((left, top))
         imgui.dummy((1, max(y - top - GAP, 1)))
         imgui.end_child()
@@ -106,7 +106,7 @@ class Lanes:
         self, session: Session, lane: Lane, ruler: Ruler, time_zoom: TimeZoom, y: float, now: float | None
     ) -> None:
         to = imgui.get_window_draw_list()
-        left, right, top = ruler.left, ruler.right, y + WORDS
+        left, right, top = ruler.left, ruler.right, y + LABEL_HEIGHT
         wide = right - left
         imgui.set_cursor_screen_pos((left, top))
         name = f"lane{lane.course.kind}{lane.course.number}"
@@ -131,7 +131,7 @@ class Lanes:
         at = ruler.x(session.transport.time)
         if time_zoom.low <= session.transport.time <= time_zoom.high:
             to.add_line((at, top), (at, top + CURVE), theme.packed(theme.TEXT, 0.8))
-        self._draw_words(to, lane, lines, ruler, y, now)
+        self._draw_label(to, lane, lines, ruler, y, now)
         if hovered:
             _hover(to, lane, ruler, top)
 
@@ -145,14 +145,13 @@ class Lanes:
         low, high = (
             (float(course.values.min()), float(course.values.max())) if len(course.values) else (0.0, 0.0)
         )
-        found = envelope(
+        points = envelope(
             course.times, course.values, course.sent, time_zoom.low, time_zoom.high, max(int(wide), 1)
         )
-        made = _make_lines(found, key, low, high, wide)
-        self._lines[lane.key] = made
-        return made
+        lines = self._lines[lane.key] = _make_lines(points, key, low, high, wide)
+        return lines
 
-    def _draw_words(
+    def _draw_label(
         self, to: imgui.ImDrawList, lane: Lane, lines: _Lines, ruler: Ruler, y: float, now: float | None
     ) -> None:
         font = imgui.get_font()
@@ -208,25 +207,24 @@ def _hover(to: imgui.ImDrawList, lane: Lane, ruler: Ruler, top: float) -> None:
     imgui.set_tooltip(f"{clock_text(time)}   {value} {unit}")
 
 
-def _make_lines(found: Envelope, key: tuple[object, ...], low: float, high: float, wide: float) -> _Lines:
+def _make_lines(curve: Envelope, key: tuple[object, ...], low: float, high: float, wide: float) -> _Lines:
     """Convert values to points; their range fills the height of the lane."""
     room = high - low or 1.0
-    middle = high == low
     inner = CURVE - 6
 
     def y(values: np.ndarray) -> np.ndarray:
-        share = np.full(len(values), 0.5) if middle else (values - low) / room
+        share = np.full(len(values), 0.5) if high == low else (values - low) / room
         return 3 + inner * (1 - share)
 
-    xs, ys = (found.x * wide).tolist(), y(found.values).tolist()
+    xs, ys = (curve.x * wide).tolist(), y(curve.values).tolist()
     points = list(map(imgui.ImVec2, xs, ys))
     if len(points) == 1:
         points = [imgui.ImVec2(0.0, ys[0]), imgui.ImVec2(wide, ys[0])]
-    all_sent = bool(found.sent.all())
-    runs = [] if all_sent else [_widen(points[a:b]) for a, b in found.runs()]
+    all_sent = bool(curve.sent.all())
+    runs = [] if all_sent else [_widen(points[a:b]) for a, b in curve.runs()]
     zero = float(y(np.zeros(1))[0]) if low < 0 < high else None
-    spread = wide * float(np.ptp(found.x)) if len(points) > 8 else np.inf
-    dense = len(points) > 1.5 * spread and float(np.abs(np.diff(found.values)).mean()) > 0.2 * room
+    spread = wide * float(np.ptp(curve.x)) if len(points) > 8 else np.inf
+    dense = len(points) > 1.5 * spread and float(np.abs(np.diff(curve.values)).mean()) > 0.2 * room
     return _Lines(key, points, runs, all_sent, dense, zero, low, high)
 
 

@@ -32,7 +32,7 @@ class CurvesPanel(Panel):
     def __init__(self) -> None:
         self._courses: Courses | None = None
         self._courses_of: Any = None
-        self._chosen_once = False
+        self._movers_chosen = False
         self.which = 0
         """Number of the animation whose curves are shown, if several are compared."""
         self._lanes: list[Lane] = []
@@ -62,7 +62,7 @@ class CurvesPanel(Panel):
             return
         courses = [known.course(kind, number) for kind, number in chosen]
         if [lane.course for lane in self._lanes] != courses:
-            self._lanes = [_lane(course, place) for place, course in enumerate(courses)]
+            self._lanes = [_lane(course, number) for number, course in enumerate(courses)]
         self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, chosen, self.which))
 
     def closed(self, session: Session) -> None:
@@ -77,13 +77,13 @@ class CurvesPanel(Panel):
             later = scene.timeline.later[self.which] if several else 0
             model = scene.scenes[self.which].model if several else scene.model
             self._courses = Courses(timeline, model, float(later))
-            self._courses_of, self._chosen_once = timeline, False
+            self._courses_of, self._movers_chosen = timeline, False
         if self._courses.advance():
             session.rolling.add(self.name)
         else:
             session.rolling.discard(self.name)
-        if not self._chosen_once and self._courses.known >= 1.0:
-            self._chosen_once = True
+        if not self._movers_chosen and self._courses.known >= 1.0:
+            self._movers_chosen = True
             if not (session.selection.faps or session.selection.baps):
                 _choose(session, self._courses.movers(BEGINS_WITH))
         return self._courses
@@ -102,9 +102,9 @@ class CurvesPanel(Panel):
             imgui.text_colored(theme.FAINT, f"{known.known:.0%}")
         elif not self.time_zoom.shows_all:
             imgui.same_line()
-            if imgui.button("All of it"):
+            if imgui.button("Show all"):
                 self.time_zoom.reset()
-            tooltip("the full range again; the wheel zooms, a right drag moves")
+            tooltip("show the full range; the wheel zooms, a right drag moves")
 
 
 def _timeline(session: Session, which: int = 0) -> Any:
@@ -120,10 +120,10 @@ def _choose(session: Session, chosen: list[tuple[str, int]]) -> None:
     session.selection.baps = [number for kind, number in chosen if kind == "bap"]
 
 
-def _lane(course: Any, place: int) -> Lane:
+def _lane(course: Any, number: int) -> Lane:
     row = parameter(course.kind, course.number)
     write = partial(amount, course.kind, course.number)
-    return Lane(course, f"{row.number} {row.name}", write, COLOURS[place % len(COLOURS)])
+    return Lane(course, f"{row.number} {row.name}", write, COLOURS[number % len(COLOURS)])
 
 
 def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tuple[str, int], float]:

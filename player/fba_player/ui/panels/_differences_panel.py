@@ -19,7 +19,7 @@ ROWS = 9
 """Number of parameters listed: those that differ most."""
 POINTS = 1500
 """Most points of a curve; longer ones are thinned to the largest value of each part."""
-WORDS = {"side": "side by side", "over": "over each other"}
+ARRANGEMENT_LABELS = {"side": "side by side", "over": "over each other"}
 DEGREES = 180 / np.pi * 1e-5
 
 
@@ -46,25 +46,25 @@ class DifferencesPanel(Panel):
         self._second = min(self._second, len(scene.scenes) - 1)
         if len(scene.scenes) > 2:
             self._second = 1 + choose_name("##second", scene.names[1:], self._second - 1)
-        found = scene.differences(self._second)
-        if self._known is None or self._known[0] is not found:
-            self._known = (found, found.largest(ROWS))
+        differences = scene.differences(self._second)
+        if self._known is None or self._known[0] is not differences:
+            self._known = (differences, differences.largest(ROWS))
         largest = self._known[1]
         heading(f"{_short(scene.names[self._second])} minus {_short(scene.names[0])}", exact=True)
         if not largest:
-            imgui.text_colored(theme.FAINT, _why_nothing_differs(scene, self._second, found))
+            imgui.text_colored(theme.FAINT, _why_nothing_differs(scene, self._second, differences))
             return
         if self._chosen not in [(one.kind, one.number) for one in largest]:
             self._chosen = (largest[0].kind, largest[0].number)
         self._table(session, largest)
         chosen = next(one for one in largest if (one.kind, one.number) == self._chosen)
-        self._plot(session, found, chosen)
+        self._plot(session, differences, chosen)
 
     def _arrangement(self, session: Session, scene: Any) -> None:
         for number, name in enumerate(ARRANGEMENTS):
             if number:
                 imgui.same_line()
-            if imgui.radio_button(WORDS[name], scene.arrangement == name):
+            if imgui.radio_button(ARRANGEMENT_LABELS[name], scene.arrangement == name):
                 scene.arrangement = name
                 session.viewpoint.reset()
 
@@ -91,13 +91,13 @@ class DifferencesPanel(Panel):
                 imgui.text_colored(theme.TEXT if chosen else theme.FAINT, text)
         imgui.end_table()
 
-    def _plot(self, session: Session, found: Differences, chosen: Largest) -> None:
-        key = (found, self._chosen)
+    def _plot(self, session: Session, differences: Differences, chosen: Largest) -> None:
+        key = (differences, self._chosen)
         if self._curve is None or self._curve[0] != key:
-            values = found.faps if chosen.kind == "fap" else found.baps
+            values = differences.faps if chosen.kind == "fap" else differences.baps
             self._curve = (
                 key,
-                *thin_curve(found.times, values[:, chosen.number - 1].astype(np.float64), POINTS),
+                *thin_curve(differences.times, values[:, chosen.number - 1].astype(np.float64), POINTS),
             )
         _, times, values = self._curve
         imgui.dummy((0, 2))
@@ -124,14 +124,14 @@ class DifferencesPanel(Panel):
         imgui.text_colored(theme.FAINT, f"now {now:+.0f} {_unit(chosen.unit, now)}")
 
 
-def _why_nothing_differs(scene: Any, second: int, found: Differences) -> str:
+def _why_nothing_differs(scene: Any, second: int, differences: Differences) -> str:
     """The text shown where nothing differs: the reason."""
     one, other = (scene.scenes[number].animation for number in (0, second))
     both_faces = one.face is not None and other.face is not None
     both_bodies = one.body is not None and other.body is not None
     if not (both_faces or both_bodies):
         return "one is a face, the other a body: nothing to compare"
-    return "nothing differs" if len(found.times) else "they have no time in common"
+    return "nothing differs" if len(differences.times) else "they have no time in common"
 
 
 def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Float64]:

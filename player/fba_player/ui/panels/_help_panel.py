@@ -29,9 +29,9 @@ class HelpPanel(Panel):
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
         if columns > 1 and imgui.begin_table("columns", columns):
             imgui.table_next_row()
-            for chosen in _columns(columns):
+            for names in _columns(columns):
                 imgui.table_next_column()
-                for name in chosen:
+                for name in names:
                     _group(name, groups.get(name, []))
             imgui.end_table()
         elif columns <= 1:
@@ -51,12 +51,12 @@ def _columns(count: int) -> list[list[str]]:
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
     """(keys, what they do) by name of the group."""
-    found: dict[str, list[tuple[str, str]]] = {}
+    groups: dict[str, list[tuple[str, str]]] = {}
     for row in keys():
-        found.setdefault(row.group, []).append((row.shown, row.does))
-    found["Switches"] = session.switch_keys()
-    found["Mouse"] = list(mouse())
-    return found
+        groups.setdefault(row.group, []).append((row.shown, row.does))
+    groups["Switches"] = session.switch_keys()
+    groups["Mouse"] = list(mouse())
+    return groups
 
 
 def _group(name: str, rows: list[tuple[str, str]]) -> None:

@@ -72,22 +72,22 @@ class Chooser:
         imgui.push_style_var(imgui.StyleVar_.frame_padding, (4, 2))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, (8, 3))
         imgui.begin_child("list", (0, 0))
-        chosen = session.selection
+        selection = session.selection
         clipper = imgui.ListClipper()
         clipper.begin(len(rows))
         while clipper.step():
             for kind, number, text in rows[clipper.display_start : clipper.display_end]:
-                on = number in (chosen.faps if kind == "fap" else chosen.baps)
-                full = len(chosen.faps) + len(chosen.baps) >= MOST
+                on = number in (selection.faps if kind == "fap" else selection.baps)
+                full = len(selection.faps) + len(selection.baps) >= MOST
                 changed, _ = imgui.checkbox(f"{text}##{kind}{number}", on)
                 if (kind, number, text) == rows[0]:
                     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
                     self.place = (low.x + 10, (low.y + high.y) / 2)
                 _group(kind, number)
                 if changed and (on or not full):
-                    chosen.toggle(kind, number)
+                    selection.toggle(kind, number)
         if not rows:
-            imgui.text_colored(theme.FAINT, "nothing of that name")
+            imgui.text_colored(theme.FAINT, "no match")
         imgui.end_child()
         imgui.pop_style_var(2)
         imgui.end_popup()

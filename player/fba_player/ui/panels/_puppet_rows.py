@@ -62,12 +62,12 @@ class Group:
 def groups() -> tuple[Group, ...]:
     """All groups: those of the face, then those of the body."""
     text = (files(__package__) / "puppet.csv").read_text(encoding="utf-8")
-    found = []
+    groups = []
     for line in csv.DictReader(text.splitlines()):
         names = line["parameters"].split()
         rows = _fap_rows(names) if line["kind"] == "fap" else _bap_rows(names)
-        found.append(Group(line["group"], line["kind"], rows))
-    return tuple(found)
+        groups.append(Group(line["group"], line["kind"], rows))
+    return tuple(groups)
 
 
 @cache
@@ -100,7 +100,7 @@ def _fap_rows(names: list[str]) -> tuple[Row, ...]:
 
 
 def _bap_rows(names: list[str]) -> tuple[Row, ...]:
-    from fba.body.solve.limits import Limits
+    from fba.body.solve.limits import Limits, widest_limits
 
     limits = {limit.name: limit for limit in Limits.human().limits}
     rows: list[Row] = []
@@ -108,15 +108,9 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
     for word in words:
         if word in limits:
             limit = limits[word]
-            numbers, low, high, unit = (
-                tuple(column + 1 for column in limit.baps),
-                limit.low,
-                limit.high,
-                "deg",
-            )
+            numbers, unit = tuple(column + 1 for column in limit.baps), "deg"
+            low, high = limit.low, limit.high
         else:
-            from fba.body.solve.limits import widest_limits
-
             number = bap_numbers()[word]
             numbers, unit = (number,), baps()[number - 1].unit
             low, high = -SHIFT, SHIFT
@@ -136,12 +130,12 @@ def _bap_rows(names: list[str]) -> tuple[Row, ...]:
 
 def _codable_degrees(numbers: tuple[int, ...], end: int) -> float:
     """Largest (end 1) or smallest (end 0) angle that a stream can code, in whole degrees."""
-    found = 0.0
+    degrees = 0.0
     for number in numbers:
         bap = baps()[number - 1]
         assert bap.i_limits is not None
-        found += bap.i_limits[end] * max(bap.step_iso, bap.step_visage) * DEGREES
-    return float(np.trunc(found))
+        degrees += bap.i_limits[end] * max(bap.step_iso, bap.step_visage) * DEGREES
+    return float(np.trunc(degrees))
 
 
 def _is_flipped(number: int) -> bool:

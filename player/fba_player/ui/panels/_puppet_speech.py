@@ -22,7 +22,7 @@ def draw_visemes(performer: Performer) -> None:
                                 imgui.SliderFlags_.always_clamp)  # fmt: skip
     if (first, second, blend) != (now.select1, now.select2, now.blend):
         puppet.viseme = Viseme(first, second, blend)
-    if _release("viseme", there=puppet.speaks):
+    if _release("viseme", enabled=puppet.speaks):
         puppet.viseme = Viseme()
 
 
@@ -42,24 +42,24 @@ def draw_expressions(performer: Performer) -> None:
         chosen += [select, intensity]
     if chosen != [now.select1, now.intensity1, now.select2, now.intensity2]:
         puppet.expression = Expression(*chosen)
-    if _release("expression", there=puppet.feels):
+    if _release("expression", enabled=puppet.feels):
         puppet.expression = Expression()
     imgui.dummy((1, 4))
     imgui.push_text_wrap_pos(0.0)
     imgui.text_colored(
         theme.FAINT,
-        "A viseme takes the place of what the mouth does; expressions are added to what is played. "
-        "Sliders win over both.",
+        "A viseme replaces the mouth of the animation; expressions are added to the animation. "
+        "Sliders override both.",
     )
     imgui.pop_text_wrap_pos()
 
 
-def _release(what: str, *, there: bool) -> bool:
-    """Draw a button, disabled unless `there`, so that nothing moves under the mouse; returns a press."""
-    imgui.begin_disabled(not there)
+def _release(what: str, *, enabled: bool) -> bool:
+    """Draw a button, disabled unless `enabled`, so that nothing moves under the mouse; returns a press."""
+    imgui.begin_disabled(not enabled)
     pressed = imgui.button(f"Release##{what}")
     imgui.end_disabled()
-    return bool(pressed and there)
+    return bool(pressed and enabled)
 
 
 def _choice(label: str, names: tuple[str, ...], now: int) -> int:

@@ -17,7 +17,7 @@ from fba_player.session.session import Session
 from fba_player.ui import theme
 from fba_player.ui.panels._bit_rates import Rates, bars_of_planes, measure_rates, probe_encoded
 from fba_player.ui.panels._curve_data import Course, TimeZoom
-from fba_player.ui.panels._curve_plot import CURVE, WORDS, Lane, Lanes
+from fba_player.ui.panels._curve_plot import CURVE, LABEL_HEIGHT, Lane, Lanes
 from fba_player.ui.panels.panel import Panel, tooltip
 from fba_player.ui.ruler import Ruler
 
@@ -34,7 +34,7 @@ STEP = 3.0
 class RatePanel(Panel):
     """kbit/s in the last second, a bar for each plane, and a table.
 
-    An animation that is no stream is encoded to show what it would take.
+    An animation that is no stream is encoded to measure it.
     """
 
     name, title, label = "rate", "Bit rate", "Bit rate"
@@ -56,27 +56,29 @@ class RatePanel(Panel):
 
     def draw(self, session: Session) -> None:
         """Draw the content."""
-        info, own = self._stream(session)
+        info, note = self._stream(session)
         if info is None:
-            imgui.text_colored(theme.FAINT, own)
+            imgui.text_colored(theme.FAINT, note)
             return
         if self._rates is None or self._rates[0] is not info:
-            found = measure_rates(info)
-            self._rates = (info, found, _lanes(found, own) if found is not None else [])
-        _, found, lanes = self._rates
-        if found is None:
+            rates = measure_rates(info)
+            self._rates = (info, rates, _lanes(rates, note) if rates is not None else [])
+        _, rates, lanes = self._rates
+        if rates is None:
             imgui.text_colored(theme.FAINT, "There are no planes.")
             return
         transport = session.transport
-        self.time_zoom.bound(transport.start, max(float(found.times[-1]), transport.start))
+        self.time_zoom.bound(transport.start, max(float(rates.times[-1]), transport.start))
         high = BARS + 6 + imgui.get_text_line_height_with_spacing() * 2.5
-        imgui.begin_child("rate", (0, max(imgui.get_content_region_avail().y - high, WORDS + CURVE + 24)))
-        row = _row(found, transport.time) - (len(found.times) - len(found.rate))
-        now = {("rate", 0): float(found.rate[row])} if row >= 0 else {}
+        imgui.begin_child(
+            "rate", (0, max(imgui.get_content_region_avail().y - high, LABEL_HEIGHT + CURVE + 24))
+        )
+        row = _row(rates, transport.time) - (len(rates.times) - len(rates.rate))
+        now = {("rate", 0): float(rates.rate[row])} if row >= 0 else {}
         self.lanes.draw(session, lanes, self.time_zoom, now)
         imgui.end_child()
-        self._planes(session, found)
-        _table(found)
+        self._planes(session, rates)
+        _table(rates)
 
     def closed(self, session: Session) -> None:
         """Stop asking for pictures; what was encoded stays."""
@@ -100,12 +102,15 @@ class RatePanel(Panel):
             ).start()
         if not self._encoded[1]:
             session.rolling.add(self.name)
-            return None, "Encoding, to see what it would take..."
+            return None, "Encoding, to measure its bit rate..."
         session.rolling.discard(self.name)
-        would = self._encoded[1][0]
-        return would, "if encoded" if would else "No stream."
+        encoded = self._encoded[1][0]
+        return (
+            encoded,
+            "if encoded" if encoded else "It cannot be encoded, or is too long.",
+        )
 
-    def _planes(self, session: Session, found: Rates) -> None:
+    def _planes(self, session: Session, rates: Rates) -> None:
         """Draw the bars; a click seeks."""
         left, top = imgui.get_cursor_screen_pos()
         wide = max(imgui.get_content_region_avail().x, 8.0)
@@ -117,15 +122,15 @@ class RatePanel(Panel):
             session.touched()
             session.transport.seek(ruler.time(mouse))
         elif imgui.is_item_hovered():
-            row = _row(found, ruler.time(mouse))
-            kind = "I" if found.intra[row] else "P"
-            imgui.set_tooltip(f"{clock_text(found.times[row])}   {kind} plane, {found.bits[row]:.0f} bits")
+            row = _row(rates, ruler.time(mouse))
+            kind = "I" if rates.intra[row] else "P"
+            imgui.set_tooltip(f"{clock_text(rates.times[row])}   {kind} plane, {rates.bits[row]:.0f} bits")
         to = imgui.get_window_draw_list()
         to.add_rect_filled(
             (left, top), (left + wide, top + BARS), theme.packed((0, 0, 0, 0.22)), rounding=3.0
         )
         plain, key = theme.packed(theme.ACCENT, 0.75), theme.packed(theme.WARM)
-        for x, right, tall, intra in self._bar_boxes(found, wide):
+        for x, right, tall, intra in self._bar_boxes(rates, wide):
             to.add_rect_filled(
                 (left + x, top + BARS - tall), (left + right, top + BARS), key if intra else plain
             )
@@ -133,45 +138,45 @@ class RatePanel(Panel):
         if self.time_zoom.low <= session.transport.time <= self.time_zoom.high:
             to.add_line((at, top), (at, top + BARS), theme.packed(theme.TEXT, 0.8))
 
-    def _bar_boxes(self, found: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
+    def _bar_boxes(self, rates: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
         """(left, right, height, I plane) of the bars; cached until something changes."""
         time_zoom = self.time_zoom
-        made_for = (found, time_zoom.low, time_zoom.high, wide)
+        made_for = (rates, time_zoom.low, time_zoom.high, wide)
         if self._bars[0] == made_for:
             return self._bars[1]
-        inside = int(((found.times >= time_zoom.low) & (found.times <= time_zoom.high)).sum())
+        inside = int(((rates.times >= time_zoom.low) & (rates.times <= time_zoom.high)).sum())
         count = max(min(int(wide / STEP), inside), 1)
         tall, intra = bars_of_planes(
-            found.times, found.bits, found.intra, time_zoom.low, time_zoom.high, count
+            rates.times, rates.bits, rates.intra, time_zoom.low, time_zoom.high, count
         )
-        heights = np.where(tall > 0, 2 + (BARS - 6) * np.sqrt(tall / max(float(found.bits.max()), 1.0)), 0.0)
+        heights = np.where(tall > 0, 2 + (BARS - 6) * np.sqrt(tall / max(float(rates.bits.max()), 1.0)), 0.0)
         each = wide / count
         bars = [
-            (place * each, (place + 1) * each - (1 if each >= STEP else 0), float(height), bool(key))
-            for place, (height, key) in enumerate(zip(heights, intra, strict=True))
+            (number * each, (number + 1) * each - (1 if each >= STEP else 0), float(height), bool(key))
+            for number, (height, key) in enumerate(zip(heights, intra, strict=True))
             if height
         ]
         self._bars = (made_for, bars)
         return bars
 
 
-def _lanes(found: Rates, word: str) -> list[Lane]:
-    count = len(found.rate)
-    course = Course("rate", 0, found.times[-count:], found.rate, np.ones(count, bool))
-    title = f"{word or 'in one second'}; {found.mean:.2f} on average"
+def _lanes(rates: Rates, note: str) -> list[Lane]:
+    count = len(rates.rate)
+    course = Course("rate", 0, rates.times[-count:], rates.rate, np.ones(count, bool))
+    title = f"{note or 'in one second'}; {rates.mean:.2f} on average"
     return [Lane(course, title, lambda value: (f"{value:.2f}", "kbit/s"), theme.ACCENT)]
 
 
-def _row(found: Rates, time: float) -> int:
+def _row(rates: Rates, time: float) -> int:
     """Position of the plane shown at a time."""
-    return int(np.clip(np.searchsorted(found.times, time + 1e-6, side="right") - 1, 0, len(found.times) - 1))
+    return int(np.clip(np.searchsorted(rates.times, time + 1e-6, side="right") - 1, 0, len(rates.times) - 1))
 
 
-def _table(found: Rates) -> None:
+def _table(rates: Rates) -> None:
     narrow = imgui.get_content_region_avail().x < ALL_COLUMNS
     if not imgui.begin_table("totals", 4 if narrow else 5, imgui.TableFlags_.sizing_fixed_fit):
         return
-    for total in found.totals:
+    for total in rates.totals:
         if total.planes is None and total.share < LITTLE:
             continue
         imgui.table_next_row()
@@ -180,8 +185,8 @@ def _table(found: Rates) -> None:
         cells = [total.name, count, mean, f"{total.bits / 8:.0f} bytes", f"{total.share:.1%}"]
         if narrow:
             del cells[3]
-        for place, text in enumerate(cells):
+        for column, text in enumerate(cells):
             imgui.table_next_column()
-            imgui.text_colored(theme.FAINT if place else theme.TEXT, text)
+            imgui.text_colored(theme.FAINT if column else theme.TEXT, text)
     imgui.end_table()
-    tooltip("the height of a bar goes with the square root of its bits")
+    tooltip("the height of a bar is proportional to the square root of its bits")

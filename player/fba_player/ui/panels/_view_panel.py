@@ -38,7 +38,7 @@ class ViewPanel(Panel):
             else:
                 _fap(switch, switches)
             tooltip(switch.description, session.switch_key(switch))
-        if switches.changed and imgui.button("As at the beginning", (-1, 0)):
+        if switches.changed and imgui.button("Reset switches", (-1, 0)):
             for name in switches.changed:
                 scene.show(name, SWITCHES[name].default)
 

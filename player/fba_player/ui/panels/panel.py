@@ -112,7 +112,7 @@ def tooltip(text: str, key: str = "") -> None:
 
 def icon_button(
     name: str,
-    sign: Callable[[imgui.ImDrawList, float, float, float, int], None],
+    draw_icon: Callable[[imgui.ImDrawList, float, float, float, int], None],
     size: float = 30.0,
     *,
     lit: bool = False,
@@ -130,5 +130,5 @@ def icon_button(
         ground = theme.packed(theme.HOVERED if hovered and not held else theme.RAISED)
         to.add_rect_filled((x, y), (x + size, y + size), ground, rounding=6.0)
     shade = (0.06, 0.07, 0.08, 1.0) if filled else colour or (theme.ACCENT if lit else theme.TEXT)
-    sign(to, x + size / 2, y + size / 2, size * (0.25 if filled else 0.27), theme.packed(shade))
+    draw_icon(to, x + size / 2, y + size / 2, size * (0.25 if filled else 0.27), theme.packed(shade))
     return bool(pressed)

@@ -63,7 +63,7 @@ class PuppetPanel(Panel):
         imgui.begin_disabled(performer.puppet.idle)
         if self._button("Release all"):
             performer.puppet.release_all()
-        tooltip("everything follows what is played again")
+        tooltip("all parameters follow the animation again")
         imgui.end_disabled()
         self.places = {}
         if imgui.begin_tab_bar("parts"):
@@ -101,7 +101,7 @@ class PuppetPanel(Panel):
             return
         if self._button("Record###record"):
             performer.record()
-        tooltip("what is shown, with what you do to it, becomes a take")
+        tooltip("record what is shown, with your changes, as a take")
         last = performer.takes.last
         if last is None:
             imgui.same_line(0, 12)
@@ -110,12 +110,12 @@ class PuppetPanel(Panel):
         imgui.same_line()
         if self._button("Stop###show" if performer.showing else "Show###show"):
             performer.stop() if performer.showing else performer.show()
-        tooltip("the last take, once")
+        tooltip("play the last take once")
         imgui.same_line()
         if self._button("Undo"):
             performer.undo()
-            session.say("The last take is gone")
-        tooltip("forget the last take")
+            session.say("The last take was deleted")
+        tooltip("delete the last take")
         imgui.same_line(0, 12)
         imgui.text_colored(theme.FAINT, f"{last.name}: {float(last.duration):.1f} s")
         imgui.set_next_item_width(imgui.get_content_region_avail().x - 64)
@@ -211,7 +211,7 @@ class PuppetPanel(Panel):
                 self._release(performer, group, row)
             imgui.pop_style_var()
             imgui.pop_style_color()
-            tooltip("release: it follows what is played again")
+            tooltip("release: follow the animation again")
 
     def _both(self, group: Group, row: Row) -> list[tuple[Row, float]]:
         """The rows that a slider moves, each with its sign."""
@@ -230,7 +230,7 @@ class PuppetPanel(Panel):
 
     def _release(self, performer: Performer, group: Group, row: Row) -> None:
         for one, _ in self._both(group, row):
-            _give_back(performer, one.kind, one.numbers)
+            _release_parameters(performer, one.kind, one.numbers)
 
 
 def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None:
@@ -244,7 +244,7 @@ def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None
     if touched:
         imgui.same_line()
         if imgui.small_button(f"Release##{group.name}"):
-            _give_back(performer, group.kind, group.numbers)
+            _release_parameters(performer, group.kind, group.numbers)
     imgui.dummy((1, 2))
 
 
@@ -255,7 +255,7 @@ def _parameter_names(row: Row) -> str:
     return f"{row.kind.upper()} " + ", ".join(f"{number} {name}" for number, name in pairs)
 
 
-def _give_back(performer: Performer, kind: str, numbers: tuple[int, ...]) -> None:
+def _release_parameters(performer: Performer, kind: str, numbers: tuple[int, ...]) -> None:
     if kind == "fap":
         performer.puppet.release(faps=numbers)
     else:
