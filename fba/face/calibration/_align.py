@@ -1,4 +1,4 @@
-"""Aligns a person's feature points, in any unit and pose, with a face model: metres, in its frame."""
+"""Aligns a person's feature points, in any unit and pose, with a face model, in metres."""
 
 from __future__ import annotations
 
@@ -12,27 +12,26 @@ from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-"""Units of length that files are in, in metres."""
+"""Units of length of files, in metres."""
 HUMAN = (0.7, 1.4)
-"""A person's size relative to the model: from a child of two to a giant. Outside it the unit is wrong."""
+"""Range of a person's size relative to the model, from a child of two to a giant. Beyond it, the unit is
+wrong."""
 OWN_AXES = np.radians(15.0)
-"""A rotation this close to whole right angles is rounded to them: the rest is a difference of faces."""
+"""Rotations this close to multiples of 90 degrees are rounded to them: the rest is a difference of faces."""
 FEWEST_POINTS = 4
 FLAT = 0.02
 """Ratio of smallest to largest spread below which points lie in a plane, as those of a photograph do."""
 MIRRORED_FIT = 0.6
-"""Points are mirrored where their mirror image leaves less than this share of the error."""
+"""Points are taken as mirrored if their mirror image fits with less than this share of the error."""
 
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
     """A person's feature points in the frame of the model, and the transform that brought them there.
 
-    points: (84, 3), metres. scale: metres for one unit of the file. unit: its name, "" where none fits
-    and the size was taken from the model. angle: of the rotation, radians. mirrored:
-    left and right were swapped. flat: the points had no depth, and were given the model's. expected:
-    (84, 3), where the model's points would be on a person of that size; residual: (84,), metres between
-    the two, NaN where unknown.
+    points: (84, 3), metres. scale: metres for one unit of the file. unit: its name, "" if none fits and the
+    size is the model's. angle: of the rotation, radians. mirrored: left and right were swapped. flat: the
+    points had no depth and got the model's. expected: (84, 3), the model's points at the person's size.
     """
 
     points: Float64
@@ -42,20 +41,20 @@ class Alignment:
     mirrored: bool
     flat: bool
     expected: Float64
-    residual: Float64
 
 
 def align(given: Float64, reference: Float64, *, unit: str | float | None = None) -> Alignment:
-    """A person's feature points (84, 3) scaled, rotated and shifted into the frame of reference (84, 3).
+    """A person's feature points (84, 3), scaled, rotated and shifted to match a reference (84, 3).
 
-    NaN marks unknown points. unit: a name of `UNITS`, or metres for one unit of the file; None finds it.
-    Raises ModelError where fewer than four points are known to both, or where they coincide or lie on one
+    NaN marks unknown points. unit: a name in `UNITS`, or metres for one unit of the file; None finds it.
+    Raises ModelError where fewer than four points are known in both, or where they coincide or lie on one
     line.
     """
     known = known_rows(given, reference)
     _check(given, known)
     here, there = given[known], reference[known]
-    flat = _flatness(here) < FLAT and _flatness(there) > 2 * FLAT
+    flatness = [spread[2] / spread[0] for spread in (_spread(here), _spread(there))]
+    flat = bool(flatness[0] < FLAT and flatness[1] > 2 * FLAT)
     if flat:
         rotation, mirrored = _find_flat_pose(here, there), False
         angle = _angle(rotation)
@@ -69,14 +68,12 @@ def align(given: Float64, reference: Float64, *, unit: str | float | None = None
     # Size and position are found last: rounding the rotation to right angles changes the best fit.
     size, weight = _robust_size(posed[known], there)
     scale, name = _find_unit(size, unit)
-    placed = posed * scale
+    points, expected = posed * scale, reference * scale / size
     if flat:
-        placed[:, 2] = np.where(np.isfinite(placed[:, 2]), reference[:, 2] * scale / size, np.nan)
-    shift = _trusted_median(there * scale / size - placed[known], weight)
-    placed += shift
-    expected = reference * scale / size
-    residual = np.linalg.norm(placed - expected, axis=1)
-    return Alignment(placed, scale, name, angle, mirrored, flat, expected, residual)
+        points[:, 2] = np.where(np.isfinite(points[:, 2]), expected[:, 2], np.nan)
+    # The median shift of those points that fit best.
+    points += np.median((expected - points)[known][weight >= np.median(weight)], axis=0)
+    return Alignment(points, scale, name, angle, mirrored, flat, expected)
 
 
 def known_rows(*points: Float64) -> Bool:
@@ -90,7 +87,7 @@ def _check(given: Float64, known: Bool) -> None:
             f"only {int(known.sum())} feature points are known to both the person and the face "
             f"({', '.join(np.array(names())[known]) or 'none'}); at least {FEWEST_POINTS} are needed"
         )
-    spread = np.linalg.svd(given[known] - given[known].mean(axis=0), compute_uv=False)
+    spread = _spread(given[known])
     if not spread[0] > 0 or not np.isfinite(spread).all() or spread[1] < 1e-4 * spread[0]:
         what = "one spot" if not spread[0] > 0 else "one line"
         raise ModelError(
@@ -99,9 +96,9 @@ def _check(given: Float64, known: Bool) -> None:
         )
 
 
-def _flatness(points: Float64) -> float:
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return float(spread[2] / spread[0])
+def _spread(points: Float64) -> Float64:
+    """(3,) extent of points (N, 3) along their principal axes, the largest first."""
+    return np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
 
 
 def _find_pose(here: Float64, there: Float64) -> tuple[Float64, bool]:
@@ -130,35 +127,41 @@ def _rotation(here: Float64, there: Float64, handed: float) -> tuple[Float64, fl
         size = float((share @ (turned * b).sum(axis=1)) / (share @ (a**2).sum(axis=1)))
         away = np.linalg.norm(turned * size - b, axis=1)
         error = float(np.median(away))
-        usual = max(1.5 * error, 1e-9 * float(np.abs(b).max()))
-        weight = 1.0 / (1.0 + (away / (2 * usual)) ** 2) ** 2
+        weight = _robust_weights(away, b)
     return matrix, error
 
 
+def _robust_weights(errors: Float64, points: Float64) -> Float64:
+    """(N,) Geman-McClure weights of points (N, 3) by their errors (N,), near 1 below the median error."""
+    usual = max(1.5 * float(np.median(errors)), 1e-9 * float(np.abs(points).max()))
+    weights: Float64 = 1.0 / (1.0 + (errors / (2 * usual)) ** 2) ** 2
+    return weights
+
+
 def _find_flat_pose(here: Float64, there: Float64) -> Float64:
-    """(3, 3) rotation of points in a plane onto the model seen from the front, on the better of two sides."""
+    """(3, 3) rotation of points in a plane onto the model seen from the front, the better side forward."""
     _, _, axes = np.linalg.svd(here - here.mean(axis=0), full_matrices=True)
     axes[2] = np.cross(axes[0], axes[1])
     flat = (here - here.mean(axis=0)) @ axes.T
-    found = []
+    poses = []
     for side in (1.0, -1.0):
         plane = flat * (1.0, side, 0.0)
         matrix, error = _rotation(plane, there * (1.0, 1.0, 0.0), 1.0)
-        found.append((error, matrix @ np.diag([1.0, side, side]) @ axes))
-    best: Float64 = min(found, key=lambda pair: pair[0])[1]
+        poses.append((error, matrix @ np.diag([1.0, side, side]) @ axes))
+    best: Float64 = min(poses, key=lambda pair: pair[0])[1]
     return best
 
 
 def _snap_to_axes(matrix: Float64) -> Float64:
-    """The nearest rotation by whole right angles if it is within `OWN_AXES`, else the matrix unchanged."""
-    quarter = []
+    """The nearest rotation by multiples of 90 degrees if within `OWN_AXES`, else the matrix unchanged."""
+    right_angled = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
             turn = np.zeros((3, 3))
             turn[range(3), order] = signs
             if np.linalg.det(turn) > 0:
-                quarter.append(turn)
-    nearest = min(quarter, key=lambda turn: _angle(matrix @ turn.T))
+                right_angled.append(turn)
+    nearest = min(right_angled, key=lambda turn: _angle(matrix @ turn.T))
     return nearest if _angle(matrix @ nearest.T) < OWN_AXES else matrix
 
 
@@ -174,13 +177,12 @@ def _robust_size(posed: Float64, there: Float64) -> tuple[float, Float64]:
         share = weight / weight.sum()
         a, b = posed - share @ posed, there - share @ there
         size = float(np.sqrt((share @ (b**2).sum(axis=1)) / (share @ (a**2).sum(axis=1))))
-        away = np.linalg.norm(a * size - b, axis=1)
-        usual = max(1.5 * float(np.median(away)), 1e-9 * float(np.abs(b).max()))
-        weight = 1.0 / (1.0 + (away / (2 * usual)) ** 2) ** 2
+        weight = _robust_weights(np.linalg.norm(a * size - b, axis=1), b)
     return size, weight
 
 
 def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
+    """(metres for one unit, its name or ""). size: factor by which the points fit the model best."""
     if isinstance(unit, str):
         if unit not in UNITS:
             raise ModelError(f"there is no unit of length {unit!r}; there are {', '.join(UNITS)}")
@@ -196,14 +198,8 @@ def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
     return size, ""
 
 
-def _trusted_median(rows: Float64, weight: Float64) -> Float64:
-    trusted = rows[weight >= np.median(weight)]
-    middle: Float64 = np.median(trusted, axis=0)
-    return middle
-
-
 def centre_on_pupils(points: Float64, reference: Float64) -> Float64:
-    """Points (84, 3) shifted so that the pupils' midpoint is the reference's; unchanged if unknown."""
+    """Points (84, 3) shifted so that the midpoint of the pupils is the reference's; unchanged if unknown."""
     rows = [row_of()["3.5"], row_of()["3.6"]]
     shift = reference[rows].mean(axis=0) - points[rows].mean(axis=0)
     return points + shift if np.isfinite(shift).all() else points

@@ -1,4 +1,4 @@
-"""The FaceDefTables of a face carried over to the same face in another shape."""
+"""Carries the FaceDefTables of a face over to the same face in another shape."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from fba.face.calibration._shape import Shape, fit_similarity
 from fba.face.feature_points import row_of
 from fba.face.tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.parameters import faps
+from fba.rotations import between
 
 if TYPE_CHECKING:
     from fba.face.fapu import Fapu
@@ -22,22 +23,22 @@ if TYPE_CHECKING:
 
 LID_FAPS = {19: "left", 20: "right", 21: "left", 22: "right"}
 LEAST = 1e-6
-"""Weight with which a direction without edges is taken to stretch like the others."""
+"""Weight of the average stretch, for directions in which a vertex has no edges."""
 
 
 def carry_tables(
     model: FaceModel, parts: tuple[Part, ...], points: Float64, fapu: Fapu, shape: Shape
 ) -> tuple[FaceDefTables, ...]:
-    """The model's tables for its parts in another shape: one FaceDefTables per table of the model.
+    """The model's tables for its parts in another shape, one for each.
 
     parts: the parts after fitting, in the model's order. points: (84, 3) fitted feature points, metres.
-    fapu: of the fitted face. A displacement keeps its length in FAPU and turns with the face around it.
+    fapu: of the fitted face. A displacement keeps its length in FAPU and rotates with the face around it.
     Displacements of lids stretch with the skin instead, as the opening between them does, and are
-    corrected to keep the lid on the eyeball. Each FAP's own vertex then moves by as many FAPU as before
-    in the same direction, and the other vertices are corrected with it. Transforms keep their angles;
-    where a FAP's unit is a length, the angle is scaled so that the chin moves as far as before.
+    corrected to keep the lid on the eyeball. Then displacements are corrected so that each FAP's own vertex
+    moves by as many FAPU as before in the same direction. Transforms keep their angles; where a FAP's unit
+    is a length, the angle is scaled so that the chin moves as many FAPU as before.
     """
-    names = {part.name: place for place, part in enumerate(parts)}
+    numbers = {part.name: number for number, part in enumerate(parts)}
     rotations = {part.name: shape.rotations.get(part.name) for part in model.parts}
     stretched = _lid_stretches(model, parts) if LID_FAPS.keys() & model.table_of.keys() else {}
     tables = []
@@ -52,49 +53,47 @@ def carry_tables(
             matrices = local.get(mesh.part)
             if matrices is not None:
                 moves = np.einsum("vij,vkj->vki", matrices[mesh.vertices], moves)
-            if fap.unit == "AU":  # an angle: displacements scale with the part
-                old, new = model.parts[names[mesh.part]], parts[names[mesh.part]]
+            if fap.unit == "AU":  # displacements by an angle scale with the part
+                old, new = model.parts[numbers[mesh.part]], parts[numbers[mesh.part]]
                 moves = moves * fit_similarity(old.vertices, new.vertices.astype(np.float64)).size
             moved[mesh.part] = moves * (units[0] / units[1] if lid else 1.0)
-        right = _point_correction(model, table, moved) if fap.unit != "AU" else None
+        correction = _point_correction(model, table, moved) if fap.unit != "AU" else None
         meshes = []
         for mesh in table.meshes:
             moves = moved[mesh.part]
-            if right is not None and len(right) == moves.shape[1]:
-                moves = np.einsum("kij,vkj->vki", right, moves)
+            if correction is not None and len(correction) == moves.shape[1]:
+                moves = np.einsum("kij,vkj->vki", correction, moves)
             if lid:
-                old, new = model.parts[names[mesh.part]], parts[names[mesh.part]]
-                places = [part.vertices[mesh.vertices].astype(np.float64) for part in (old, new)]
-                before = places[0], mesh.displacements.astype(np.float64) * units[0]
-                after = places[1], moves * units[1]
+                old, new = model.parts[numbers[mesh.part]], parts[numbers[mesh.part]]
+                vertices = [part.vertices[mesh.vertices].astype(np.float64) for part in (old, new)]
+                before = vertices[0], mesh.displacements.astype(np.float64) * units[0]
+                after = vertices[1], moves * units[1]
                 moves = keep_lid_on_eyeball(shape.eyes, table.fap, mesh.borders, before, after) / units[1]
             meshes.append(FaceDefMesh(mesh.part, mesh.borders, mesh.vertices, moves.astype(np.float32)))
-        balls = {eye.was.part: eye for eye in shape.eyes.values()}
+        eyes = {eye.was.part: eye for eye in shape.eyes.values()}
         ratio = units[0] / units[1]
-        transforms = [
-            _carry_transform(model, one, points, fap.unit, ratio, balls) for one in table.transforms
-        ]
+        transforms = [_carry_transform(model, one, points, fap.unit, ratio, eyes) for one in table.transforms]
         tables.append(FaceDefTables(table.fap, tuple(meshes), tuple(transforms)))
     return tuple(tables)
 
 
 def _lid_stretches(model: FaceModel, parts: tuple[Part, ...]) -> dict[str, Float64]:
-    """(V, 3, 3) by name of the part: stretch of the skin, for skin and for the parts on it."""
+    """By part name: (V, 3, 3) stretch of the skin, for skin and for the parts on it."""
     from scipy.spatial import cKDTree
 
-    found = {
+    stretches = {
         old.name: surface_stretches(old, new.vertices)
         for old, new in zip(model.parts, parts, strict=True)
         if old.kind in ("skin", "mouth")
     }
-    skin = [part for part in model.parts if part.name in found]
+    skin = [part for part in model.parts if part.name in stretches]
     if skin:
         tree = cKDTree(np.concatenate([part.vertices for part in skin]))
-        joined = np.concatenate([found[part.name] for part in skin])
+        joined = np.concatenate([stretches[part.name] for part in skin])
         for part in model.parts:
-            if part.name not in found and len(part.vertices):
-                found[part.name] = joined[tree.query(part.vertices)[1]]
-    return found
+            if part.name not in stretches and len(part.vertices):
+                stretches[part.name] = joined[tree.query(part.vertices)[1]]
+    return stretches
 
 
 def _carry_transform(
@@ -125,8 +124,8 @@ def _carry_transform(
 
 
 def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Float64, float]:
-    """(centre (3,), size): a hinge moved by the affine map of the feature points, and the chin's new distance
-    from it relative to the old one.
+    """(centre (3,), size): a hinge moved by the affine map of the feature points, and the ratio of the chin's
+    new distance from it to the old one.
     """
     known = known_rows(points, model.points)
     here, there = model.points[known], points[known]
@@ -136,10 +135,8 @@ def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Fl
     chin = row_of()["2.1"]
     if not known[chin]:
         return moved, 1.0
-    arms = [
-        np.hypot(*(chin_at - at)[1:]) for chin_at, at in ((points[chin], moved), (model.points[chin], centre))
-    ]
-    return moved, float(arms[0] / arms[1]) if arms[1] > 0 else 1.0
+    after, before = (np.hypot(*arm[1:]) for arm in (points[chin] - moved, model.points[chin] - centre))
+    return moved, float(after / before) if before > 0 else 1.0
 
 
 def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
@@ -147,11 +144,10 @@ def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str
     for name in faps()[table.fap - 1].feature_points:
         vertex = int(model.bound[row_of()[name]])
         for mesh in table.meshes:
-            own = vertex - model.starts[mesh.part]
-            found = np.flatnonzero((mesh.vertices == own) & (vertex >= 0))
-            if len(found):
-                wanted = mesh.displacements[found[0]].astype(np.float64)
-                got = moved[mesh.part][found[0]]
+            rows = np.flatnonzero((mesh.vertices == vertex - model.starts[mesh.part]) & (vertex >= 0))
+            if len(rows):
+                wanted = mesh.displacements[rows[0]].astype(np.float64)
+                got = moved[mesh.part][rows[0]]
                 return np.stack([_rotation_and_scale(a, b) for a, b in zip(got, wanted, strict=True)])
     return None
 
@@ -161,20 +157,14 @@ def _rotation_and_scale(a: Float64, b: Float64) -> Float64:
     lengths = float(np.linalg.norm(a)), float(np.linalg.norm(b))
     if min(lengths) < 1e-9:
         return np.eye(3)
-    u, v = a / lengths[0], b / lengths[1]
-    axis, cosine = np.cross(u, v), float(u @ v)
-    if cosine < -0.99:
-        return np.eye(3) * lengths[1] / lengths[0]
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    turn: Float64 = (np.eye(3) + cross + cross @ cross / (1 + cosine)) * lengths[1] / lengths[0]
-    return turn
+    opposed = a @ b < -0.99 * lengths[0] * lengths[1]
+    return (np.eye(3) if opposed else between(a, b)) * lengths[1] / lengths[0]
 
 
 def surface_stretches(part: Part, after: Floating) -> Float64:
-    """(V, 3, 3) linear map of the surface around each vertex from before to after.
+    """(V, 3, 3) linear map that takes the surface around each vertex of a part to vertices `after` (V, 3).
 
-    Least squares over the edges around the vertex; the normal is taken to the new normal, scaled as the
-    surface is.
+    Least squares over the edges at the vertex; its normal goes to the new normal, scaled as the surface is.
     """
     from fba.mesh.meshes import vertex_normals
 
@@ -187,12 +177,10 @@ def surface_stretches(part: Part, after: Floating) -> Float64:
     squares, products = np.zeros((len(before), 3, 3)), np.zeros((len(before), 3, 3))
     np.add.at(squares, edges[:, 0], old[:, :, None] * old[:, None, :])
     np.add.at(products, edges[:, 0], new[:, :, None] * old[:, None, :])
-    grown = np.zeros(len(before)), np.zeros(len(before))
-    np.add.at(grown[0], edges[:, 0], (old**2).sum(axis=1))
-    np.add.at(grown[1], edges[:, 0], (new**2).sum(axis=1))
-    size = np.sqrt(grown[1] / np.maximum(grown[0], 1e-30))
-    size[grown[0] < 1e-20] = 1.0
-    weight = np.maximum(grown[0], 1e-20)
+    lengths = [np.bincount(edges[:, 0], (edge**2).sum(axis=1), len(before)) for edge in (old, new)]
+    size = np.sqrt(lengths[1] / np.maximum(lengths[0], 1e-30))
+    size[lengths[0] < 1e-20] = 1.0
+    weight = np.maximum(lengths[0], 1e-20)
     along = [n.astype(np.float64) for n in normals]
     squares += weight[:, None, None] * along[0][:, :, None] * along[0][:, None, :]
     products += (weight * size)[:, None, None] * along[1][:, :, None] * along[0][:, None, :]
@@ -211,10 +199,9 @@ def keep_lid_on_eyeball(
 ) -> Float64:
     """Displacements (N, K - 1, 3), metres a step, corrected so that the lid keeps to the eyeball.
 
-    before, after: neutral vertices (N, 3) and displacements (N, K - 1, 3) of the old face and of the new
-    one. At every border a vertex is as many radii from the eyeball's centre as on the old face, apart from
-    the difference that the neutral faces have already. Only depth is corrected, so that heights stay and
-    lids meet.
+    before, after: neutral vertices (N, 3) and displacements (N, K - 1, 3) of the old and the new face. At
+    every border a vertex gets as many radii from the eyeball's centre as on the old face, but for the
+    difference of the neutral faces. Only depth is corrected, so that heights stay and lids meet.
     """
     eye = eyes.get(LID_FAPS[fap])
     moves = after[1]
@@ -222,13 +209,13 @@ def keep_lid_on_eyeball(
         return moves
     steps = np.diff(borders.astype(np.float64))
     zero = int(np.flatnonzero(borders == 0)[0])
-    old, new = (_positions_at_borders(*one, steps, zero) for one in (before, after))
+    old, new = (_positions_at_borders(*face, steps, zero) for face in (before, after))
     wanted = np.linalg.norm(old - eye.was.centre, axis=2) * eye.size
     arms = new - eye.centre
     depth = wanted**2 - arms[..., 0] ** 2 - arms[..., 1] ** 2
     forward = np.sqrt(np.maximum(depth, 0.0)) - arms[..., 2]
     near = eyeball_weight(eye, old.reshape(-1, 3)).reshape(old.shape[:2]).min(axis=1)
-    # A vertex that leaves the front of the eyeball anywhere on its way is not on a lid's edge.
+    # A vertex that ever leaves the front of the eyeball is not on a lid's edge.
     near *= ((arms[..., 2] > 0) & (depth > 0)).all(axis=1)
     forward = (forward - forward[:, [zero]]) * near[:, None]
     corrected = moves.copy()
@@ -239,5 +226,5 @@ def keep_lid_on_eyeball(
 def _positions_at_borders(vertices: Float64, moves: Float64, steps: Float64, zero: int) -> Float64:
     """(N, K, 3) position of each vertex at each border."""
     path = np.concatenate([np.zeros((len(vertices), 1, 3)), moves * steps[:, None]], axis=1).cumsum(axis=1)
-    places: Float64 = vertices[:, None] + path - path[:, [zero]]
-    return places
+    positions: Float64 = vertices[:, None] + path - path[:, [zero]]
+    return positions

@@ -1,5 +1,4 @@
-"""Prepares a person's aligned feature points for fitting: drops doubtful ones, mirrors missing ones from
-the other side, shuts the mouth."""
+"""Prepares a person's aligned feature points: drops doubtful ones, mirrors missing ones, shuts the mouth."""
 
 from __future__ import annotations
 
@@ -12,26 +11,26 @@ from fba.errors import FbaWarning
 from fba.face.feature_points import MIRRORED, names, row_of
 
 APART = 0.012
-"""Points of the face further apart than this share of the pupils' distance must not coincide."""
+"""Points further apart on the face than this share of the pupils' distance must not coincide."""
 TOGETHER = 0.1
-"""Points given nearer to each other than this share of their distance on the face coincide."""
+"""Points nearer to each other than this share of their distance on the face coincide."""
 FAR_OFF = 0.75
-"""A point this share of the pupils' distance from its expected position is a mistake ..."""
+"""A point is a mistake if its error exceeds this share of the pupils' distance ..."""
 FAR_OFF_USUAL = 6.0
-"""... if it is also this many times the median deviation off, and its mate on the other side is not."""
+"""... and this many times the median error, and its mate on the other side differs."""
 TURNED = np.radians(20.0)
-"""The plane of symmetry is measured from the points unless it turns from x = 0 by more than this."""
+"""The plane of symmetry is computed from the points unless it deviates from x = 0 by more than this."""
 PUPIL = 0.2
-"""Share of the lid opening by which a pupil may be off the middle between the lids."""
+"""Share of the lid opening by which a pupil may be off the middle of the lids."""
 LIPS = (("2.2", "2.3", "8.2"), ("2.6", "2.8", "8.7"), ("2.7", "2.9", "8.8"))
-"""Upper and lower inner lip, and the outer lip below."""
+"""Points of the upper and the lower inner lip, and of the outer lip below."""
 OPEN = 0.01
 """Share of the mouth's width by which lips may be apart without a warning."""
 CLOSE_ENOUGH = 0.25
-"""Share of the distance between two such points by which the person's may differ and stay unchanged."""
+"""Lips stay unchanged if they are off by less than this share of the distance between two such points."""
 TEETH = ("9.10", "9.11")
 FREE = ("7.1", "11.5")
-"""Points on no surface: they say nothing about its shape, and each author places them differently."""
+"""Points on no surface: they do not describe its shape, and authors place them differently."""
 
 _MEET = (
     *({upper, lower} for upper, lower, _ in LIPS),
@@ -45,8 +44,8 @@ _OTHER = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 def drop_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2) -> Float64:
     """Points (84, 3) with obvious mistakes set to NaN; an FbaWarning names each.
 
-    expected: (84, 3), positions on a person of that size, metres. Of two points that coincide but are
-    apart on the face, the one less symmetric to its mate is dropped, or else the one further from its
+    expected: (84, 3), the model's points at the person's size, metres. Of two points that coincide but are
+    apart on the model, the one less symmetric to its mate is dropped, or else the one further from its
     expected position. A single point far from its expected position is dropped.
     """
     result = points.copy()
@@ -54,16 +53,16 @@ def drop_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2) ->
     unit = _between(expected, "3.5", "3.6")
     messages = []
     rows = np.flatnonzero(np.isfinite(away))
-    unlike = _asymmetry(points)
-    for place, a in enumerate(rows):
-        for b in rows[place + 1 :]:
+    asymmetry = _asymmetry(points)
+    for k, a in enumerate(rows):
+        for b in rows[k + 1 :]:
             apart = float(np.linalg.norm(expected[a] - expected[b]))
             given = float(np.linalg.norm(points[a] - points[b]))
             meet = {names()[a], names()[b]} in _MEET
             if meet or apart < APART * unit or given > TOGETHER * apart or np.isnan(result[[a, b], 0]).any():
                 continue
-            worst = unlike if abs(unlike[a] - unlike[b]) > 0.01 * unit else away
-            worse = a if worst[a] > worst[b] else b
+            error = asymmetry if abs(asymmetry[a] - asymmetry[b]) > 0.01 * unit else away
+            worse = a if error[a] > error[b] else b
             result[worse] = np.nan
             messages.append(
                 f"{names()[a]} and {names()[b]} stand on one spot, but the face has them "
@@ -88,7 +87,7 @@ def drop_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2) ->
 
 
 def _asymmetry(points: Float64) -> Float64:
-    """(84,) metres between each point and the mirror image of its mate; 0 where there is none."""
+    """(84,) distance of each point from the mirror image of its mate, metres; 0 where there is none."""
     normal, offset = symmetry_plane(points)
     image = points - 2 * np.outer(points @ normal - offset, normal)
     apart = np.zeros(len(points))
@@ -98,7 +97,7 @@ def _asymmetry(points: Float64) -> Float64:
 
 
 def mirror_missing(points: Float64) -> tuple[Float64, tuple[str, ...]]:
-    """(points with those missing on one side mirrored from the other, their names)."""
+    """(points (84, 3) with those missing on one side mirrored from the other, their names)."""
     normal, offset = symmetry_plane(points)
     full = points.copy()
     added = []
@@ -130,10 +129,10 @@ def symmetry_plane(points: Float64) -> tuple[Float64, float]:
 
 
 def centre_pupils(points: Float64, *, stacklevel: int = 2) -> tuple[Float64, tuple[str, ...]]:
-    """(points with pupils half way up between the lids, names of the pupils that were moved).
+    """(points (84, 3) with pupils at mid-height between the lids, names of those that were moved).
 
-    Lids are tangent to the iris in a neutral face, so the pupil is in the middle. Raises an FbaWarning for
-    a pupil further off than drooping lids explain.
+    Lids are tangent to the iris in a neutral face, so the pupil is in the middle. An FbaWarning names a
+    pupil further off than drooping lids explain.
     """
     full = points.copy()
     moved = []
@@ -157,8 +156,8 @@ def centre_pupils(points: Float64, *, stacklevel: int = 2) -> tuple[Float64, tup
 def shut_mouth(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64:
     """Points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones stay.
 
-    reference: (84, 3), the face's own points at the size of the person. Where the person's mouth is
-    open, the whole lower lip is raised, and an FbaWarning says how far.
+    reference: (84, 3), the model's points at the person's size. If the person's mouth is open, the whole
+    lower lip is raised, and an FbaWarning says how far.
     """
     full = points.copy()
     width = _between(full, "8.3", "8.4")
@@ -201,6 +200,7 @@ def shut_mouth(points: Float64, reference: Float64, *, stacklevel: int = 2) -> F
 
 
 def _between(points: Float64, left: str, right: str) -> float:
+    """Distance of two points in x, metres; 0.06 where it is unknown or not positive."""
     distance = float(points[row_of()[left], 0] - points[row_of()[right], 0])
     return distance if np.isfinite(distance) and distance > 0 else 0.06
 

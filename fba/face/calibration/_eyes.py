@@ -1,4 +1,4 @@
-"""Eyeballs of a fitted face: still spheres, with an iris of the right size, under lids that still fit."""
+"""Fits eyeballs: they stay spheres, get an iris of the right size, and lids stay in contact."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from fba.face.calibration._field import linear_field
 from fba.face.eyeball import Eyeball
 
 LID = 1.10
-"""Skin within this many radii of the eyeball's centre lies on it: the lids and their lining."""
+"""Skin within this many radii of the eyeball's centre is on it: the lids and their lining."""
 REACH = 1.6
 """Beyond this many radii the eyeball has no influence on the skin."""
 SIZES = (0.75, 1.35)
 """Limits of an eyeball's size relative to the face around it."""
 WIDEST_IRIS = np.radians(42.0)
-"""Half the angle that the widest iris takes of its eyeball."""
+"""Largest angle at the eyeball's centre between gaze and edge of the iris."""
 BARELY = 1.003
 """Radii from the centre at which a lid is just outside the eyeball."""
 DEEP = 0.0005
@@ -31,10 +31,10 @@ LEAST = 0.02
 
 @dataclass(frozen=True, eq=False)
 class FittedEye:
-    """An eyeball after fitting; call it with vertices (N, 3) of the old one.
+    """An eyeball after fitting; calling it with vertices (N, 3) of the old one gives the new ones.
 
     centre: (3,) and radius: metres, after. was: the eyeball before. iris, iris_was: angle between the gaze
-    and the edge of the iris after and before, radians.
+    and the edge of the iris, after and before, radians.
     """
 
     was: Eyeball
@@ -76,17 +76,17 @@ def fit_eye(
 ) -> FittedEye:
     """The eyeball that fits under the fitted lids as the old one does under the old lids.
 
-    skin, fitted: (V, 3) vertices before and after. pupil: its point before and after. size: of the
-    fitted face around the eye relative to the old one. pupil_given: keep the pupil exactly where it is;
-    the centre lies straight behind it. iris: its diameter before and after, metres. given: (K, 3) points
-    of the lids before, and their targets; if they get inside the eyeball it is set back, and an
-    FbaWarning says how far.
+    skin, fitted: (V, 3) vertices before and after. pupil: its point before and after. size: of the fitted
+    face around the eye relative to the old one. pupil_given: keep the pupil exactly in place, with the
+    centre straight behind it. iris: its diameter before and after, metres. given: (K, 3) points of the lids
+    before, and their targets; if these are inside the eyeball it is set back, and an FbaWarning says how
+    far.
     """
     from scipy.optimize import least_squares
 
     distance = np.linalg.norm(skin - eye.centre, axis=1)
     lids = distance < LID * eye.radius
-    clearance, places = distance[lids] / eye.radius, fitted[lids]
+    clearance, lid_vertices = distance[lids] / eye.radius, fitted[lids]
     depth = float(np.linalg.norm(pupil[0] - eye.centre)) / eye.radius
     front = pupil[1]
 
@@ -95,23 +95,23 @@ def fit_eye(
 
     def misfit(values: Float64) -> Float64:
         radius = values[0]
-        away = np.linalg.norm(places - centre(values), axis=1) - clearance * radius
+        away = np.linalg.norm(lid_vertices - centre(values), axis=1) - clearance * radius
         usual = np.array([0.5 * (radius - size * eye.radius), 0.3 * (values[1] + depth * radius - front[2])])
         return np.concatenate([away / np.sqrt(max(len(away), 1)), usual])
 
     low, high = (bound * size * eye.radius for bound in SIZES)
     start = np.array([size * eye.radius, front[2] - depth * size * eye.radius])
     if pupil_given:
-        found = least_squares(
+        best = least_squares(
             lambda one: misfit(np.array([one[0], front[2] - depth * one[0]])),
             start[:1],
             bounds=([low], [high]),
         )
-        values = np.array([found.x[0], front[2] - depth * found.x[0]])
+        values = np.array([best.x[0], front[2] - depth * best.x[0]])
     else:
         far = 3 * high
-        found = least_squares(misfit, start, bounds=([low, start[1] - far], [high, start[1] + far]))
-        values = found.x
+        best = least_squares(misfit, start, bounds=([low, start[1] - far], [high, start[1] + far]))
+        values = best.x
     radius = float(values[0])
     angles = [
         float(np.arcsin(min(across / 2 / ball, np.sin(WIDEST_IRIS))))
@@ -120,13 +120,13 @@ def fit_eye(
     clear = np.minimum(np.linalg.norm(given[0] - eye.centre, axis=1) / eye.radius, BARELY)
     values[1] -= _setback(given[1], clear * radius, centre(values), eye.side)
     fitted_eye = FittedEye(eye, centre(values), radius, angles[1], angles[0])
-    # The pupil's own vertex may stand a little off the axis.
+    # The pupil's own vertex may be a little off the axis.
     off = (front - fitted_eye(pupil[0][None])[0]) * (1.0, 1.0, 0.0)
     return replace(fitted_eye, centre=fitted_eye.centre + off)
 
 
 def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> float:
-    """Metres by which an eyeball must go back for points (K, 3) to be at least (K,) from its centre."""
+    """Metres by which an eyeball must be set back for points (K, 3) to be at least (K,) from its centre."""
     across = np.hypot(*(given - centre)[:, :2].T)
     room = np.sqrt(np.maximum(least**2 - across**2, 0.0))
     back = float(np.where(room > 0, centre[2] + room - given[:, 2], 0.0).max(initial=0.0))
@@ -143,9 +143,9 @@ def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> floa
 def lay_lids_on(
     eye: FittedEye, skin: Float64, fitted: Float64, sources: Float64, targets: Float64
 ) -> Float64:
-    """(V, 3) the skin, laid on an eyeball as it lay before.
+    """(V, 3) the fitted skin, laid on an eyeball as the old skin was on the old one.
 
-    Near the sphere it keeps its height above it, in proportion; further out it stays as fitted. The given
+    Near the sphere it keeps its distance from it, in proportion; further out it stays as fitted. The given
     points (sources before, targets after) reach their targets, and no other vertex that was outside the
     eyeball ends up inside it.
     """
@@ -155,7 +155,7 @@ def lay_lids_on(
     weight = eyeball_weight(eye, sources)
     local = weight > LEAST
     if local.any():
-        # The remaining errors of the given points are interpolated over the skin between them.
+        # Errors that are left at the given points are interpolated over the skin between them.
         left = (targets[local] - _lay_on(eye, sources[local], targets[local])) / weight[local, None]
         moved[near] += eyeball_weight(eye, skin[near])[:, None] * linear_field(sources[local], left)(
             skin[near]
@@ -178,17 +178,8 @@ def eyeball_weight(eye: FittedEye, points: Float64) -> Float64:
     return weight
 
 
-def _push_outside(
-    eye: FittedEye,
-    skin: Float64,
-    moved: Float64,
-    near: Bool,
-    sources: Float64,
-) -> Float64:
-    """(V, 3) moved, with vertices that have got inside the eyeball put back on it; given points stay.
-
-    Changes `moved` in place.
-    """
+def _push_outside(eye: FittedEye, skin: Float64, moved: Float64, near: Bool, sources: Float64) -> Float64:
+    """`moved` (V, 3), with vertices inside the eyeball pushed out onto it, in place; sources stay."""
     from scipy.spatial import cKDTree
 
     before = np.linalg.norm(skin - eye.was.centre, axis=1) / eye.was.radius

@@ -12,23 +12,23 @@ from fba.face.feature_points import names
 from fba.mesh.meshes import vertex_normals
 
 WELL_KNOWN = 0.02
-"""Metres: the affine part is used along directions in which the points spread by more than this."""
+"""Metres: the affine part covers directions in which the points spread by more than this."""
 ANCHOR_DISTANCE = 0.08
-"""Metres from every point, for an adult head: beyond it only the affine part acts."""
+"""Metres from every source, for an adult head, beyond which only the affine part acts."""
 ANCHORS = 60
 SAME_PLACE = 1e-5
 """Sources within this many metres are merged into one."""
 SLACK = 1e-9
-"""Smoothing of the anchors: they hold the far field at zero without being met exactly."""
+"""Smoothing of the anchors: they keep the far field near zero, not exactly at it."""
 LEAST_VOLUME = 0.04
-"""Smallest local volume of the deformation, as a share of the usual one, that is not a fold."""
+"""The deformation folds where its local volume is below this share of the usual one."""
 KERNELS = ("thin_plate_spline", "cubic", "linear")
 """Kernels of the radial basis functions, from the smoothest to the least prone to fold."""
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A deformation of space: call it with points (N, 3), metres.
+    """A deformation of space: calling it with points (N, 3) gives where they move, metres.
 
     matrix, origin, target: its affine part. rest: the non-affine part, a function of points (N, 3).
     """
@@ -50,8 +50,8 @@ class Field:
     def rotations(self, points: Floating) -> Float64:
         """(N, 3, 3) rotation of the deformation at each point, without its stretch."""
         u, _, vt = np.linalg.svd(self.jacobians(points))
-        turned: Float64 = u @ vt
-        return turned
+        rotations: Float64 = u @ vt
+        return rotations
 
     def jacobians(self, points: Floating, step: float = 1e-4) -> Float64:
         """(N, 3, 3) Jacobian of the deformation at each point, by central differences of `step` metres."""
@@ -63,9 +63,9 @@ class Field:
 def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str, size: float) -> Field:
     """The deformation of a mesh (V, 3) that takes sources (N, 3) to targets (N, 3).
 
-    size: of the person relative to the face. The affine part is used along directions in which the points
-    spread. A radial basis function (`KERNELS`) does the rest; anchors on the mesh hold it at zero far from
-    all points, so that the back of a head does not follow the tip of a nose.
+    size: of the person relative to the face. An affine map covers directions in which the points spread, a
+    radial basis function (`KERNELS`) the rest; anchors on the mesh keep that near zero far from all points,
+    so that the back of a head does not follow the tip of a nose.
     """
     from scipy.interpolate import RBFInterpolator
 
@@ -85,21 +85,20 @@ def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str,
 
 
 def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
-    """(K, 3): up to `ANCHORS` vertices spread over the part of a mesh that is far from all sources."""
+    """(K, 3): up to `ANCHORS` vertices, spread over that part of a mesh that is far from all sources."""
     from scipy.spatial import cKDTree
 
     away = cKDTree(sources).query(mesh)[0]
-    rest = mesh[away > ANCHOR_DISTANCE]
-    chosen: list[int] = []
-    distance = np.full(len(rest), np.inf)
-    while len(chosen) < min(ANCHORS, len(rest)):
-        nearest = int(distance.argmax()) if chosen else int(away[away > ANCHOR_DISTANCE].argmax())
-        if chosen and distance[nearest] < ANCHOR_DISTANCE / 2:
+    far = mesh[away > ANCHOR_DISTANCE]
+    anchors: list[int] = []
+    distance = np.full(len(far), np.inf)  # from the nearest anchor
+    while len(anchors) < min(ANCHORS, len(far)):
+        furthest = int(distance.argmax()) if anchors else int(away[away > ANCHOR_DISTANCE].argmax())
+        if anchors and distance[furthest] < ANCHOR_DISTANCE / 2:
             break
-        chosen.append(nearest)
-        distance = np.minimum(distance, np.linalg.norm(rest - rest[nearest], axis=1))
-    points: Float64 = rest[chosen]
-    return points
+        anchors.append(furthest)
+        distance = np.minimum(distance, np.linalg.norm(far - far[furthest], axis=1))
+    return np.asarray(far[anchors])
 
 
 def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
@@ -108,11 +107,7 @@ def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
     gram = np.exp(-_squares(centres, centres) / (2 * width**2))
     strength = np.linalg.lstsq(gram, shifts, rcond=None)[0]
 
-    def moved(points: Float64) -> Float64:
-        found: Float64 = np.exp(-_squares(points, centres) / (2 * width**2)) @ strength
-        return found
-
-    return moved
+    return lambda points: np.exp(-_squares(points, centres) / (2 * width**2)) @ strength
 
 
 def linear_field(centres: Float64, shifts: Float64) -> Any:
@@ -124,6 +119,7 @@ def linear_field(centres: Float64, shifts: Float64) -> Any:
 
 
 def _squares(a: Float64, b: Float64) -> Float64:
+    """(N, M) squared distances between points (N, 3) and (M, 3)."""
     squares: Float64 = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
     return squares
 
@@ -135,28 +131,24 @@ def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Floa
     group = np.arange(len(sources))
     for a, b in sorted(cKDTree(sources).query_pairs(SAME_PLACE)):
         group[group == group[b]] = group[a]
-    spots, inverse = np.unique(group, return_inverse=True)
-    count = np.bincount(inverse).astype(np.float64)[:, None]
-    summed = np.zeros((len(spots), 6))
+    inverse = np.unique(group, return_inverse=True)[1]
+    summed = np.zeros((int(inverse.max()) + 1, 6))
     np.add.at(summed, inverse, np.hstack([sources, targets]))
-    mean = summed / count
+    mean = summed / np.bincount(inverse)[:, None]
     return mean[:, :3], mean[:, 3:]
 
 
 def folded_vertices(field: Field, mesh: Floating, size: float) -> Intp:
-    """Vertices at which the deformation turns space inside out, or nearly so.
-
-    size: usual factor of lengths.
-    """
+    """Vertices at which the deformation turns space inside out, or nearly so. size: its usual scale."""
     volume = np.linalg.det(field.jacobians(mesh)) / size**3
     return np.flatnonzero(~(volume > LEAST_VOLUME))
 
 
 def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) -> tuple[Intp, float]:
-    """(numbers of the triangles that a deformation turns over, their share of the total area before).
+    """(triangles that a deformation turns over, their share of the total area before).
 
-    A triangle has turned over where its normal agreed with the mean of its neighbours' normals before but
-    opposes it after: a rotation of the surface around it does not count.
+    A triangle has turned over if its normal agreed with the mean of its neighbours' normals before but
+    opposes it after: a rotation of the whole surface does not count.
     """
     agreeing, areas = [], []
     for vertices in (np.asarray(before, dtype=np.float64), after):
@@ -178,4 +170,4 @@ def nearest_points(points: Float64, sources: Float64, rows: Intp, count: int = 4
     _, near = cKDTree(sources).query(points, k=min(3, len(sources)))
     votes = np.bincount(np.ravel(near), minlength=len(sources))
     order = np.argsort(-votes, kind="stable")[:count]
-    return tuple(names()[int(rows[place])] for place in order if votes[place])
+    return tuple(names()[int(rows[k])] for k in order if votes[k])

@@ -30,13 +30,12 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
 if TYPE_CHECKING:
     from fba.face.checks.posing import Poser
-    from fba.face.tables import FaceDefTables
 
 
 TURNED_OVER = 0.002
-"""Share of the surface that may turn over, in wrinkles, before the deformation is refused as folded."""
+"""Share of the surface that may turn over, as in wrinkles, before the deformation is refused."""
 FAPU_DISTANCES = ("ES0", "ENS0", "MNS0", "MW0", "IRISD0")
-"""The distances of a face that the FAPU are fractions of."""
+"""The distances of a face of which the FAPU are fractions."""
 
 
 def fit(
@@ -47,17 +46,17 @@ def fit(
     tables: Literal["auto", "carry", "author"] = "auto",
     name: str | None = None,
 ) -> FaceModel:
-    """The model in the shape of a person: deformed smoothly through the person's feature points.
+    """The model deformed smoothly into the shape of a person, through the person's feature points.
 
-    points: float (84, 3), rows as `feature_point_names()`, NaN where unknown, in any unit and pose; unit
-    names it ("mm", "cm", "m", "in", or metres for one unit), None finds it. Points of a side that is
-    missing are mirrored from the other. Eyeballs stay spheres and teeth rigid; lips and teeth meet, as in
-    every neutral face. The person keeps size and axes where unit and axes are a file's usual ones; the
-    middle between the pupils stays where the model has it.
+    points: float (84, 3), rows as `feature_point_names()`, NaN where unknown, in any unit and pose. unit:
+    "mm", "cm", "m", "in", or metres for one unit; None finds it. Points that one side lacks are mirrored
+    from the other. Eyeballs stay spheres and teeth rigid; lips and teeth meet, as in every neutral face. The
+    person keeps its size in a usual unit, and its axes if they are nearly the model's; the midpoint of the
+    pupils stays that of the model.
 
-    tables: how FaceDefTables are made: "carry" bends the model's with the surface, "author" makes new ones,
-    "auto" carries them and, if these break more of the standard's rules than the model did, also makes new
-    ones and keeps the better ones of each FAP.
+    tables: how FaceDefTables are made. "carry" bends the model's with the surface; "author" makes new ones;
+    "auto" carries them and, if these break more of the standard's rules than the model's do, also makes new
+    ones and takes the better ones for each FAP.
     name: of the fitted model, by default the model's own.
 
     Warns with FbaWarning about left and right swapped, misplaced points that were left out, an open mouth.
@@ -99,11 +98,11 @@ def fit(
 
 
 def points_of_distances(model: FaceModel, distances: Mapping[str, float]) -> Float64:
-    """Feature points (84, 3) of a face of which only the distances behind the FAPU are known.
+    """Feature points (84, 3) of a face of which only the distances of the FAPU are known.
 
-    distances: any of `FAPU_DISTANCES` in any unit, as Xface files give them; ES0 is required, as it sets
-    the size. NaN for points that no distance moves. Raises ModelError for a distance that is
-    unknown or not positive.
+    distances: any of `FAPU_DISTANCES` in any unit, as in Xface files; ES0 is required, as it sets the size.
+    Points that no distance concerns are NaN. Raises ModelError for a distance that is unknown or not
+    positive.
     """
     for key, value in distances.items():
         if key not in FAPU_DISTANCES or not (np.isfinite(value) and value > 0):
@@ -118,19 +117,18 @@ def points_of_distances(model: FaceModel, distances: Mapping[str, float]) -> Flo
     row = row_of()
     scaled = model.points * size
     points = np.full_like(scaled, np.nan)
-    eyes = ["3.5", "3.6", "3.1", "3.2", "3.3", "3.4"]
-    nose, mouth = ["9.15", "9.4", "9.5"], ["2.2", "2.3", "2.4", "2.5", "8.3", "8.4", "8.1", "8.2"]
-    for name in (*eyes, *nose, *mouth):
-        points[row[name]] = scaled[row[name]]
+    eyes = [row[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.3", "3.4")]
+    nose = [row[name] for name in ("9.15", "9.4", "9.5")]
+    mouth = [row[name] for name in ("2.2", "2.3", "2.4", "2.5", "8.3", "8.4", "8.1", "8.2")]
+    points[eyes + nose + mouth] = scaled[eyes + nose + mouth]
     lids = (wanted["IRISD0"] - own["IRISD0"] * size) / 2
     points[[row["3.1"], row["3.2"]], 1] += lids
     points[[row["3.3"], row["3.4"]], 1] -= lids
     down = wanted["ENS0"] - own["ENS0"] * size
-    points[[row[name] for name in nose], 1] -= down
-    points[[row[name] for name in mouth], 1] -= down + wanted["MNS0"] - own["MNS0"] * size
-    across = [row[name] for name in mouth]
+    points[nose, 1] -= down
+    points[mouth, 1] -= down + wanted["MNS0"] - own["MNS0"] * size
     middle = (scaled[row["8.3"], 0] + scaled[row["8.4"], 0]) / 2
-    points[across, 0] = middle + (points[across, 0] - middle) * wanted["MW0"] / (own["MW0"] * size)
+    points[mouth, 0] = middle + (points[mouth, 0] - middle) * wanted["MW0"] / (own["MW0"] * size)
     return points
 
 
@@ -138,10 +136,10 @@ def _check_points(points: npt.ArrayLike) -> Float64:
     given = np.array(points, dtype=np.float64)
     if given.shape != (len(names()), 3):
         raise ModelError(f"feature points must have shape ({len(names())}, 3), not {given.shape}")
-    half = np.isnan(given).any(axis=1) & ~np.isnan(given).all(axis=1)
-    wild = np.isinf(given).any(axis=1) | (np.abs(np.nan_to_num(given)) > 1e9).any(axis=1)
-    if (half | wild).any():
-        row = int(np.flatnonzero(half | wild)[0])
+    partial = np.isnan(given).any(axis=1) & ~np.isnan(given).all(axis=1)
+    too_large = np.isinf(given).any(axis=1) | (np.abs(np.nan_to_num(given)) > 1e9).any(axis=1)
+    if (partial | too_large).any():
+        row = int(np.flatnonzero(partial | too_large)[0])
         raise ModelError(f"feature point {names()[row]} at {given[row].tolist()} has no usable position")
     return given
 
@@ -149,16 +147,16 @@ def _check_points(points: npt.ArrayLike) -> Float64:
 def _swap_to_own_sides(points: Float64) -> Float64:
     from fba.face.importers.points.fdp_data import repair_sides
 
-    right, swaps, wrong = repair_sides(points)
-    changed = [f"{a} and {b} have changed places" for a, b in swaps]
-    changed += [f"{one} is on the other side" for one in wrong]
-    if changed:
-        warnings.warn(f"put right: {'; '.join(changed)}", FbaWarning, stacklevel=3)
-    return right
+    repaired, swaps, wrong = repair_sides(points)
+    changes = [f"{a} and {b} have changed places" for a, b in swaps]
+    changes += [f"{name} is on the other side" for name in wrong]
+    if changes:
+        warnings.warn(f"put right: {'; '.join(changes)}", FbaWarning, stacklevel=3)
+    return repaired
 
 
 def _size(here: Float64, there: Float64) -> float:
-    """The person's size relative to the model: the median over all pairs of points, so no outlier counts."""
+    """The person's size relative to the model: the median over all pairs of points, so robust to outliers."""
     from scipy.spatial.distance import pdist
 
     before, after = pdist(here), pdist(there)
@@ -167,7 +165,7 @@ def _size(here: Float64, there: Float64) -> float:
 
 
 def _iris_diameters(model: FaceModel, targets: Float64, size: float) -> tuple[float, float]:
-    """(before, after) diameter of the iris, metres: the height of the lid opening of a neutral face."""
+    """(before, after) diameter of the iris, metres: the height of a neutral face's lid opening."""
     row = row_of()
     before = model.fapu.IRISD * PER_DISTANCE
     heights = [
@@ -186,7 +184,7 @@ def _iris_diameters(model: FaceModel, targets: Float64, size: float) -> tuple[fl
 def _deform_without_folds(
     model: FaceModel, targets: Float64, known: Bool, sure: Bool, size: float, iris: tuple[float, float]
 ) -> Shape:
-    """The parts under the smoothest deformation that does not fold.
+    """The shape by the smoothest deformation that does not fold.
 
     Raises ModelError, naming the points, where every kernel folds.
     """
@@ -195,13 +193,13 @@ def _deform_without_folds(
     if outer.sum() < 4:
         outer[pupils] = known[pupils]
     rows = np.flatnonzero(outer)
-    sources, places = model.points[rows], targets[rows]
+    sources = model.points[rows]
     mesh = np.concatenate(
         [part.vertices for part in model.parts if part.kind in ("skin", "mouth")] or [model.vertices]
     )
     worst: Intp = np.zeros(0, dtype=np.intp)
     for kernel in KERNELS:
-        field = deformation(sources, places, mesh, kernel, size)
+        field = deformation(sources, targets[rows], mesh, kernel, size)
         worst = folded_vertices(field, mesh, size)
         if not len(worst):
             return deform(model, field, targets, sure, iris)
@@ -213,7 +211,7 @@ def _deform_without_folds(
 
 
 def _check_folds(model: FaceModel, parts: tuple[Part, ...], targets: Float64, known: Bool) -> None:
-    """Raise ModelError where too many triangles of the finished skin have turned over."""
+    """Raises ModelError where too many triangles of the fitted skin have turned over."""
     for old, new in zip(model.parts, parts, strict=True):
         if old.kind not in ("skin", "mouth") or not len(old.triangles):
             continue
@@ -240,34 +238,30 @@ def _with_tables(model: FaceModel, fitted: FaceModel, shape: Shape, how: str) ->
     if how == "carry":
         return carried
     bent = Poser(carried)
-    broken = _count_errors(bent)
-    if broken <= _count_errors(Poser(model)):
+    errors = _count_errors(bent)
+    if errors <= _count_errors(Poser(model)):
         return carried
     new = Poser(_author_anew(model, fitted), like=bent)
     best = Poser(_best_tables(new, bent), like=new)
-    return min(
-        (new.model, _count_errors(new)),
-        (best.model, _count_errors(best)),
-        (carried, broken),
-        key=itemgetter(1),
-    )[0]
+    candidates = ((_count_errors(new), new), (_count_errors(best), best), (errors, bent))
+    return min(candidates, key=itemgetter(0))[1].model
 
 
 def _best_tables(first: Poser, second: Poser) -> FaceModel:
     """The first model with the second's tables for every FAP where these break fewer rules."""
-    chosen = {table.fap: table for table in first.model.tables}
+    tables = {table.fap: table for table in first.model.tables}
     for table in second.model.tables:
-        number = table.fap
-        if number not in chosen or _count_errors(second, number) < _count_errors(first, number):
-            chosen[number] = table
-    lost = {number: why for number, why in first.model.lost.items() if number not in chosen}
-    return first.model.with_tables(tuple(chosen.values()), lost)
+        fap = table.fap
+        if fap not in tables or _count_errors(second, fap) < _count_errors(first, fap):
+            tables[fap] = table
+    lost = {fap: why for fap, why in first.model.lost.items() if fap not in tables}
+    return first.model.with_tables(tuple(tables.values()), lost)
 
 
 def _author_anew(model: FaceModel, fitted: FaceModel) -> FaceModel:
     from fba.face.authoring import author
 
-    made = author(
+    authored = author(
         fitted.parts,
         fitted.points,
         bound=fitted.bound,
@@ -276,8 +270,8 @@ def _author_anew(model: FaceModel, fitted: FaceModel) -> FaceModel:
         fit=model.fit,
         notes=fitted.notes,
     )
-    tables: tuple[FaceDefTables, ...] = tuple(one for one in made.tables if one.fap not in model.lost)
-    return made.with_tables(tables, {**made.lost, **model.lost})
+    tables = tuple(table for table in authored.tables if table.fap not in model.lost)
+    return authored.with_tables(tables, {**authored.lost, **model.lost})
 
 
 def _count_errors(poser: Poser, fap: int | None = None) -> int:

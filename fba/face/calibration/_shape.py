@@ -1,8 +1,8 @@
-"""The parts of a face deformed: skin smoothly, eyeballs and teeth as rigid bodies of another size."""
+"""Deforms the parts of a face: skin smoothly, eyeballs and teeth rigidly but for their size."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from fba.face.calibration._field import Field, bump_field
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
 from fba.face.feature_points import names, row_of
 from fba.mesh.meshes import vertex_normals
+from fba.rotations import apply, between_all
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
@@ -26,21 +27,25 @@ TONGUE = ("6.1", "6.2", "6.3", "6.4")
 INNER = ("3.5", "3.6", *TEETH["upper"], *TEETH["lower"], *TONGUE, "7.1", "11.5")
 """Points on rigid parts, inside the mouth or on no surface: they do not deform the skin."""
 ON_LIDS = ("lash", "brow", "hair", "other")
-"""Kinds of parts that are carried by the skin under them."""
+"""Kinds of parts that move with the skin under them."""
 LIPS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")
 SNAP = 2e-5
-"""Metres: vertices this close to a target are moved onto it; too little to be seen."""
+"""Metres: vertices this close to a target are moved onto it; the difference is invisible."""
 BESIDE = 0.005
-"""Metres in x and y within which teeth count as behind a point of the lips."""
+"""Teeth within this many metres of a point of the lips, in x and y, are behind it."""
 TONGUE_WIDTH = 0.012
-"""Metres within which the tongue follows a given point of it."""
+"""A given point moves the tongue within about this many metres."""
+
+
+Map = Callable[[Floating], Float64]
+"""A function from points (N, 3) to where they move, (N, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Vertices of every part by name, the feature points (84, 3), and what became of the eyes.
+    """A deformed face: vertices by part name, feature points (84, 3), and the eyes by side.
 
-    rotations: (V, 3, 3), rotation of the surroundings of each vertex, for parts that are not rigid.
+    rotations: by part name, (V, 3, 3), rotation of the deformation at each vertex of parts not rigid.
     """
 
     vertices: Mapping[str, Float64]
@@ -57,17 +62,17 @@ class Similarity:
     target: Float64
     size: float
 
-    def __call__(self, places: Floating) -> Float64:
-        moved: Float64 = self.target + self.size * (np.asarray(places, dtype=np.float64) - self.origin)
+    def __call__(self, points: Floating) -> Float64:
+        moved: Float64 = self.target + self.size * (np.asarray(points, dtype=np.float64) - self.origin)
         return moved
 
 
 def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: tuple[float, float]) -> Shape:
     """All parts and feature points of a model after a deformation.
 
-    targets: (84, 3), required positions of the feature points in metres, NaN where the field decides. given:
-    (84,), mask of the points that the person's data give reliably. iris: its diameter before and after,
-    metres.
+    targets: (84, 3), required positions of the feature points in metres, NaN where the field gives them.
+    given: (84,), mask of the points that are reliable in the person's data. iris: its diameter before and
+    after, metres.
     """
     row = row_of()
     vertices = {part.name: field(part.vertices) for part in model.parts}
@@ -135,30 +140,29 @@ def _snap_to_points(model: FaceModel, vertices: dict[str, Float64], targets: Flo
 
 
 def _surface_points(model: FaceModel, targets: Float64) -> tuple[Float64, Float64]:
-    """((K, 3), (K, 3)): positions of the known points on the surface before, and their targets."""
+    """((K, 3), (K, 3)): the known points on the surface before, and their targets."""
     outer = np.array([name not in INNER for name in names()])
     known = known_rows(targets, model.points) & outer
     return model.points[known], targets[known]
 
 
 def fit_similarity(before: Floating, after: Float64) -> Similarity:
-    """The scale and shift closest, in least squares, to the deformation of vertices (N, 3) into after."""
-    places = np.asarray(before, dtype=np.float64)
-    a, b = places - places.mean(axis=0), after - after.mean(axis=0)
+    """The scale and shift that take vertices (N, 3) closest to those after, in least squares."""
+    origin, target = np.asarray(before, dtype=np.float64).mean(axis=0), after.mean(axis=0)
+    a, b = before - origin, after - target
     squares = float((a**2).sum())
-    size = float((a * b).sum()) / squares if squares > 0 else 1.0
-    return Similarity(places.mean(axis=0), after.mean(axis=0), size)
+    return Similarity(origin, target, float((a * b).sum()) / squares if squares > 0 else 1.0)
 
 
 def _fit_teeth_and_tongue(
     model: FaceModel, field: Field, targets: Float64, given: Bool
-) -> tuple[dict[str, Similarity], _Tongue]:
-    """(teeth by jaw, tongue): the maps that move each row of teeth and the tongue."""
+) -> tuple[dict[str, Similarity], Map]:
+    """(map of the teeth by jaw, map of the tongue)."""
     row = row_of()
     teeth = [part.vertices for part in model.of_kind("teeth")]
     inside = teeth or [part.vertices for part in model.of_kind("tongue")] or [model.vertices]
-    places = np.concatenate(inside).astype(np.float64)
-    both = fit_similarity(places, field(places))
+    vertices = np.concatenate(inside).astype(np.float64)
+    both = fit_similarity(vertices, field(vertices))
     both = _behind_lips(model, field, both) if teeth else both
     jaws = {}
     for jaw, (edge, gum) in TEETH.items():
@@ -167,47 +171,43 @@ def _fit_teeth_and_tongue(
         if np.isfinite(here[0]).all() and np.isfinite(there[0]).all() and given[row[edge]]:
             size = both.size
             if given[row[gum]] and np.isfinite(here).all() and np.isfinite(there).all():
-                tall = float(np.linalg.norm(there[1] - there[0]) / np.linalg.norm(here[1] - here[0]))
-                size = tall if 0.7 * both.size < tall < 1.4 * both.size else size
+                height = float(np.linalg.norm(there[1] - there[0]) / np.linalg.norm(here[1] - here[0]))
+                size = height if 0.7 * both.size < height < 1.4 * both.size else size
             jaws[jaw] = Similarity(here[0], there[0], size)
     wanted = [row[name] for name in TONGUE if given[row[name]] and np.isfinite(model.points[row[name]]).all()]
-    return jaws, _Tongue(jaws["lower"], model.points[wanted], targets[wanted])
+    return jaws, _fit_tongue(jaws["lower"], model.points[wanted], targets[wanted])
 
 
 def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarity:
-    """The map of the teeth, shifted back until they are as far behind the inner lips as before."""
+    """The map of the teeth, shifted back so that they are as far behind the inner lips as before."""
     known = [row for row in (row_of()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
-    places = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
-    lips, moved = field(model.points[known]), teeth(places)
+    vertices = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
+    lips, moved = field(model.points[known]), teeth(vertices)
     back = 0.0
     for before, after in zip(model.points[known], lips, strict=True):
-        room = before[2] - _foremost_z(places, before)
+        room = before[2] - _foremost_z(vertices, before)
         wanted = after[2] - teeth.size * room
         if np.isfinite(room):
             back = max(back, _foremost_z(moved, after) - wanted)
     return Similarity(teeth.origin, teeth.target - (0.0, 0.0, max(back, 0.0)), teeth.size)
 
 
-def _foremost_z(places: Float64, point: Float64) -> float:
+def _foremost_z(points: Float64, point: Float64) -> float:
     """The greatest z of points (N, 3) right behind or before a point, -inf where there are none."""
-    near = np.hypot(places[:, 0] - point[0], places[:, 1] - point[1]) < BESIDE
-    return float(places[near, 2].max()) if near.any() else -np.inf
+    near = np.hypot(points[:, 0] - point[0], points[:, 1] - point[1]) < BESIDE
+    return float(points[near, 2].max()) if near.any() else -np.inf
 
 
-class _Tongue:
-    """The map of the tongue: it follows the lower teeth and passes through its given points."""
-
-    def __init__(self, base: Similarity, here: Float64, there: Float64) -> None:
-        self._base = base
-        self._rest = bump_field(here, there - base(here), TONGUE_WIDTH) if len(here) else None
-
-    def __call__(self, places: Floating) -> Float64:
-        moved = self._base(places)
-        return moved if self._rest is None else moved + self._rest(np.asarray(places, dtype=np.float64))
+def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
+    """The map of the tongue, which moves as the lower teeth (`base`), and takes given points to others."""
+    if not len(here):
+        return base
+    rest = bump_field(here, there - base(here), TONGUE_WIDTH)
+    return lambda points: base(points) + rest(np.asarray(points, dtype=np.float64))
 
 
 def _jaw(model: FaceModel, part: Part) -> str:
-    """The jaw of a part of the teeth, "upper" or "lower", by its height against the line where they meet."""
+    """The jaw of a part of the teeth, "upper" or "lower": above or below the line where they meet."""
     edges = model.points[[row_of()["9.10"], row_of()["9.11"]], 1]
     heights = [float(one.vertices[:, 1].mean()) for one in model.of_kind("teeth")]
     boundary = float(edges.mean()) if np.isfinite(edges).all() else float(np.mean(heights))
@@ -238,9 +238,9 @@ def _points(
     field: Field,
     targets: Float64,
     teeth: Mapping[str, Similarity],
-    tongue: _Tongue,
+    tongue: Map,
 ) -> Float64:
-    """Feature points after the deformation: bound ones on their vertices, free ones as given or carried."""
+    """(84, 3) feature points after the deformation: bound ones at their vertices, others as given."""
     points = field(np.nan_to_num(model.points))
     for jaw, group in TEETH.items():
         for name in group:
@@ -260,21 +260,9 @@ def _points(
 
 
 def rebuild_part(part: Part, vertices: Float64) -> Part:
-    """The part with other vertices and its normals rotated with the surface, so that seams stay invisible."""
-    before = vertex_normals(part.vertices, part.triangles).astype(np.float64)
-    after = vertex_normals(vertices, part.triangles).astype(np.float64)
-    normals = np.asarray(part.normals, dtype=np.float64)
-    axis = np.cross(before, after)
-    cosine = (before * after).sum(axis=1, keepdims=True)
-    # Rodrigues' formula for the smallest rotation that takes one unit vector to another
-    turned = (
-        normals * cosine
-        + np.cross(axis, normals)
-        + axis * (axis * normals).sum(axis=1, keepdims=True) / np.maximum(1 + cosine, 1e-6)
+    """The part with other vertices, its normals rotated with the surface so that seams stay invisible."""
+    before, after = (
+        vertex_normals(corners, part.triangles).astype(np.float64) for corners in (part.vertices, vertices)
     )
-    length = np.linalg.norm(turned, axis=1, keepdims=True)
-    return replace(
-        part,
-        vertices=vertices.astype(np.float32),
-        normals=np.where(length > 0.1, turned / np.maximum(length, 0.1), after).astype(np.float32),
-    )
+    normals = apply(between_all(before, after), np.asarray(part.normals, dtype=np.float64))
+    return replace(part, vertices=vertices.astype(np.float32), normals=normals.astype(np.float32))
