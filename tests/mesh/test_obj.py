@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fba.errors import ModelError
-from fba.face.importers.assembly.polygon_parts import make_part
+from fba.face.importers.assembly.polygon_parts import make_piece
 from fba.mesh import obj, text_files
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import triangulate
@@ -52,7 +52,7 @@ def test_groups_objects_and_materials(tmp_path: Path) -> None:
 def test_texture_coordinates_are_turned_over_and_seams_split(tmp_path: Path) -> None:
     text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0.25 1\nf 1/1 2/2 3/3\nf 1/4/1 3/3/1 4//1\n"
     mesh = read_obj(written(tmp_path, text))
-    source = make_part(mesh, np.ones(2, dtype=bool), "skin", "skin", scale=0.5)
+    source = make_piece(mesh, np.ones(2, dtype=bool), "skin", "skin", scale=0.5)
     part = source.part
     # vertex 0 has two texture coordinates, the others one each
     assert sorted(source.origin.tolist()) == [0, 0, 1, 2, 3]

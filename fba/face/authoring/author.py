@@ -213,9 +213,8 @@ class _Authoring:
         reached = jaw_angles_at_values(motion, values, angles)
         for part in self.parts:
             if part.name in shares:
-                inner = opening_shifts(part.vertices.astype(np.float64), jaw, reached)
-                inner *= shares[part.name][:, None]
-                self.moves[OPEN_JAW][part.name] = Motion(motion.values, np.arange(len(part.vertices)), inner)
+                shifts = opening_shifts(part.vertices.astype(np.float64), jaw, reached)
+                self._add_inner(OPEN_JAW, part, motion.values, shifts * shares[part.name][:, None])
         for fap in (THRUST_JAW, SHIFT_JAW):
             self._add_sliding(fap, jaw, shares)
 
@@ -229,8 +228,12 @@ class _Authoring:
         chin = int(np.flatnonzero(motion.vertices == self.marks.vertex["2.1"])[0])
         for part in self.parts:
             if part.name in shares:
-                inner = motion.shifts[:, chin, None] * shares[part.name][:, None]
-                self.moves[fap][part.name] = Motion(motion.values, np.arange(len(part.vertices)), inner)
+                shifts = motion.shifts[:, chin, None] * shares[part.name][:, None]
+                self._add_inner(fap, part, motion.values, shifts)
+
+    def _add_inner(self, fap: int, part: Part, values: Float64, shifts: Float64) -> None:
+        """Add the shifts (K, V, 3) of a part in the mouth to a FAP."""
+        self.moves[fap][part.name] = Motion(values, np.arange(len(part.vertices)), shifts)
 
     def _add_lids(self) -> None:
         for fap, (side, _) in LIDS.items():

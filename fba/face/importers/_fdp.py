@@ -10,8 +10,7 @@ import numpy as np
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.model import ImportOptions, finish_import
-from fba.face.importers.assembly.pieces import Piece
-from fba.face.importers.assembly.polygon_parts import make_part
+from fba.face.importers.assembly.polygon_parts import make_piece
 from fba.face.importers.mesh import import_mesh
 from fba.face.importers.points.fdp import load_fdp
 from fba.face.importers.points.fdp_data import Fdp
@@ -69,8 +68,8 @@ def _import_xface(fdp: Fdp, options: ImportOptions) -> FaceModel:
     for number, shape in enumerate(read_vrml(file)):
         label = f"{file.name}_{number}"
         if len(shape):
-            source = make_part(shape, np.ones(len(shape), dtype=np.bool_), label, "other")
-            pieces.append(Piece(source.part, "", source.origin + np.int32(start)))
+            piece = make_piece(shape, np.ones(len(shape), dtype=np.bool_), label)
+            pieces.append(replace(piece, origin=piece.origin + np.int32(start)))
             kinds.setdefault(label, BINDS.get(bind.get(label, ""), "skin"))
         for point, (submesh, vertex) in fdp.vertices.items():
             if submesh == label:

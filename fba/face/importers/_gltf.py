@@ -12,7 +12,8 @@ from fba.arrays import Float32
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import ImportOptions, finish_import, turn_upright
-from fba.face.importers.assembly.pieces import Piece, assemble, unused_name
+from fba.face.importers.assembly.pieces import assemble, unused_name
+from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.importers.points.points_file import given_points, points_beside
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.text_files import MAX_VERTICES

@@ -1,4 +1,4 @@
-"""Finds the importer for a file, from its content, then from its name."""
+"""Recognises which importer a file is for, by its content, then by its name."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ OBJ_WORDS = (b"v ", b"f ", b"vt ", b"vn ", b"g ", b"o ", b"mtllib", b"usemtl", b
 
 def sniff(path: str | os.PathLike[str]) -> str:
     """The kind of a source, one of `KINDS`; ModelError, listing them, for anything else."""
-    place = Path(path)
-    if place.is_dir():
+    path = Path(path)
+    if path.is_dir():
         from fba.face.importers.makehuman.makehuman import base_file
 
-        base_file(place)
+        base_file(path)
         return "makehuman"
     try:
-        head = read_head(place)
+        head = read_head(path)
     except FormatError as error:
         raise ModelError(str(error)) from error
-    kind = _kind_of_content(head, place)
+    kind = _kind_of_content(head, path)
     if kind is None:
         reads = "; ".join(KINDS.values())
-        found = but_recognised(head)
-        raise ModelError(f"{place}: no face can be read from this file{found}. Read are: {reads}")
+        recognised = but_recognised(head)
+        raise ModelError(f"{path}: no face can be read from this file{recognised}. Read are: {reads}")
     return kind
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError, Remedy
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly.model import ImportOptions, finish_import
-from fba.face.importers.assembly.pieces import Piece, unused_name
-from fba.face.importers.assembly.polygon_parts import make_part
+from fba.face.importers.assembly.pieces import unused_name
+from fba.face.importers.assembly.polygon_parts import Piece, make_piece
 from fba.face.importers.points.fdp_data import repair_sides
 from fba.face.importers.points.points_file import GivenPoints, given_points, points_beside
 from fba.face.model import FaceModel, Material
@@ -61,10 +62,8 @@ def polygon_pieces(polygons: Polygons, materials: Mapping[str, Material]) -> lis
         if not (np.diff(polygons.starts)[faces] >= 3).any():
             continue
         name = unused_name(group or material or "mesh", taken)
-        source = make_part(
-            polygons, faces, name, "other", material=materials.get(material, Material(material or "plain"))
-        )
-        pieces.append(Piece(source.part, material, source.origin))
+        own = materials.get(material, Material(material or "plain"))
+        pieces.append(replace(make_piece(polygons, faces, name, material=own), material=material))
     return pieces
 
 

@@ -15,7 +15,7 @@ from fba.face.feature_points import row_of
 from fba.face.gltf.morphs import displacements
 from fba.face.importers import import_model
 from fba.face.importers.assembly.landmarks import find_points
-from fba.face.importers.assembly.pieces import Piece
+from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers, faps
 from mesh_files import write_glb, write_points

@@ -81,24 +81,25 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
     if len(lost) == len(numbers):
         return {}, lost
     lips = _fields(marks)
+    surface, pinned = marks.surface, marks.on_contours(*LIP_CONTOURS)
     motions: dict[int, Motion] = {}
     for number in numbers:
         mate = faps()[number - 1].lip_mate
         if number in lost or number in motions:
             continue
-        full_field = marks.step(number)[None] * _fap_field(lips, number)[:, None]
-        if number in PUSH:
-            share = lips.inward + OUTER_PUSH * (1 - lips.inward)
-            motions[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
-        elif mate is None or mate in lost:
-            share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
-            motions[number] = _motion_along(marks, limiter, full_field * share[:, None], number)
+        field = marks.step(number)[None] * _fap_field(lips, number)[:, None]
+        if number in PUSH or mate is None or mate in lost:
+            if number in PUSH:
+                share = lips.inward + OUTER_PUSH * (1 - lips.inward)
+            else:
+                share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
+            field = field * share[:, None]
+            moving = np.flatnonzero(np.abs(field).max(axis=1) > 0)
+            motions[number] = eased_linear_motion(surface, limiter, moving, field[moving], number, pinned)
         elif number < mate:
-            full_field = ease_field(
-                marks.surface, limiter, full_field, values_to_reach(number), marks.on_contours(*LIP_CONTOURS)
-            )
+            field = ease_field(surface, limiter, field, values_to_reach(number), pinned)
             inward = lips.inward[:, None]
-            pair = _coupled_motions(limiter, full_field * inward, full_field * (1 - inward), number)
+            pair = _coupled_motions(limiter, field * inward, field * (1 - inward), number)
             motions[number], motions[mate] = pair
     return motions, lost
 
@@ -135,14 +136,15 @@ def _fap_field(lips: _Lips, number: int) -> Float64:
 
 
 def _fields(marks: Landmarks) -> _Lips:
+    """The motion of each handle spread along the contours and into the skin around them."""
     names = list(HANDLES)
     size = len(marks.surface)
     values = np.full((size, len(names)), np.nan)
-    for side, which in (("inner", 0), ("outer", 1)):
+    for number, side in enumerate(("inner", "outer")):
         for half, handles in (("upper", UPPER), ("lower", LOWER)):
             walk = marks.contour(f"{half} {side} lip")
             if len(walk):
-                nodes = [marks.vertex.get(HANDLES[name][which]) for name in handles]
+                nodes = [marks.vertex.get(HANDLES[name][number]) for name in handles]
                 values[walk] = 0.0
                 values[walk[:, None], [names.index(name) for name in handles]] = _contour_shares(
                     marks.surface.vertices, walk, nodes
@@ -180,13 +182,6 @@ def _inward(marks: Landmarks) -> Float64:
         marks.surface, marks.lips, fixed, inner[fixed][:, None].astype(np.float64), slack=1.0, harmonic=True
     )
     return smoothstep(field[:, 0])
-
-
-def _motion_along(marks: Landmarks, limiter: Limiter, field: Float64, fap: int) -> Motion:
-    vertices = np.flatnonzero(np.abs(field).max(axis=1) > 0)
-    return eased_linear_motion(
-        marks.surface, limiter, vertices, field[vertices], fap, marks.on_contours(*LIP_CONTOURS)
-    )
 
 
 def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:

@@ -1,4 +1,4 @@
-"""Names of shapes (morph targets, blendshapes) as writers spell them, and what they are called here.
+"""Names of shapes (morph targets, blendshapes) as programs write them, and ARKit's names for them.
 
 "eyeBlinkLeft", "eyeBlink_L", "Left_Eye_Blink" and "blendShape1.eyeBlink_L" are one shape. Known are
 ARKit's 52 names with synonyms (`arkit.csv`) and the names of the FAPs, as this project's own files use
@@ -38,12 +38,12 @@ def arkit_of(name: str) -> str | None:
 
 def canonical_names(names: Iterable[str]) -> dict[str, str]:
     """ARKit's name -> the name that a file uses for it; the first of several."""
-    found: dict[str, str] = {}
+    used: dict[str, str] = {}
     for name in names:
         shape = arkit_of(name)
         if shape is not None:
-            found.setdefault(shape, name)
-    return found
+            used.setdefault(shape, name)
+    return used
 
 
 @cache
@@ -54,11 +54,11 @@ def _rows() -> tuple[dict[str, str], ...]:
 
 @cache
 def _synonyms() -> dict[frozenset[str], str]:
-    found: dict[frozenset[str], str] = {}
+    shapes: dict[frozenset[str], str] = {}
     for row in _rows():
         for name in (row["shape"], *filter(None, row["synonyms"].split(";"))):
-            found.setdefault(_words(name), row["shape"])
-    return found
+            shapes.setdefault(_words(name), row["shape"])
+    return shapes
 
 
 @cache

@@ -39,8 +39,7 @@ class Limiter:
     @classmethod
     def from_mesh(cls, vertices: Float64, triangles: Intp) -> Limiter:
         """The limiter of a mesh; triangles without area are left out, as they have no front to turn."""
-        first, second = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
-        areas = np.linalg.norm(np.cross(first, second), axis=1)
+        areas = np.linalg.norm(np.cross(*_two_edges(vertices, triangles)), axis=1)
         typical = float(np.median(areas)) if len(areas) else 0.0
         return cls(vertices, triangles[areas > DEGENERATE * typical])
 
@@ -71,15 +70,14 @@ class Limiter:
             return touched
         starts, fans = self._fans
         count = starts[vertices + 1] - starts[vertices]
-        place = np.repeat(starts[vertices] - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-        touched = self.triangles[np.unique(fans[place])]
+        rows = np.repeat(starts[vertices] - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
+        touched = self.triangles[np.unique(fans[rows])]
         return touched
 
     def reach(self, field: Float64, triangles: Intp) -> Float64:
         """(M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it unfolded."""
-        p, d = self.vertices, field
-        e1, e2 = (p[triangles[:, k]] - p[triangles[:, 0]] for k in (1, 2))
-        d1, d2 = (d[triangles[:, k]] - d[triangles[:, 0]] for k in (1, 2))
+        e1, e2 = _two_edges(self.vertices, triangles)
+        d1, d2 = _two_edges(field, triangles)
         normal = np.cross(e1, e2)
         area = (normal**2).sum(axis=1)
         linear = ((np.cross(e1, d2) + np.cross(d1, e2)) * normal).sum(axis=1) / area
@@ -102,8 +100,7 @@ class Limiter:
         fine = self.soundness(shifts, triangles, turning=turning)
         if not turning or fine.all():
             return bool(fine.all())
-        corners = self.vertices[triangles]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        areas = np.linalg.norm(np.cross(*_two_edges(self.vertices, triangles)), axis=1)
         return float(areas[~fine].sum()) <= SPECK * float(areas.sum())
 
     def soundness(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> Bool:
@@ -112,10 +109,8 @@ class Limiter:
         turning: the skin may rotate, as a lid does about the eyeball; then a triangle has folded where it
         faces away from its neighbours, not where it faces away from its neutral direction.
         """
-        p = self.vertices[triangles]
-        q = p + shifts[triangles]
-        e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-        f1, f2 = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
+        e1, e2 = _two_edges(self.vertices, triangles)
+        f1, f2 = _two_edges(self.vertices + shifts, triangles)
         before, after = np.cross(e1, e2), np.cross(f1, f2)
         if turning:
             fans = _vertex_fans(triangles)
@@ -127,6 +122,12 @@ class Limiter:
         now = np.linalg.norm(np.stack([f1, f2, f2 - f1]), axis=2)
         fine &= (now <= 1.1 * MOST_STRETCH * np.maximum(lengths, TINY_EDGE * typical)).all(axis=0)
         return fine
+
+
+def _two_edges(vertices: Float64, triangles: Intp) -> tuple[Float64, Float64]:
+    """The edges (M, 3) from the first corner of each triangle to the second and the third."""
+    first = vertices[triangles[:, 0]]
+    return vertices[triangles[:, 1]] - first, vertices[triangles[:, 2]] - first
 
 
 def _vertex_fans(triangles: Intp) -> Any:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32
-from fba.face.importers.assembly.pieces import Piece
+from fba.face.importers.assembly.polygon_parts import Piece
 
 
 def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece], int]:

@@ -10,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
 from fba.face.feature_points import row_of
-from fba.face.importers.assembly.pieces import Piece
+from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.model import Material, Part
 
 LOOKS = {

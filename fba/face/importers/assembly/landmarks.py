@@ -18,7 +18,7 @@ from fba.face.authoring.shapes.shape_names import canonical_names, fap_of
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
 from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._warping import warp_points
-from fba.face.importers.assembly.pieces import Piece
+from fba.face.importers.assembly.polygon_parts import Piece
 from fba.parameters import faps
 
 NEEDED = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")

@@ -14,7 +14,8 @@ from fba.errors import ModelError, OptionError
 from fba.face.feature_points import names, row_of
 from fba.face.importers.assembly._winding import turn_outward
 from fba.face.importers.assembly.default_materials import apply_default_materials
-from fba.face.importers.assembly.pieces import FREE, Piece, assemble, shift_piece
+from fba.face.importers.assembly.pieces import FREE, assemble, shift_piece
+from fba.face.importers.assembly.polygon_parts import Piece
 from fba.face.model import FaceModel
 
 PUPILS = 0.062

@@ -5,16 +5,16 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Bool, Float32, Float64, Int32
+from fba.arrays import Bool, Float32, Float64
 from fba.errors import ModelError, OptionError
-from fba.face.importers.assembly.polygon_parts import vertex_components
+from fba.face.importers.assembly.polygon_parts import Piece, vertex_components
 from fba.face.model import PART_KINDS, Part
 
 DROPPED = "none"
@@ -25,21 +25,6 @@ EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
 EYE_SIZES = (0.02, 0.12)
 """Radius of an eyeball by the height of the mesh, head alone to head and shoulders."""
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A piece of a mesh file, not yet a part.
-
-    part: name and geometry; its kind does not count before `assemble`. material: the material's name in
-    the file. origin: int32 (V,), its vertices' numbers in the file, -1 where they have none. morphs:
-    float32 (V, 3) displacements by the name of a shape.
-    """
-
-    part: Part
-    material: str = ""
-    origin: Int32 = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
-    morphs: Mapping[str, Float32] = field(default_factory=dict)
 
 
 def assemble(
@@ -112,7 +97,7 @@ def _with_eyes(
             eyes.add(a[:2])
     result: list[tuple[Piece, str | None]] = []
     for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
-        mask = np.isin(label, [shell for which, shell in eyes if which == number])
+        mask = np.isin(label, [shell for index, shell in eyes if index == number])
         if mask.any():
             result.append((_cut(piece, mask, f"{piece.part.name} eyes"), "eye"))
         if not mask.all():

@@ -1,8 +1,9 @@
-"""Parts of a face from the polygons of a mesh file, and the connected components of a mesh."""
+"""Pieces of a mesh file, made of its polygons; connected components of a mesh."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,23 +15,30 @@ from fba.mesh.polygons import Polygons, triangulate
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
-    """A part, and where its vertices come from: int32 (V,), vertex of the file by vertex of the part."""
+class Piece:
+    """A piece of a mesh file, not yet a part.
+
+    part: name and geometry; its kind does not count before `assemble`. material: the material's name in
+    the file. origin: int32 (V,), its vertices' numbers in the file, -1 where they have none. morphs:
+    float32 (V, 3) displacements by the name of a shape.
+    """
 
     part: Part
-    origin: Int32
+    material: str = ""
+    origin: Int32 = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    morphs: Mapping[str, Float32] = field(default_factory=dict)
 
 
-def make_part(
+def make_piece(
     polygons: Polygons,
     faces: Bool,
     name: str,
-    kind: str,
+    kind: str = "other",
     *,
     scale: float = 1.0,
     material: Material | None = None,
-) -> Source:
-    """One part of some polygons; vertices with several texture coordinates are split.
+) -> Piece:
+    """One piece of some polygons (mask (F,)); vertices with several texture coordinates are split.
 
     Splitting keeps position and normal, so that seams do not show. scale: metres per unit of the file.
     Raises ModelError where no triangle is left.
@@ -45,11 +53,10 @@ def make_part(
     unique, triangles = np.unique(key, return_inverse=True)
     origin = (unique >> 32).astype(np.int32)
     vertices = polygons.vertices[origin] * scale
-    # normals of the unsplit mesh
-    _, first = np.unique(origin, return_inverse=True)
-    whole = np.unique(origin)
-    place = np.searchsorted(whole, cut.corners).astype(np.int32)
-    normals = vertex_normals((polygons.vertices[whole] * scale).astype(np.float32), place)[first]
+    # normals of the mesh before splitting
+    unsplit, first = np.unique(origin, return_inverse=True)
+    joined = np.searchsorted(unsplit, cut.corners).astype(np.int32)
+    normals = vertex_normals((polygons.vertices[unsplit] * scale).astype(np.float32), joined)[first]
     texcoords = None
     if textured and polygons.texcoords is not None:
         coord = (unique & 0xFFFFFFFF) - 1
@@ -64,7 +71,7 @@ def make_part(
         None if polygons.colours is None else polygons.colours[origin],
         material or Material(),
     )
-    return Source(part, origin)
+    return Piece(part, origin=origin)
 
 
 def polygon_components(polygons: Polygons) -> list[Bool]:
@@ -79,13 +86,14 @@ def polygon_components(polygons: Polygons) -> list[Bool]:
 def vertex_components(triangles: Int32, count: int, vertices: Float32) -> Intp:
     """(count,) connected component of each vertex; vertices at one position (texture seams) count as one."""
     _, same = np.unique(vertices, axis=0, return_inverse=True)
-    place = same.reshape(-1)
-    a, b, c = place[triangles].T if len(triangles) else (place[:0],) * 3
-    label = _connected(np.concatenate([a, b]), np.concatenate([b, c]), int(place.max()) + 1)
-    return np.asarray(label[place], dtype=np.intp)
+    position = same.reshape(-1)
+    a, b, c = position[triangles].T if len(triangles) else (position[:0],) * 3
+    label = _connected(np.concatenate([a, b]), np.concatenate([b, c]), int(position.max()) + 1)
+    return np.asarray(label[position], dtype=np.intp)
 
 
 def _connected(a: Integer, b: Integer, count: int) -> Intp:
+    """(count,) component of each vertex, for edges between vertices a (E,) and b (E,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -54,8 +54,8 @@ def shape_of(head: MakeHumanHead, moved: Float64) -> Mapping[str, Float32]:
     """
     moves: dict[str, Float32] = {}
     eyes = None
-    for source in head.sources:
-        if len(source.origin) and source.origin[0] < 0:
+    for piece in head.pieces:
+        if len(piece.origin) and piece.origin[0] < 0:
             if eyes is None:
                 before = eye_pieces(head.folder / EYES, head.base.vertices)
                 after = eye_pieces(head.folder / EYES, head.base.vertices + moved)
@@ -63,11 +63,11 @@ def shape_of(head: MakeHumanHead, moved: Float64) -> Mapping[str, Float32]:
                     a.part.name: (b.part.vertices - a.part.vertices)
                     for a, b in zip(before, after, strict=True)
                 }
-            shift = eyes[source.part.name]
+            shift = eyes[piece.part.name]
         else:
-            shift = (moved[source.origin] * METRES).astype(np.float32)
+            shift = (moved[piece.origin] * METRES).astype(np.float32)
         if np.abs(shift).max() > 1e-7:
-            moves[source.part.name] = shift
+            moves[piece.part.name] = shift
     return moves
 
 

@@ -21,7 +21,9 @@ from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
 from fba.face.importers.assembly.default_materials import LOOKS
-from fba.face.importers.assembly.polygon_parts import Source, make_part, polygon_components
+from fba.face.importers.assembly.model import bind_by_number
+from fba.face.importers.assembly.pieces import shift_piece
+from fba.face.importers.assembly.polygon_parts import Piece, make_piece, polygon_components
 from fba.face.importers.makehuman._mhclo import fit_clothes
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh.obj import read_obj
@@ -51,21 +53,21 @@ HELPERS = (
 class MakeHumanHead:
     """The head of a base mesh, before it gets tables.
 
-    folder: of the base mesh. base: all of it, in decimetres. sources: the parts and which vertex of
-    the base mesh each of theirs is (-1 for eyes fitted from a file of their own). points: float64
-    (84, 3), metres; bound: int32 (84,), vertices counted through the parts.
+    folder: of the base mesh. base: all of it, in decimetres. pieces: their origins are vertices of the base
+    mesh (-1 for eyes fitted from a file of their own). points: float64 (84, 3), metres; bound: int32 (84,),
+    vertices counted through the pieces.
     """
 
     folder: Path
     base: Polygons
-    sources: tuple[Source, ...]
+    pieces: tuple[Piece, ...]
     points: Float64
     bound: Int32
 
     @property
     def parts(self) -> tuple[Part, ...]:
         """The parts alone."""
-        return tuple(source.part for source in self.sources)
+        return tuple(piece.part for piece in self.pieces)
 
 
 def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
@@ -84,22 +86,19 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
             f"{file}: this is not MakeHuman's base mesh hm08: {len(base.vertices)} vertices instead of "
             f"{VERTICES}" + (f", no group {missing[0]!r}" if missing else "")
         ).with_remedies(Remedy("kind", "import another OBJ file with {} and its feature points", "'obj'"))
-    sources = [_skin(base)]
-    sources += _eyes(file, base)
+    pieces = [_skin(base), *_eyes(file, base)]
     for name, kind, groups in HELPERS:
         faces = base.in_groups(*groups)
-        sources.append(make_part(base, faces, name, kind, scale=METRES, material=LOOKS[kind]))
-    points, bound = _feature_points(base, sources)
+        pieces.append(make_piece(base, faces, name, kind, scale=METRES, material=LOOKS[kind]))
+    points, bound = _feature_points(base, pieces)
     pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
     shift = -pupils.mean(axis=0)
-    for number, source in enumerate(sources):
-        vertices = (source.part.vertices.astype(np.float64) + shift).astype(np.float32)
-        sources[number] = replace(source, part=replace(source.part, vertices=vertices))
+    pieces = [shift_piece(piece, 1.0, shift) for piece in pieces]
     points = points + shift
     # float32 as the vertices are, so that bound points stand exactly on them
-    everything = np.concatenate([source.part.vertices for source in sources])
+    everything = np.concatenate([piece.part.vertices for piece in pieces])
     points[bound >= 0] = everything[bound[bound >= 0]]
-    return MakeHumanHead(file.parent, base, tuple(sources), points, bound)
+    return MakeHumanHead(file.parent, base, tuple(pieces), points, bound)
 
 
 def base_file(path: str | os.PathLike[str]) -> Path:
@@ -158,39 +157,39 @@ def _head(base: Polygons) -> tuple[Bool, Bool]:
     return masks[0] | masks[1], masks[1]
 
 
-def _skin(base: Polygons) -> Source:
+def _skin(base: Polygons) -> Piece:
     """The skin, darker and redder inside the mouth."""
     head, mouth = _head(base)
     colours = np.tile(np.array([*LOOKS["skin"].colour, 0.4], dtype=np.float32), (len(base.vertices), 1))
     colours[base.used(mouth)] = (*LOOKS["mouth"].colour, 0.6)
     painted = replace(base, colours=colours)
-    return make_part(painted, head, "skin", "skin", scale=METRES, material=LOOKS["skin"])
+    return make_piece(painted, head, "skin", "skin", scale=METRES, material=LOOKS["skin"])
 
 
-def _eyes(file: Path, base: Polygons) -> list[Source]:
+def _eyes(file: Path, base: Polygons) -> list[Piece]:
     """Left and right eyeball: the fitted eyes, else those of the base mesh."""
     clothes = find_beside(file, EYES)
     if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
         return [
-            make_part(base, base.in_groups(g), n, "eye", scale=METRES, material=LOOKS["eye"])
+            make_piece(base, base.in_groups(g), n, "eye", scale=METRES, material=LOOKS["eye"])
             for n, g in sides
         ]
     return eye_pieces(clothes, base.vertices)
 
 
-def eye_pieces(clothes: Path, base: Float64) -> list[Source]:
+def eye_pieces(clothes: Path, base: Float64) -> list[Piece]:
     """Left and right eyeball of the eyes in an .mhclo file, fitted to a base mesh (V, 3)."""
     eyes = fit_clothes(clothes, base)
     picture = find_beside(clothes, "brown_eye.png")
     material = (
         Material("eye", (1.0, 1.0, 1.0), 0.1, read_bytes(picture)) if picture is not None else LOOKS["eye"]
     )
-    sources = []
+    pieces = []
     for name, side in (("left eye", 1.0), ("right eye", -1.0)):
-        source = make_part(eyes, _eyeball(eyes, side), name, "eye", scale=METRES, material=material)
-        sources.append(Source(source.part, np.full(len(source.origin), -1, dtype=np.int32)))
-    return sources
+        piece = make_piece(eyes, _eyeball(eyes, side), name, "eye", scale=METRES, material=material)
+        pieces.append(replace(piece, origin=np.full(len(piece.origin), -1, dtype=np.int32)))
+    return pieces
 
 
 def _eyeball(eyes: Polygons, side: float) -> Bool:
@@ -205,24 +204,22 @@ def _eyeball(eyes: Polygons, side: float) -> Bool:
     return best[1]
 
 
-def _feature_points(base: Polygons, sources: list[Source]) -> tuple[Float64, Int32]:
+def _feature_points(base: Polygons, pieces: list[Piece]) -> tuple[Float64, Int32]:
     """(points (84, 3) in metres, origin as in the base mesh; vertices (84,) they are bound to)."""
     points = np.full((len(row_of()), 3), np.nan)
-    bound = np.full(len(row_of()), -1, dtype=np.int32)
-    first: dict[int, int] = {}
-    start = 0
-    for source in sources:
-        for vertex, origin in enumerate(source.origin.tolist()):
-            first.setdefault(origin, start + vertex)
-        if source.part.kind == "eye":
-            row = row_of()["3.5" if "left" in source.part.name else "3.6"]
-            front = _front(source.part.vertices)
-            points[row], bound[row] = source.part.vertices[front], start + front
-        start += len(source.part.vertices)
-    for name, vertices in _rows("makehuman.csv", "point").items():
+    rows = _rows("makehuman.csv", "point")
+    for name, vertices in rows.items():
         points[row_of()[name]] = base.vertices[list(vertices)].mean(axis=0) * METRES
-        if len(vertices) == 1 and name != "11.5":
-            bound[row_of()[name]] = first[vertices[0]]
+    single = {name: vertices[0] for name, vertices in rows.items() if len(vertices) == 1}
+    bound = bind_by_number(pieces, single)
+    start = 0
+    for piece in pieces:
+        part = piece.part
+        if part.kind == "eye":
+            row = row_of()["3.5" if "left" in part.name else "3.6"]
+            front = _front(part.vertices)
+            points[row], bound[row] = part.vertices[front], start + front
+        start += len(part.vertices)
     return points, bound
 
 
