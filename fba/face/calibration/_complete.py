@@ -41,7 +41,7 @@ _MEET = (
 _OTHER = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 
 
-def drop_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2) -> Float64:
+def drop_mistakes(points: Float64, expected: Float64) -> Float64:
     """Points (84, 3) with obvious mistakes set to NaN; an FbaWarning names each.
 
     expected: (84, 3), the model's points at the person's size, metres. Of two points that coincide but are
@@ -82,7 +82,7 @@ def drop_mistakes(points: Float64, expected: Float64, *, stacklevel: int = 2) ->
                 f"{names()[row]} is {away[row] * 1000:.0f} mm from where the others put it: left out"
             )
     if messages:
-        _warn("; ".join(messages), stacklevel)
+        _warn("; ".join(messages))
     return result
 
 
@@ -128,7 +128,7 @@ def symmetry_plane(points: Float64) -> tuple[Float64, float]:
     return normal, float(np.median(halves @ normal)) if len(halves) else 0.0
 
 
-def centre_pupils(points: Float64, *, stacklevel: int = 2) -> tuple[Float64, tuple[str, ...]]:
+def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
     """(points (84, 3) with pupils at mid-height between the lids, names of those that were moved).
 
     Lids are tangent to the iris in a neutral face, so the pupil is in the middle. An FbaWarning names a
@@ -147,13 +147,12 @@ def centre_pupils(points: Float64, *, stacklevel: int = 2) -> tuple[Float64, tup
             "; ".join(
                 f"pupil {name} is {off * 1000:+.1f} mm off the middle between the lids: put there"
                 for name, off in moved
-            ),
-            stacklevel,
+            )
         )
     return full, tuple(name for name, _ in moved)
 
 
-def shut_mouth(points: Float64, reference: Float64, *, stacklevel: int = 2) -> Float64:
+def shut_mouth(points: Float64, reference: Float64) -> Float64:
     """Points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones stay.
 
     reference: (84, 3), the model's points at the person's size. If the person's mouth is open, the whole
@@ -183,8 +182,7 @@ def shut_mouth(points: Float64, reference: Float64, *, stacklevel: int = 2) -> F
         fault = "the mouth is open by" if widest > 0 else "the lower lip is in the upper one by"
         _warn(
             f"{fault} {abs(widest) * 1000:.1f} mm, but the lips of a neutral face touch: "
-            "the lower lip was moved",
-            stacklevel,
+            "the lower lip was moved"
         )
     a, b = (row_of()[name] for name in TEETH)
     apart = full[a] + reference[b] - reference[a] - full[b]
@@ -192,8 +190,7 @@ def shut_mouth(points: Float64, reference: Float64, *, stacklevel: int = 2) -> F
         if np.linalg.norm(apart) > 2 * OPEN * width:
             _warn(
                 f"upper and lower teeth are {np.linalg.norm(apart) * 1000:.1f} mm from touching as those "
-                "of a neutral face do: the lower ones were moved",
-                stacklevel,
+                "of a neutral face do: the lower ones were moved"
             )
         full[[b, row_of()["9.9"]]] += apart
     return full
@@ -205,5 +202,5 @@ def _between(points: Float64, left: str, right: str) -> float:
     return distance if np.isfinite(distance) and distance > 0 else 0.06
 
 
-def _warn(text: str, stacklevel: int) -> None:
-    warnings.warn(text, FbaWarning, stacklevel=stacklevel + 2)
+def _warn(text: str) -> None:
+    warnings.warn(text, FbaWarning, stacklevel=4)

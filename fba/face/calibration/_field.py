@@ -18,6 +18,8 @@ ANCHOR_DISTANCE = 0.08
 ANCHORS = 60
 SAME_PLACE = 1e-5
 """Sources within this many metres are merged into one."""
+DIFFERENCE = 1e-4
+"""Metres between a point and those at which its derivatives are computed."""
 SLACK = 1e-9
 """Smoothing of the anchors: they keep the far field near zero, not exactly at it."""
 LEAST_VOLUME = 0.04
@@ -40,11 +42,7 @@ class Field:
 
     def __call__(self, points: Floating) -> Float64:
         flat = np.asarray(points, dtype=np.float64)
-        moved: Float64 = self.affine(flat) + self.rest(flat)
-        return moved
-
-    def affine(self, points: Float64) -> Float64:
-        moved: Float64 = (points - self.origin) @ self.matrix.T + self.target
+        moved: Float64 = (flat - self.origin) @ self.matrix.T + self.target + self.rest(flat)
         return moved
 
     def rotations(self, points: Floating) -> Float64:
@@ -53,11 +51,11 @@ class Field:
         rotations: Float64 = u @ vt
         return rotations
 
-    def jacobians(self, points: Floating, step: float = 1e-4) -> Float64:
-        """(N, 3, 3) Jacobian of the deformation at each point, by central differences of `step` metres."""
+    def jacobians(self, points: Floating) -> Float64:
+        """(N, 3, 3) Jacobian of the deformation at each point, by central differences."""
         flat = np.asarray(points, dtype=np.float64)
-        columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * step]
-        return np.stack(columns, axis=2) / (2 * step)
+        columns = [self(flat + offset) - self(flat - offset) for offset in np.eye(3) * DIFFERENCE]
+        return np.stack(columns, axis=2) / (2 * DIFFERENCE)
 
 
 def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str, size: float) -> Field:
@@ -161,13 +159,13 @@ def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) 
     return wrong, float(areas[0][wrong].sum() / max(areas[0].sum(), 1e-30))
 
 
-def nearest_points(points: Float64, sources: Float64, rows: Intp, count: int = 4) -> tuple[str, ...]:
-    """Names of the feature points (rows, at sources (N, 3)) that are nearest to most of the points."""
+def nearest_points(points: Float64, sources: Float64, rows: Intp) -> tuple[str, ...]:
+    """Names of the four feature points (rows, at sources (N, 3)) that are nearest to most of the points."""
     from scipy.spatial import cKDTree
 
     if not len(points) or not len(sources):
         return ()
     _, near = cKDTree(sources).query(points, k=min(3, len(sources)))
     votes = np.bincount(np.ravel(near), minlength=len(sources))
-    order = np.argsort(-votes, kind="stable")[:count]
+    order = np.argsort(-votes, kind="stable")[:4]
     return tuple(names()[int(rows[k])] for k in order if votes[k])

@@ -34,7 +34,7 @@ ACCURACY = 0.05
 MATE = 0.01
 """Distance that its mate may move, as a share of the point's."""
 ARC = {OPEN_JAW, 19, 20, 21, 22}
-"""FAPs whose points follow an arc: only the component along the direction is prescribed."""
+"""FAPs whose points follow an arc: they may move in depth too."""
 EYE_POINT = {23: "3.5", 24: "3.6", 25: "3.5", 26: "3.6", **THRUST_EYE, 29: "3.5", 30: "3.6"}
 HEAD_AXIS = {HEAD_PITCH: (1.0, 0.0, 0.0), HEAD_YAW: (0.0, 1.0, 0.0), HEAD_ROLL: (0.0, 0.0, 1.0)}
 
@@ -53,38 +53,23 @@ def check_point(poser: Poser, fap: int) -> Iterator[Finding]:
         yield from _check_shift(poser, fap)
 
 
-def point_error(poser: Poser, fap: int, value: float) -> float:
-    """Error of a shifted feature point, as a share of its correct motion; NaN where it has no vertex.
-
-    For points on arcs, only the component along the standard's direction counts.
-    """
-    entry = faps()[fap - 1]
-    point = EYE_POINT.get(fap) or entry.feature_points[0]
-    direction = np.array(DIRECTIONS[entry.positive])
-    wanted = value * poser.model.fapu[entry.unit]
-    if not poser.has(point):
-        return float("nan")
-    moved = poser.shift({fap: value})[poser.vertex(point)]
-    off = np.array([moved @ direction - wanted, moved[0]]) if fap in ARC else moved - wanted * direction
-    return float(np.linalg.norm(off) / abs(wanted))
-
-
 def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     point = EYE_POINT.get(fap) or entry.feature_points[0]
     if not poser.has(point):
         yield Finding(entry.label, "its feature point stands on a vertex", f"{point} is free", "a vertex")
         return
+    direction = np.array(DIRECTIONS[entry.positive])
     for value in (SMALL, -SMALL) if entry.direction == "B" else (SMALL,):
-        error = point_error(poser, fap, value)
-        if not error <= ACCURACY:
-            moved = poser.shift({fap: value})[poser.vertex(point)] * 1000
-            wanted = value * poser.model.fapu[entry.unit] * np.array(DIRECTIONS[entry.positive]) * 1000
+        moved = poser.shift({fap: value})[poser.vertex(point)]
+        wanted = value * poser.model.fapu[entry.unit] * direction
+        off = np.array([(moved - wanted) @ direction, moved[0]]) if fap in ARC else moved - wanted
+        if not np.linalg.norm(off) <= ACCURACY * np.linalg.norm(wanted):
             yield Finding(
                 entry.label,
                 f"{point} moves by value x {entry.unit} {entry.positive}",
-                f"{_vector(moved)} mm at {value:g}",
-                f"{_vector(wanted)} mm within {ACCURACY:.0%}",
+                f"{_vector(moved * 1000)} mm at {value:g}",
+                f"{_vector(wanted * 1000)} mm within {ACCURACY:.0%}",
             )
     mate = entry.left_right_mate
     if mate is None:
