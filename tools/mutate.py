@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("fba", "player", "conformance", "tests")
+FOLDERS = ("fba", "player", "conformance", "tests", "docs")
 LIMIT = 300
 """Seconds for the tests of one mutant; a mutant that never ends is found, too."""
 
@@ -53,6 +53,7 @@ LIVE = "player/fba_player/playback/live.py"
 MIXER = "player/fba_player/sound/_mixer.py"
 DEVICE_CLOCK = "player/fba_player/sound/_device_clock.py"
 GROUND = "fba/capture/limbs/ground.py"
+SOLES = "fba/capture/limbs/soles.py"
 RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
 REPORT = "fba/capture/_report.py"
@@ -172,6 +173,11 @@ MUTANTS = (
     Mutant(GROUND, "LONG = 1.0", "LONG = 1.2", CAPTURE_TEST),
     Mutant(GROUND, "SLIGHT = 0.015", "SLIGHT = 0.008", CAPTURE_TEST),
     Mutant(GROUND, "SLIGHT = 0.015", "SLIGHT = 0.02", CAPTURE_TEST),
+    Mutant(SOLES, "TOES = 0.06", "TOES = 0.05", CAPTURE_TEST),
+    Mutant(SOLES, "HEEL = 0.045", "HEEL = 0.05", CAPTURE_TEST),
+    Mutant(SOLES, "WITHIN = 0.012", "WITHIN = 0.01", CAPTURE_TEST),
+    Mutant(SOLES, "TOLERATED = 0.005", "TOLERATED = 0.006", CAPTURE_TEST),
+    Mutant(SOLES, "FARTHEST = 0.03", "FARTHEST = 0.04", CAPTURE_TEST),
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.0", RENDER_TEST),
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.1", RENDER_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),

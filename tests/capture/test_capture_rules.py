@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fba.body import BapSolver
+from fba.body import BapSolver, Skeleton
 from fba.capture import matching, retarget
-from fba.capture.limbs import ground
+from fba.capture.limbs import ground, soles
 from fba.capture.limbs.foot_planting import turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
@@ -125,3 +125,34 @@ def test_ground_slopes_where_feet_walk_far_and_rise_little(metres: float, rise: 
     along = np.linspace(-metres / 2, metres / 2, 400)
     found = ground_under(rise * along, along).slope
     assert found[1] == (pytest.approx(rise, rel=0.3) if slopes else 0.0)
+
+
+@pytest.mark.parametrize(("toes", "longer"), [(False, 0.0), (True, 0.06)])
+def test_on_tiptoe_the_tip_of_the_toes_is_lowest(toes: bool, longer: float) -> None:
+    """A foot that points straight down reaches as far as its ball, or 6 cm further with toes."""
+    skeleton = Skeleton.default()
+    down = Rotation.from_euler("x", [90], degrees=True).as_matrix()
+    joints = ("ankle", "subtalar", "midtarsal", "metatarsal")
+    root = skeleton.centres[:1]
+    found = soles.body_soles(skeleton, {f"l_{joint}": down for joint in joints}, root, toes)
+    assert found is not None
+    ankle, ball = (skeleton.centres[skeleton.number(name)] for name in ("l_ankle", "l_metatarsal"))
+    assert found.lowest[0] == pytest.approx(ankle[1] - (ball[2] - ankle[2]) - longer)
+    assert found.points[1, 0, 0] == pytest.approx(  # the right heel, flat on the ground
+        skeleton.centres[skeleton.number("r_ankle")] * [1, 0, 1] - [0, 0, 0.045]
+    )
+
+
+@pytest.mark.parametrize(
+    ("height", "lacking", "move"),
+    [
+        (0.012, 0.02, 0.015),  # on the ground: but for 5 mm, which nobody sees
+        (0.012, -0.02, -0.015),
+        (0.012, 0.004, 0.0),
+        (0.012, 0.2, 0.03),  # at most 3 cm
+        (0.06, 0.02, 0.0),  # in the air
+    ],
+)
+def test_legs_move_feet_that_are_on_the_ground(height: float, lacking: float, move: float) -> None:
+    above = np.full((2, 60), height)
+    np.testing.assert_allclose(soles.heights(above, above - lacking, 60.0), move, atol=1e-4)
