@@ -49,10 +49,14 @@ class Levels:
 
 
 class Reader:
-    """Reads elements from data and records them until `drain`."""
+    """Reads elements from data and records them until `drain`.
 
-    def __init__(self, data: bytes) -> None:
+    byte_aligned: look for start codes at byte boundaries without regard to the bits before them.
+    """
+
+    def __init__(self, data: bytes, *, byte_aligned: bool = False) -> None:
         self.data = data
+        self.byte_aligned = byte_aligned
         self.stream = ConstBitStream(data)
         self.size = len(data) * 8
         self.plane: int | None = None
@@ -127,15 +131,22 @@ class Reader:
 
         Stuffing is a 0 and then 1s up to the byte boundary: 1 to 8 bits. At a byte boundary it may be
         missing; after another start code it must be missing, because there the byte 0x7F can begin a plane.
-        (Elsewhere, too, a P plane with BAPs may look like stuffing and a start code: the guard against
-        emulation counts zeros in its segment only. A writer must put a plane start code before such a plane.)
+        A reader that only looks at byte boundaries (`byte_aligned`) skips other bits, too, and takes 23 zeros
+        for a start code; behind one, it does not look for another.
+        (A plane may look like stuffing and a start code, because the guard against emulation counts zeros in
+        segments only. A writer must put a plane start code before such a plane.)
         """
+        if self.byte_aligned and behind_start_code:
+            return None
         unaligned = -self.bit % 8
         for bits in (unaligned,) if unaligned else (0,) if behind_start_code else (0, 8):
             if self.bit + bits + PREFIX_BITS > self.size:
                 continue
             ahead = str(self.stream.peek(f"bin:{bits + PREFIX_BITS}"))
-            if ahead[:bits] == _stuffing(bits) and ahead[bits:] == "0" * 23 + "1":
+            if self.byte_aligned:
+                if ahead[bits:-1] == "0" * 23 and (bits < 8 or ahead[:bits] == _stuffing(8)):
+                    return bits
+            elif ahead[:bits] == _stuffing(bits) and ahead[bits:] == "0" * 23 + "1":
                 return bits
         return None
 

@@ -78,12 +78,16 @@ def decode_values(data: bytes, *, bap_steps: str = "iso") -> list[dict[str, Any]
 
 
 class Walker:
-    """Reads one object, one plane at each step. `record` describes the last plane (see `planes`)."""
+    """Reads one object, one plane at each step. `record` describes the last plane (see `planes`).
 
-    def __init__(self, data: bytes, *, bap_steps: str = "iso") -> None:
+    byte_aligned: take 23 zero bits at the next byte boundary for a start code, whatever stands before them,
+    as the standard's look-ahead can be read. Streams are to be written so that this makes no difference.
+    """
+
+    def __init__(self, data: bytes, *, bap_steps: str = "iso", byte_aligned: bool = False) -> None:
         if bap_steps not in BAP_STEP_TABLES:
             raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
-        self.reader = Reader(bytes(data))
+        self.reader = Reader(bytes(data), byte_aligned=byte_aligned)
         self.fap = Part("fap")
         self.bap = Part("bap", bap_steps)
         self.viseme = HighLevel("viseme")

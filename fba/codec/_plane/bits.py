@@ -68,14 +68,13 @@ class BitWriter:
         count = 8 - (self.bit & 7)
         self.write((1 << (count - 1)) - 1, count)
 
-    def take_bytes(self) -> bytes:
-        """Return the complete bytes written so far, and drop them; up to 7 bits stay."""
-        count = self.bit >> 3
-        taken = self.data[:count].tobytes()
-        rest = self.data[count]
+    def take_bytes(self, stop: int) -> bytes:
+        """Return the complete bytes before bit `stop`, and drop them."""
+        count = stop >> 3
         used = (self.bit + 7) >> 3
+        taken = self.data[:count].tobytes()
+        rest = self.data[count:used].copy()
         self.data[:used] = 0
-        self.bit &= 7
-        if self.bit:
-            self.data[0] = rest
+        self.data[: len(rest)] = rest
+        self.bit -= 8 * count
         return taken

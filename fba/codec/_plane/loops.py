@@ -33,6 +33,12 @@ SKIP_MAX = 15 << 20
 
 FIRST_FLAG = slots.FLAGS.start
 
+AFTER_CODE = -2
+"""Instead of the first bit of the plane before: a start code ends here, and no reader looks for another."""
+
+START_CODE_ZEROS = 23
+"""Zero bits that begin a start code, and nothing else at a byte boundary."""
+
 # Results of `find_start_code` without a start code.
 NO_START_CODE = -1
 UNDECIDED = -2
@@ -118,15 +124,78 @@ def find_start_code(data: UInt8, bit: int, end: int, after_code: bool) -> tuple[
 
 
 @compiled
-def imitates_start_code(data: UInt8, bit: int, end: int) -> bool:
-    """Whether a reader would take a P plane at bit..end for alignment and a start code.
+def _zeros_ahead(data: UInt8, start: int, stop: int) -> int:
+    """Return how many bits of the plane start..stop are 0 from where a reader looks ahead up to the first 1.
 
-    Its first bits can look like alignment, and the 1 inserted after 22 zeros can complete 00 00 01: the guard
-    counts zeros in segments only, not in the header before them.
+    Readers that do not check alignment look at the next byte boundary, behind a byte 0x7F if they stand on
+    one. -1 - zeros if no 1 follows in this plane: what is written behind it decides.
     """
-    code, _ = find_start_code(data, bit, end, False)
-    prefix = bit + (8 - (bit & 7) if bit & 7 or data[bit >> 3] == 0x7F else 0) + 24
-    return code != NO_START_CODE and prefix <= end
+    bit = (start + 7) >> 3 << 3
+    if bit == start and data[bit >> 3] == 0x7F:
+        bit += 8
+    zeros = 0
+    while bit < stop:
+        if read_bit(data, bit):
+            return zeros
+        zeros += 1
+        bit += 1
+    return -1 - zeros
+
+
+@compiled
+def hides_plane(data: UInt8, start: int, stop: int) -> bool:
+    """Whether a start code written at `stop`, behind its alignment, hides the plane start..stop.
+
+    A reader that stands at `start` and looks ahead at the byte boundary then finds the start code there, or
+    zeros before it, and takes the plane for alignment.
+    """
+    within_a_byte = start & 7 != 0 and start >> 3 == stop >> 3
+    return within_a_byte or (stop & 7 == 7 and _zeros_ahead(data, start, stop) < 0)
+
+
+@compiled
+def insert_start_code(data: UInt8, start: int, stop: int) -> int:
+    """Put alignment and fba_object_plane_start_code before the bits start..stop; return their new stop.
+
+    data: zeroed from `stop` on, with room for 40 bits more.
+    """
+    aligned = (start >> 3) + 1
+    shift = 8 * (aligned + 4) - start
+    for bit in range(stop - 1, start - 1, -1):
+        mask = np.uint8(128 >> ((bit + shift) & 7))
+        if read_bit(data, bit):
+            data[(bit + shift) >> 3] |= mask
+            data[bit >> 3] &= np.uint8(255 - (128 >> (bit & 7)))
+        else:
+            data[(bit + shift) >> 3] &= np.uint8(255 - mask)
+    for bit in range(start + 1, 8 * aligned):
+        data[bit >> 3] |= np.uint8(128 >> (bit & 7))
+    data[aligned : aligned + 4] = 0
+    data[aligned + 2] = 0x01
+    data[aligned + 3] = 0xBB
+    return stop + shift
+
+
+@compiled
+def guard_plane(data: UInt8, before: int, start: int, stop: int) -> tuple[int, int]:
+    """Put a start code before the plane start..stop if a reader may take the plane itself for one.
+
+    A look-ahead takes 23 zero bits for a start code; the guard against them counts zeros within segments
+    only, not in headers. before: first bit of the plane before, or -1 if a start code stands before it.
+    Returns stop, and the first bit of this plane, or -1 with a start code before it.
+
+    data: zeroed from `stop` on, with room for 80 bits more.
+    """
+    zeros = _zeros_ahead(data, start, stop)
+    if zeros < 0:
+        zeros = -1 - zeros + 2  # those of the next plane, before the first bit of its fba_object_mask
+    if zeros < START_CODE_ZEROS:
+        return stop, start
+    if before >= 0 and hides_plane(data, before, start):
+        moved = insert_start_code(data, before, stop) - stop
+        start += moved
+        stop += moved
+    return insert_start_code(data, start, stop), -1
 
 
 @compiled
@@ -300,20 +369,8 @@ def _write_nibble(data: UInt8, bit: int, value: int) -> int:
 
 @compiled
 def room_for(skip: int, layout: Layout) -> int:
-    """Return an upper bound of the bits of a P plane with a start code before it."""
-    return 112 + 4 * (skip // 15) + 20 * len(layout.segments) + 17 * len(layout.order)
-
-
-@compiled
-def _write_start_code(data: UInt8, bit: int) -> int:
-    """Write alignment and fba_object_plane_start_code; return the bit after them."""
-    bit += 1
-    while bit & 7:
-        data[bit >> 3] |= np.uint8(128 >> (bit & 7))
-        bit += 1
-    data[(bit >> 3) + 2] = 0x01
-    data[(bit >> 3) + 3] = 0xBB
-    return bit + 32
+    """Return an upper bound of the bits of a P plane, and of start codes before it and the plane before."""
+    return 152 + 4 * (skip // 15) + 20 * len(layout.segments) + 17 * len(layout.order)
 
 
 @compiled
@@ -341,51 +398,47 @@ def _write_plane(
 def encode_run(
     data: UInt8,
     bit: int,
-    after_code: bool,
+    before: int,
     object_mask: int,
     layout: Layout,
     coding: Coding,
     rows: Int32,
     skips: Int64,
-    borders: Int64,
-) -> tuple[int, int, int, int]:
-    """Encode rows[t] as P planes at `bit`; return (planes, status, bit, slot).
+) -> tuple[int, int, int, int, int]:
+    """Encode rows[t] as P planes at `bit`; return (planes, status, bit, slot, before).
 
-    after_code: a start code ends at `bit`. A start code is written before a plane that a reader would take
-    for one. OUT_OF_RANGE: the difference of `slot` in the next plane does not fit its range; nothing of that
-    plane was written. OUT_OF_DATA: `data` has no room for another plane. borders: first bit of each plane,
-    and the bit after the last.
+    before: first bit of the last plane written, AFTER_CODE if a start code ends at `bit`, or -1 if one stands
+    before that plane. A start code is written before a plane that a reader may take for one, see
+    `guard_plane`. OUT_OF_RANGE: the difference of `slot` in the next plane does not fit its range; nothing of
+    that plane was written. OUT_OF_DATA: `data` has no room for another plane.
     """
     order, minimum, step, last = layout.order, coding.minimum, coding.step, coding.last
     symbols = np.zeros(len(order), np.int64)
     flags = np.zeros(3, np.int64)
     room = 8 * len(data)
-    borders[0] = bit
     for count in range(len(rows)):
         skip = int(skips[count])
         if bit + room_for(skip, layout) > room:
-            return count, OUT_OF_DATA, bit, -1
+            return count, OUT_OF_DATA, bit, -1, before
         for position in range(len(order)):
             slot = int(order[position])
             symbol = quantise(int(rows[count, slot]) - int(last[slot]), int(step[slot])) - int(minimum[slot])
             if symbol < 0 or symbol >= coding.models.size[slot]:
-                return count, OUT_OF_RANGE, bit, slot
+                return count, OUT_OF_RANGE, bit, slot, before
             symbols[position] = symbol
         for flag in range(3):
             flags[flag] = rows[count, FIRST_FLAG + flag]
         start = bit
         bit = _write_plane(data, start, object_mask, skip, layout, coding, symbols, flags)
-        if not (after_code and count == 0) and imitates_start_code(data, start, bit):
-            data[(start >> 3) + 1 : (bit >> 3) + 1] = 0
-            data[start >> 3] &= np.uint8(0xFF00 >> (start & 7) & 0xFF)
-            bit = _write_start_code(data, start)
-            bit = _write_plane(data, bit, object_mask, skip, layout, coding, symbols, flags)
+        if before == AFTER_CODE:
+            before = -1
+        else:
+            bit, before = guard_plane(data, before, start, bit)
         learn(order, symbols, coding.models)
         for position in range(len(order)):
             slot = int(order[position])
             last[slot] += (int(symbols[position]) + int(minimum[slot])) * int(step[slot])
-        borders[count + 1] = bit
-    return len(rows), OK, bit, -1
+    return len(rows), OK, bit, -1, before
 
 
 STATUS_TEXT = {

@@ -36,29 +36,27 @@ class PlaneWriter:
         self.models = Models(bap_table)
         self.planes = 0
         self._writer = BitWriter()
-        self._taken = 0
         self._settings: dict[int, PartSettings] = {}
         self._layouts: dict[int, Layout] = {}
-
-    @property
-    def bits(self) -> int:
-        """Number of bits written."""
-        return 8 * self._taken + self._writer.bit
+        self._before = loops.AFTER_CODE  # see `loops.encode_run`
 
     def take_bytes(self) -> bytes:
-        """Return the complete bytes written since the last call."""
-        taken = self._writer.take_bytes()
-        self._taken += len(taken)
+        """Return the complete bytes written since the last call, but not those that may have to move."""
+        writer = self._writer
+        if self._before >= 0 and not loops.hides_plane(writer.data, self._before, writer.bit):
+            self._before = -1
+        taken = writer.take_bytes(writer.bit if self._before < 0 else self._before)
+        if self._before >= 0:
+            self._before -= 8 * len(taken)
         return taken
 
     def begin_object(self) -> None:
         """Write the start code of an object."""
-        self._write_start_code(syntax.OBJECT_CODES[0])
+        self._writer.write(_code(syntax.OBJECT_CODES[0]), 32)
 
     def end_object(self) -> None:
         """Write alignment and end code."""
-        self._writer.align()
-        self._write_start_code(syntax.END_CODE)
+        self._write_aligned_code(syntax.END_CODE)
 
     def settings_in_force(self, part: int) -> PartSettings | None:
         """Return the settings of the last I plane with this part, or None."""
@@ -100,8 +98,8 @@ class PlaneWriter:
             plan.append((part, part_settings, order, segments, fitting))
         writer = self._writer
         if settings.start_code:
-            writer.align()
-            self._write_start_code(syntax.PLANE_CODES[0])
+            self._write_aligned_code(syntax.PLANE_CODES[0])
+        start = writer.bit
         writer.write(1, 1)
         writer.write(sum(part for part, _ in parts), 2)
         writer.write(int(settings.frame_rate is not None), 1)
@@ -121,6 +119,11 @@ class PlaneWriter:
             )
             models.last[order] = levels * models.step[order]
             self._settings[part] = part_settings
+        if self._before == loops.AFTER_CODE:
+            self._before = -1
+        else:
+            writer.reserve(_SEGMENT_BITS + 80)
+            writer.bit, self._before = loops.guard_plane(writer.data, self._before, start, writer.bit)
         self._layouts.clear()
         self.planes += 1
         return clamped
@@ -137,24 +140,20 @@ class PlaneWriter:
             self._layouts[mask] = Layout(*slots.coding_order(face, body))
         layout = self._layouts[mask]
         models, writer = self.models, self._writer
-        borders = np.zeros(len(rows) + 1, dtype=np.int64)
         if start_code:
-            writer.align()
-            self._write_start_code(syntax.PLANE_CODES[0])
+            self._write_aligned_code(syntax.PLANE_CODES[0])
         done = 0
         while done < len(rows):
-            count, status, bit, slot = loops.encode_run(
+            count, status, writer.bit, slot, self._before = loops.encode_run(
                 writer.data,
                 writer.bit,
-                start_code and done == 0,
+                self._before,
                 mask,
                 layout,
                 models.predicted,
                 rows[done:],
                 skips[done:],
-                borders[done:],
             )
-            writer.bit = bit
             done += count
             self.planes += count
             if status == loops.OUT_OF_RANGE:
@@ -164,6 +163,17 @@ class PlaneWriter:
                 need = loops.room_for(int(skips[done]), layout)
                 writer.reserve(max(need, 8 * len(writer.data)))
 
-    def _write_start_code(self, code: int) -> None:
-        """Write a start code with this last byte."""
-        self._writer.write(int.from_bytes(syntax.START_CODE_PREFIX, "big") << 8 | code, 32)
+    def _write_aligned_code(self, code: int) -> None:
+        """Write alignment and the start code with this last byte, so that they do not hide the last plane."""
+        writer, before = self._writer, self._before
+        writer.reserve(160)
+        if before >= 0 and loops.hides_plane(writer.data, before, writer.bit):
+            writer.bit = loops.insert_start_code(writer.data, before, writer.bit)
+        writer.align()
+        writer.write(_code(code), 32)
+        self._before = loops.AFTER_CODE
+
+
+def _code(last_byte: int) -> int:
+    """Return the start code with this last byte."""
+    return int.from_bytes(syntax.START_CODE_PREFIX, "big") << 8 | last_byte
