@@ -53,6 +53,8 @@ LIVE = "player/fba_player/playback/live.py"
 MIXER = "player/fba_player/sound/_mixer.py"
 DEVICE_CLOCK = "player/fba_player/sound/_device_clock.py"
 GROUND = "fba/capture/limbs/ground.py"
+SESSION = "player/fba_player/session/session.py"
+TAKES = "player/fba_player/session/takes.py"
 SOLES = "fba/capture/limbs/soles.py"
 RENDER = "player/fba_player/export/render.py"
 GLTF_READER = "fba/formats/gltf/reader.py"
@@ -71,6 +73,8 @@ CAPTURE_TEST = (
 )
 WEIGHTS_TEST = "tests/body/skin/test_skin_weights.py"
 TRANSPORT_TEST = "tests/player/playback/test_transport.py"
+NOTICES_TEST = "tests/player/session/test_notices.py"
+TAKES_TEST = "tests/player/session/test_puppet.py"
 RENDER_TEST = "tests/player/export/test_render_files.py"
 GLTF_TEST = "tests/formats/gltf/test_gltf_skeletons.py"
 OTHER_BODIES_TEST = "tests/capture/test_other_bodies.py"
@@ -178,6 +182,17 @@ MUTANTS = (
     Mutant(SOLES, "WITHIN = 0.012", "WITHIN = 0.01", CAPTURE_TEST),
     Mutant(SOLES, "TOLERATED = 0.005", "TOLERATED = 0.006", CAPTURE_TEST),
     Mutant(SOLES, "FARTHEST = 0.03", "FARTHEST = 0.04", CAPTURE_TEST),
+    Mutant(SESSION, "LEAVING = 6.0", "LEAVING = 5.0", NOTICES_TEST),
+    Mutant(SESSION, "LEAVING = 6.0", "LEAVING = 7.0", NOTICES_TEST),
+    Mutant(SESSION, "NOTICE_SECONDS = 4.0", "NOTICE_SECONDS = 3.0", NOTICES_TEST),
+    Mutant(SESSION, "NOTICE_SECONDS = 4.0", "NOTICE_SECONDS = 5.0", NOTICES_TEST),
+    Mutant(SESSION, "NOTICE_FADES = 0.5", "NOTICE_FADES = 0.1", NOTICES_TEST),
+    Mutant(TAKES, "RATE = Fraction(25)", "RATE = Fraction(30)", TAKES_TEST),
+    Mutant(TAKES, "RATES = (5, 120)", "RATES = (4, 120)", TAKES_TEST),
+    Mutant(TAKES, "RATES = (5, 120)", "RATES = (5, 119)", TAKES_TEST),
+    Mutant(TAKES, "LONGEST = 3600.0", "LONGEST = 3700.0", TAKES_TEST),
+    Mutant(TAKES, "STILL = 0.2", "STILL = 0.1", TAKES_TEST),
+    Mutant(TAKES, "STILL = 0.2", "STILL = 0.3", TAKES_TEST),
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.0", RENDER_TEST),
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.1", RENDER_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),
