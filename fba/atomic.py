@@ -77,7 +77,7 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
 
 
 def write_error(path: PathLike, error: BaseException, what: str = "could not be written") -> FbaError:
-    """The error to raise when writing failed: `what`, the reason, and what to do if the disk is full."""
+    """Return the error for failed writing: `what`, the reason, and what to do if the disk is full."""
     if isinstance(error, FbaError):
         return error
     reason = _reason(error) or type(error).__name__
@@ -144,7 +144,7 @@ def _check_folder(folder: str, name: str) -> None:
 
 
 def _descriptor(name: str) -> int | None:
-    """The descriptor of an open file by its name, 1 for `/dev/stdout`; None for other names."""
+    """Return the descriptor of an open file by its name, 1 for `/dev/stdout`; None for other names."""
     match = _OPEN_FILE.fullmatch(name)
     return int(match[1]) if match else _STANDARD.get(name)
 

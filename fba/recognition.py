@@ -53,7 +53,7 @@ CSV_LINES = 3
 """Lines that a table has at least."""
 
 
-def recognised(head: bytes) -> str:
+def recognise(head: bytes) -> str:
     """Return what a file with this beginning seems to be, such as "a PNG picture"; "" if that is unknown."""
     if not head:
         return ""
@@ -78,9 +78,9 @@ def recognised(head: bytes) -> str:
     return _recognise_text(head.removeprefix(b"\xef\xbb\xbf").lstrip())
 
 
-def but_recognised(head: bytes) -> str:
-    """Return the same as the end of an error: "; it seems to be a PNG picture", or ""."""
-    kind = recognised(head)
+def recognition_hint(head: bytes) -> str:
+    """Return the end of an error: "; it seems to be a PNG picture", or "" if that is unknown."""
+    kind = recognise(head)
     return f"; it seems to be {kind}" if kind else ""
 
 

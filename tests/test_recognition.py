@@ -12,7 +12,7 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, FaceTrack
-from fba.recognition import but_recognised, recognised
+from fba.recognition import recognise, recognition_hint
 
 SAMPLES = Path(fba.__file__).parent / "samples"
 
@@ -58,8 +58,8 @@ def zipped() -> bytes:
     ],
 )  # fmt: skip
 def test_kinds(head: bytes, kind: str) -> None:
-    assert recognised(head) == kind
-    assert but_recognised(head) == (f"; it seems to be {kind}" if kind else "")
+    assert recognise(head) == kind
+    assert recognition_hint(head) == (f"; it seems to be {kind}" if kind else "")
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_files_that_are_written_here(tmp_path: Path, name: str, kind: str) -> No
     parts = {".fap": (face, None), ".bap": (None, body), ".bvh": (None, body), ".glb": (None, body)}
     path = tmp_path / name
     fba.write(path, Animation(25, np.arange(3), *parts.get(path.suffix, (face, body))))
-    assert recognised(path.read_bytes()[:4096]) == kind
+    assert recognise(path.read_bytes()[:4096]) == kind
 
 
 @pytest.mark.parametrize("suffix", [".fba", ".fap", ".bap", ".epf", ".bvh", ".glb", ".gltf", ""])
@@ -124,4 +124,4 @@ def test_a_face_model_that_is_none() -> None:
     ],
 )
 def test_where_one_kind_ends_and_another_begins(head: bytes, kind: str) -> None:
-    assert recognised(head) == kind
+    assert recognise(head) == kind

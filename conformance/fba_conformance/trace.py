@@ -13,7 +13,7 @@ from typing import Any
 
 from fba.errors import FbaError, FbaWarning
 from fba.parameters import BAP_STEP_TABLES
-from fba.recognition import HEAD_BYTES, but_recognised
+from fba.recognition import HEAD_BYTES, recognition_hint
 from fba_conformance._part import HighLevel, Part
 from fba_conformance._reader import (
     OBJECT_START_CODES,
@@ -134,7 +134,7 @@ class Walker:
             raise reader.error(
                 f"an FBA object starts with {' or '.join(f'{c:08x}' for c in OBJECT_START_CODES)}, "
                 f"found {reader.data[:4].hex() or 'nothing'}"
-                f"{but_recognised(reader.data[:HEAD_BYTES]) or '; is this an FBA stream?'}",
+                f"{recognition_hint(reader.data[:HEAD_BYTES]) or '; is this an FBA stream?'}",
                 bit=0,
             )
         if start:

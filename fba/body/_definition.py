@@ -50,7 +50,7 @@ class BodyDefinition:
 
     @classmethod
     def load(cls, path: Path) -> BodyDefinition:
-        """A definition from a JSON file: {"joints": {"l_hip": {"centre": [x, y, z], "parent": "sacroiliac"},
+        """Load a definition from JSON: {"joints": {"l_hip": {"centre": [x, y, z], "parent": "sacroiliac"},
         ...}}.
 
         "parent" may be left out of all joints. Raises FormatError where the file cannot be read, ModelError
@@ -74,7 +74,7 @@ class BodyDefinition:
         return cls({name: joint["centre"] for name, joint in joints.items()}, parents)
 
     def skeleton(self, profile: str = "calibration", generic: Skeleton | None = None) -> Skeleton:
-        """The skeleton that a decoder of this profile moves.
+        """Return the skeleton that a decoder of this profile moves.
 
         profile: one of `PROFILES`. generic: the decoder's own body, the default one where None. Raises
         ModelError where "predictable" lacks parents, or they contradict each other.
@@ -99,7 +99,7 @@ class BodyDefinition:
 
 
 def calibrate(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Skeleton:
-    """The skeleton with its segments scaled so that joints are at the given centres (metres).
+    """Return the skeleton with its segments scaled so that joints are at the given centres (metres).
 
     A joint between two given ones keeps its relative position along the line between them; one beyond the
     last given joint keeps its direction from it, at that joint's scale. Joints that the skeleton lacks have
@@ -140,7 +140,7 @@ def calibrate(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Skel
 
 
 def _first_given_below(parents: Int64, given: Mapping[int, Float64]) -> list[int]:
-    """For each joint the closest given joint among itself and its descendants, -1 for none."""
+    """Return, for each joint, the closest given joint among itself and its descendants, -1 for none."""
     result = [-1] * len(parents)
     depth = [0] * len(parents)
     for number in range(len(parents) - 1, -1, -1):
@@ -154,14 +154,14 @@ def _first_given_below(parents: Int64, given: Mapping[int, Float64]) -> list[int
 
 
 def _share_along(old: Float64, parents: Int64, parent: int, number: int, below: int) -> float:
-    """Position of a joint along the line from its parent to a given joint below: 0 to 1, generic body."""
+    """Return a joint's position, 0 to 1, from its parent to a given joint below, in the generic body."""
     line = old[below] - old[parent]
     length = float(line @ line)
     return float((old[number] - old[parent]) @ line) / length if length > 1e-12 else 1.0
 
 
 def _component_across(offset: Float64, line: Float64, new_line: Float64) -> Float64:
-    """The component of an offset across the line, at the scale of the new line."""
+    """Return the component of an offset across the line, at the scale of the new line."""
     length = float(line @ line)
     if length <= 1e-12:
         return np.zeros(3)
@@ -172,7 +172,7 @@ def _component_across(offset: Float64, line: Float64, new_line: Float64) -> Floa
 
 
 def _extent(positions: Float64) -> float:
-    """The extent of joints: the diagonal of their box, or the height of a single one."""
+    """Return the extent of joints: the diagonal of their box, or the height of a single one."""
     if len(positions) == 1:
         return abs(float(positions[0, 1]))
     return float(np.linalg.norm(np.ptp(positions, axis=0)))

@@ -87,7 +87,7 @@ def _compute_blend(neck: list[BodyPart], joints: int, skull: int, placed: Float6
 
 
 def _measure_offset(anchors: Float32, placed: Float64) -> Float64:
-    """(3,) offset, metres, between a face and a body whose neck it shares vertex by vertex; else 0.
+    """Return (3,) offset, metres, between a face and a body whose neck it shares vertex by vertex; else 0.
 
     Needed because readers differ a little in where they find pupils.
     """
@@ -109,7 +109,7 @@ def _measure_offset(anchors: Float32, placed: Float64) -> Float64:
 
 
 def _dense_weights(neck: list[BodyPart], joints: int) -> Float64:
-    """(A, J) weights of the necks' vertices."""
+    """Return (A, J) weights of the necks' vertices."""
     rows = sum(len(part.vertices) for part in neck)
     dense = np.zeros((rows, joints))
     which = np.concatenate([part.joints for part in neck])
@@ -122,7 +122,7 @@ def _dense_weights(neck: list[BodyPart], joints: int) -> Float64:
 def _blend_weights(
     tree: Any, dense: Float64, places: Float64, skull: int, below: Bool
 ) -> tuple[Int32, Float32]:
-    """(joints, weights) of the nearest anchors, fading into the skull with distance except where `below`."""
+    """Return joints and weights of the nearest anchors, which fade into the skull's unless `below`."""
     away, rows = tree.query(places, k=min(NEIGHBOURS, len(dense)))
     away, rows = away.reshape(len(places), -1), rows.reshape(len(places), -1)
     share = 1 / np.maximum(away, 1e-6) ** 2
@@ -135,7 +135,7 @@ def _blend_weights(
 
 
 def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]:
-    """(vertices (N,) of the open rims in the lower half of necks, (N, 3) outward directions there)."""
+    """Return (vertices (N,) of the open rims in the lower half of necks, (N, 3) outward directions there)."""
     starts = np.cumsum([0, *(len(part.vertices) for part in neck)])
     triangles = np.concatenate([part.triangles + start for part, start in zip(neck, starts, strict=False)])
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
@@ -155,7 +155,7 @@ def _lower_edge(anchors: Float32, neck: list[BodyPart]) -> tuple[Int64, Float64]
 
 
 def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
-    """Vertices of the rims at the lower end of a neck; not those at its chin, nor of holes in it."""
+    """Return the vertices of the rims at the lower end of a neck, not at its chin nor in holes."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -173,7 +173,7 @@ def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
 
 
 def _beyond_edge(tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64) -> Bool:
-    """(V,) mask of the positions beyond the edge."""
+    """Return (V,) mask of the positions beyond the edge."""
     away, rows = tree.query(places)
     number = np.full(len(anchors), -1)
     number[edge] = np.arange(len(edge))

@@ -126,14 +126,14 @@ class BodyModel(Meshes[BodyPart]):
 
     @staticmethod
     def default() -> BodyModel:
-        """The built-in person, dressed, without the head; one shared instance."""
+        """Return the built-in person, dressed, without the head; one shared instance."""
         from fba.body.builtin import default
 
         return default()
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> BodyModel:
-        """A body from a glTF 2.0 file as `save` writes it.
+        """Return a body from a glTF 2.0 file as `save` writes it.
 
         Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
         damaged, contradicts itself, or lacks the extension FBA_body.
@@ -158,7 +158,7 @@ class BodyModel(Meshes[BodyPart]):
         normals: Float32 | None = None,
         method: str = "dual",
     ) -> Float32:
-        """The body in a pose: float32 (V, 3) for joint matrices (J, 4, 4), (T, V, 3) for (T, J, 4, 4).
+        """Return the body in a pose: float32 (V, 3) for joint matrices (J, 4, 4), (T, V, 3) for (T, J, 4, 4).
 
         matrices: as `BapSolver(model.skeleton).pose` returns them. out: written to and
         returned. normals: filled with the unit normals. Both float32, C-contiguous, of the result's shape.

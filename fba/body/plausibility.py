@@ -92,7 +92,7 @@ class Doubt:
 
 
 def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str) -> Doubt | None:
-    """The reasons why a body looks wrong under the table `used` and right under the other, or None.
+    """Return the reasons why a body looks wrong under the table `used` and right under the other, or None.
 
     index: (T,) numbers of the frames, at rate frames a second. Values must be as decoded: where they are not
     multiples of the table's steps (bap_quant 0, or resampled), the table has no effect, and None is
@@ -142,7 +142,7 @@ def measure(values: Int64, index: Int64, rate: Fraction) -> Motion:
 
 
 def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
-    """The faults of `now` that the other reading of the same motion does not have."""
+    """Return the faults of `now` that the other reading of the same motion does not have."""
     findings = []
     if now.beyond - other.beyond > BEYOND:
         findings.append(f"joints beyond human limits in {100 * now.beyond:.0f} % of frames")
@@ -161,7 +161,7 @@ def _new_faults(now: Motion, other: Motion) -> tuple[str, ...]:
 
 
 def _samples(count: int) -> Int64:
-    """Indices of the frames to examine: all of them, or runs of successive ones."""
+    """Return indices of the frames to examine: all of them, or runs of successive ones."""
     if count <= SAMPLES * RUN:
         return np.arange(count)
     starts = np.linspace(0, count - RUN, SAMPLES).astype(np.int64)
@@ -169,7 +169,7 @@ def _samples(count: int) -> Int64:
 
 
 def _beyond(values: Int64) -> Bool:
-    """bool (T,): whether any joint is beyond all limits by more than `MARGIN`, ignoring whole turns."""
+    """Return bool (T,): whether a joint exceeds all limits by more than `MARGIN`, ignoring whole turns."""
     turning = np.flatnonzero(widest_limits().any(axis=1))
     low, high = widest_limits()[turning].T
     angles = values[:, turning] * DEGREES
@@ -179,7 +179,7 @@ def _beyond(values: Int64) -> Bool:
 
 
 def _feet(values: Int64) -> Float64:
-    """float64 (T, 4, 3), metres: ankles and balls of the feet from the root's place, along the world's axes.
+    """Return float64 (T, 4, 3), metres: ankles and balls of the feet, from the root, along the world's axes.
 
     `BapSolver` poses whole bodies; this turns four points and needs no compiled loop.
     """

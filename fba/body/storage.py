@@ -43,7 +43,7 @@ def save(model: BodyModel, path: Path) -> None:
 
 
 def build(model: BodyModel) -> Builder:
-    """The glTF document of a model, its joints first among the nodes."""
+    """Return the glTF document of a model, its joints first among the nodes."""
     builder = Builder()
     skeleton = model.skeleton
     builder.root["extensionsUsed"] = [NAME]
@@ -65,10 +65,10 @@ def build(model: BodyModel) -> Builder:
     columns = inverse.transpose(0, 2, 1).reshape(-1, 16)
     skin = {"joints": list(range(len(skeleton))), "skeleton": 0, "inverseBindMatrices": builder.data(columns)}
     builder.add("skins", skin)
-    looks = PartWriter(builder)
+    materials = PartWriter(builder)
     parts = []
     for part in model.parts:
-        primitive = looks.primitive(part)
+        primitive = materials.primitive(part)
         small = np.uint8 if len(skeleton) <= 256 else np.uint16
         primitive["attributes"]["JOINTS_0"] = builder.attribute(part.joints.astype(small))
         primitive["attributes"]["WEIGHTS_0"] = builder.attribute(part.weights)
@@ -95,7 +95,7 @@ def build(model: BodyModel) -> Builder:
 
 
 def local_rotations(model: BodyModel) -> Float64:
-    """(J, 3, 3) rotation of each joint in its parent's frame, as modelled."""
+    """Return (J, 3, 3) rotation of each joint in its parent's frame, as modelled."""
     turns = model.bind[:, :3, :3].copy()
     parents = model.skeleton.parents
     turns[1:] = np.swapaxes(model.bind[parents[1:], :3, :3], 1, 2) @ turns[1:]
@@ -103,16 +103,16 @@ def local_rotations(model: BodyModel) -> Float64:
 
 
 def _quaternions(turns: Float64) -> Float64:
-    """(N, 4) x, y, z, w of rotation matrices (N, 3, 3), w not negative; exactly 0 0 0 1 for none."""
+    """Return (N, 4) x, y, z, w of rotation matrices (N, 3, 3), w not negative; exactly 0 0 0 1 for none."""
     from scipy.spatial.transform import Rotation
 
-    found: Float64 = Rotation.from_matrix(turns).as_quat(canonical=True)
-    found[(turns == np.eye(3)).all(axis=(1, 2))] = (0, 0, 0, 1)
-    return found
+    quaternions: Float64 = Rotation.from_matrix(turns).as_quat(canonical=True)
+    quaternions[(turns == np.eye(3)).all(axis=(1, 2))] = (0, 0, 0, 1)
+    return quaternions
 
 
 def load(path: Path) -> BodyModel:
-    """The body model in a .glb (or .gltf) file as `save` writes it.
+    """Return the body model in a .glb (or .gltf) file as `save` writes it.
 
     Raises FormatError where the file cannot be opened; ModelError, with the position in it, where it is
     damaged, contradicts itself, or lacks the extension FBA_body.
@@ -123,7 +123,7 @@ def load(path: Path) -> BodyModel:
 
 
 def read_body(document: Document) -> BodyModel:
-    """The body in an opened document."""
+    """Return the body in an opened document."""
     from fba.gltf.reader import read_document
 
     content = optional_member(document.root.get("extensions"), NAME)
@@ -145,52 +145,52 @@ def read_body(document: Document) -> BodyModel:
     listed = content.member("parts")
     parts = tuple(_part(entry, gltf, where, row, document) for entry in listed.elements(MAX_PARTS))
     eyes = content.get("eyes")
-    places = None if eyes is None else [each.numbers(3, -LARGEST, LARGEST) for each in eyes.elements(2)]
+    pupils = None if eyes is None else [each.numbers(3, -LARGEST, LARGEST) for each in eyes.elements(2)]
     name = content.get("name")
     with locating_errors(content), np.errstate(all="ignore"):
         return BodyModel(
             parts=parts,
             skeleton=skeleton,
             bind=bind,
-            eyes=None if places is None else np.array(places).reshape(-1, 3),
+            eyes=None if pupils is None else np.array(pupils).reshape(-1, 3),
             name="" if name is None else name.text(),
             notes={key: value.text() for key, value in content.entries("notes", MAX_NOTES)},
         )
 
 
 def _skeleton(gltf: Gltf, joints: tuple[int, ...]) -> tuple[Skeleton, Float64, Int64]:
-    """The skeleton, the bind matrices, and which of the skin's joints each of its joints is."""
-    place = {node: number for number, node in enumerate(joints)}
-    wanted = [node for node in gltf.order if node in place]  # parents first
+    """Return the skeleton, the bind matrices, and which of the skin's joints each of its joints is."""
+    column = {node: number for number, node in enumerate(joints)}
+    wanted = [node for node in gltf.order if node in column]  # parents first
     row = {node: number for number, node in enumerate(wanted)}
     parents, centres, bind = [], np.zeros((len(wanted), 3)), np.tile(np.eye(4), (len(wanted), 1, 1))
     for number, node in enumerate(wanted):
-        shown = gltf.nodes[node]
-        unscaled = shown.scale is not None and bool((shown.scale == 1).all())
-        if shown.translation is None or shown.rotation is None or not unscaled:
+        own = gltf.nodes[node]
+        unscaled = own.scale is not None and bool((own.scale == 1).all())
+        if own.translation is None or own.rotation is None or not unscaled:
             raise ModelError(
-                f"joint {shown.name!r} (node {node}) has a matrix or a scale; it must only move and turn"
+                f"joint {own.name!r} (node {node}) has a matrix or a scale; it must only move and turn"
             )
-        if shown.parent is not None and shown.parent not in row:
+        if own.parent is not None and own.parent not in row:
             raise ModelError(
-                f"joint {shown.name!r} (node {node}) hangs on node {shown.parent}, which is no joint"
+                f"joint {own.name!r} (node {node}) hangs on node {own.parent}, which is no joint"
             )
-        parent = -1 if shown.parent is None else row[shown.parent]
+        parent = -1 if own.parent is None else row[own.parent]
         parents.append(parent)
-        centres[number] = shown.translation + (centres[parent] if parent >= 0 else 0.0)
-        bind[number, :3, :3] = rotations.matrices(shown.rotation[[3, 0, 1, 2]])
-        bind[number, :3, 3] = shown.translation
+        centres[number] = own.translation + (centres[parent] if parent >= 0 else 0.0)
+        bind[number, :3, :3] = rotations.matrices(own.rotation[[3, 0, 1, 2]])
+        bind[number, :3, 3] = own.translation
         if parent >= 0:
             bind[number] = bind[parent] @ bind[number]
     if not (np.abs(centres) < LARGEST).all():
         raise ModelError(f"a joint is more than {LARGEST:g} m away")
     names = tuple(gltf.nodes[node].name for node in wanted)
     skeleton = Skeleton(names, np.array(parents, dtype=np.int64), centres)
-    return skeleton, bind, np.array([place[node] for node in wanted], dtype=np.int64)
+    return skeleton, bind, np.array([column[node] for node in wanted], dtype=np.int64)
 
 
 def _check_bind(inverse: Float64, bind: Float64, names: tuple[str, ...]) -> None:
-    """That the mesh was modelled where the nodes stand."""
+    """Raise ModelError if the mesh was not modelled where the nodes stand."""
     off = np.abs(inverse @ bind - np.eye(4)).max(axis=(1, 2))
     if not (off < BIND_TOLERANCE).all():
         worst = int(np.argmax(~(off < BIND_TOLERANCE)))

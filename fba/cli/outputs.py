@@ -221,7 +221,7 @@ def _check_place(path: Path, *, no_clobber: bool) -> None:
 
 
 def _state(path: Path, number: int) -> os.stat_result | None:
-    """What the system knows of a file; number: of the open file that "-" stands for."""
+    """Return the status of a file, or None. number: of the open file that "-" stands for."""
     try:
         return os.fstat(number) if path == STANDARD else os.stat(path)
     except (OSError, ValueError):
@@ -314,7 +314,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def _named_pipe(path: Path) -> BinaryIO | None:
-    """A named pipe, opened as soon as it has a reader; None for everything else."""
+    """Return a named pipe, opened as soon as it has a reader; None for everything else."""
     if not path.is_fifo() or str(path).startswith(("/dev/fd/", "/proc/")):
         return None
     try:

@@ -18,7 +18,7 @@ from fba.codec.block import Block
 from fba.codec.frame_buffer import FrameBuffer
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.parameters import BAP_STEP_TABLES
-from fba.recognition import HEAD_BYTES, but_recognised
+from fba.recognition import HEAD_BYTES, recognition_hint
 
 _CHUNK = 1 << 16
 """Bytes that `decode` passes to the decoder at once, so that few blocks are in memory."""
@@ -148,7 +148,7 @@ class Decoder:
         if self._objects == 0 and self._scanned == 0 and self._start_error is None:
             head = buffer.data[: min(buffer.length, 3)].tobytes()
             if head != syntax.START_CODE_PREFIX[: len(head)] or (final and buffer.length < 4):
-                self._kind = but_recognised(buffer.data[: min(buffer.length, HEAD_BYTES)].tobytes())
+                self._kind = recognition_hint(buffer.data[: min(buffer.length, HEAD_BYTES)].tobytes())
                 beginning = (
                     f"it begins with {buffer.data[: min(buffer.length, 4)].tobytes().hex(' ')}{self._kind}"
                     if head

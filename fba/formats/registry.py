@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError, OptionError, Remedy, UnsupportedError, did_you_mean
-from fba.recognition import but_recognised
+from fba.recognition import recognition_hint
 from fba.source import Path, read_head
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def format_of(path: Path, format: str | None = None) -> Format:
     if chosen is None and by_suffix:
         return by_suffix[0]  # the error of its reader will say what is wrong
     if chosen is None:
-        kind = but_recognised(head)
+        kind = recognition_hint(head)
         error = FormatError(f"is in no format known here: {_list_formats()}{kind}", path=path)
         raise error if kind else error.with_remedies(UNKNOWN)
     if by_suffix and chosen not in by_suffix:

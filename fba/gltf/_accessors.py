@@ -30,7 +30,7 @@ class Accessors:
         self._integers: dict[int, Array] = {}
 
     def floats(self, reference: Value, *types: str, count: int | None = None) -> Float32:
-        """float32 (N, width), finite, read-only; integers scaled as the document says.
+        """Return float32 (N, width), finite, read-only; integers scaled as the document says.
 
         reference: a JSON value, the accessor's index. types: allowed element types. count: the N that
         must be there. Raises ModelError.
@@ -48,7 +48,7 @@ class Accessors:
         return self._floats[index]
 
     def integers(self, reference: Value, *types: str, count: int | None = None) -> Array:
-        """The same for unsigned integers, unscaled, in their own dtype."""
+        """Return the same for unsigned integers, unscaled, in their own dtype."""
         index, entry = self._entry(reference)
         if entry.member("componentType").data not in UNSIGNED or _flag(entry, "normalized"):
             raise reference.error(
@@ -120,7 +120,7 @@ class Accessors:
     def _window(
         self, reference: Value, offset: int, count: int, width: int, kind: np.dtype[Any], where: Value
     ) -> Array:
-        """A copy of (count, width) numbers from a buffer view."""
+        """Return a copy of (count, width) numbers from a buffer view."""
         data, view = self._document.view(reference)
         element = width * kind.itemsize
         given = view.get("byteStride")

@@ -15,7 +15,7 @@ TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": 
 def read_animations(
     document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[Mesh, ...]
 ) -> tuple[Animation, ...]:
-    """All animations, in order. Channels that animate no node, or what an extension adds, are left out."""
+    """Return all animations, in order, without channels of no node, or of extensions."""
     found = []
     for number, entry in enumerate(document.entries("animations")):
         document.budget.charge(1024, entry)
@@ -40,7 +40,7 @@ def read_animations(
 
 
 def _width(target: Value, path: str, node: Node, meshes: tuple[Mesh, ...]) -> int:
-    """Numbers a key: as many weights as the node's mesh has morph targets."""
+    """Return the numbers per key: as many weights as the node's mesh has morph targets."""
     if path != "weights":
         return 4 if path == "rotation" else 3
     count = 0 if node.mesh is None else len(meshes[node.mesh].morph_names)

@@ -15,7 +15,7 @@ MAX_BYTES = 1 << 30
 
 
 def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
-    """JSON text and binary chunk (None where there is none) of a container.
+    """Return JSON text and binary chunk (None where there is none) of a container.
 
     data: all bytes of the file. file: its name for messages. Raises ModelError where the container is
     cut off, of another version, or damaged; bytes after its end are an FbaWarning.
@@ -45,7 +45,7 @@ def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | No
 
 
 def _chunks(data: memoryview, file: str) -> list[tuple[bytes, memoryview]]:
-    """The first chunks; others come after JSON and bytes, and may be skipped."""
+    """Return the first chunks; others come after JSON and bytes, and may be skipped."""
     found: list[tuple[bytes, memoryview]] = []
     at = HEADER_BYTES
     while at < len(data) and len(found) < 2:
@@ -62,7 +62,7 @@ def _chunks(data: memoryview, file: str) -> list[tuple[bytes, memoryview]]:
 
 
 def join_container(text: bytes, binary: bytes) -> bytes:
-    """A container of JSON text and bytes, both padded to whole words as the format asks.
+    """Return a container of JSON text and bytes, both padded to whole words as the format asks.
 
     Raises ModelError where the whole would be longer than `MAX_BYTES`.
     """

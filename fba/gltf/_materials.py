@@ -14,12 +14,12 @@ PICTURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 
 
 def media_type(data: bytes) -> str | None:
-    """ "image/png" or "image/jpeg" by the first bytes, or None for another content."""
+    """Return "image/png" or "image/jpeg" by the first bytes, or None for another content."""
     return next((name for mark, name in PICTURES.items() if data.startswith(mark)), None)
 
 
 def read_materials(document: Document) -> tuple[Material, ...]:
-    """All materials, in order."""
+    """Return all materials, in order."""
     pictures = _Pictures(document)
     return tuple(_material(entry, n, pictures) for n, entry in enumerate(document.entries("materials")))
 

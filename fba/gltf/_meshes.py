@@ -24,7 +24,7 @@ MAX_SETS = 8
 
 
 def read_meshes(document: Document, accessors: Accessors, materials: int) -> tuple[Mesh, ...]:
-    """All meshes, in order; materials: how many there are."""
+    """Return all meshes, in order; materials: how many there are."""
     return tuple(
         _mesh(document, accessors, entry, n, materials) for n, entry in enumerate(document.entries("meshes"))
     )
@@ -61,7 +61,7 @@ def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, m
 
 
 def _names(entry: Value, primitives: list[Value], count: int) -> tuple[str, ...]:
-    """Names of the morph targets: from the mesh's extras, as nearly all writers do, or a primitive's."""
+    """Return names of the morph targets: from the extras of the mesh, else of a primitive."""
     for holder in (entry, *primitives[:1]):
         extras = holder.get("extras")
         names = extras.get("targetNames") if extras is not None and isinstance(extras.data, dict) else None

@@ -16,7 +16,7 @@ from urllib.parse import unquote
 from fba.errors import FbaError, ModelError
 from fba.gltf import _glb as glb
 from fba.gltf.values import Budget, Value
-from fba.recognition import HEAD_BYTES, but_recognised
+from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.source import Path, open_source
 
 MAX_JSON = 64 << 20
@@ -39,7 +39,7 @@ class Document:
     budget: Budget = field(default_factory=lambda: Budget(MAX_UNPACKED))
 
     def entries(self, key: str) -> list[Value]:
-        """Entries of one of the document's lists, e.g. "meshes"."""
+        """Return the entries of one of the document's lists, e.g. "meshes"."""
         return self.root.elements(MAX_ITEMS, key)
 
     @cached_property
@@ -47,7 +47,7 @@ class Document:
         return self.entries("bufferViews")
 
     def view(self, reference: Value) -> tuple[memoryview, Value]:
-        """Bytes of the buffer view that `reference` names by its index, and its entry."""
+        """Return the bytes of the buffer view that `reference` names by its index, and its entry."""
         entry = self._views[reference.index(len(self._views), "buffer view")]
         buffer = self.buffers[entry.member("buffer").index(len(self.buffers), "buffer")]
         given = entry.get("byteOffset")
@@ -60,7 +60,7 @@ class Document:
         return buffer[offset : offset + length], entry
 
     def resource(self, uri: Value, most: int = glb.MAX_BYTES) -> bytes:
-        """Content of a data URI, or of a file in the document's folder; ModelError beyond `most` bytes."""
+        """Return the content of a data URI or a file beside the document; ModelError beyond `most` bytes."""
         if not isinstance(uri.data, str):
             raise uri.error("expected a URI")
         if uri.data.startswith("data:"):
@@ -76,13 +76,13 @@ def open_document(path: Path) -> Document:
 
 
 def parse_document(data: bytes, file: str, folder: str | None = None) -> Document:
-    """A document from bytes. file: name for messages. folder: where files it refers to may lie, or None."""
+    """Return a document from bytes. file: name for messages. folder: of the files that it names, or None."""
     binary: memoryview | None = None
     text = memoryview(data)
     if data[:4] == glb.MAGIC:
         text, binary = glb.split_container(data, file)
     elif data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
-        kind = but_recognised(data[:HEAD_BYTES])
+        kind = recognition_hint(data[:HEAD_BYTES])
         raise ModelError(f"{file}: is no glTF 2.0: neither a .glb container nor the JSON of a .gltf{kind}")
     root = Value(parse_json(text, file), file)
     asset = root.member("asset")
@@ -97,7 +97,7 @@ def parse_document(data: bytes, file: str, folder: str | None = None) -> Documen
 
 
 def parse_json(text: memoryview, file: str) -> Any:
-    """The JSON object in UTF-8 text; ModelError where it is none, too long or nested too deeply."""
+    """Return the JSON object in UTF-8 text; ModelError where it is none, too long or nested too deeply."""
     if len(text) > MAX_JSON:
         raise ModelError(
             f"{file}: {len(text)} bytes of JSON, more than the {MAX_JSON} that are read; "
@@ -157,7 +157,7 @@ def _inline(uri: Value) -> bytes:
 
 
 def _beside(uri: Value, folder: str | None, most: int) -> bytes:
-    """At most `most` bytes of a file in the folder of the document, or below it."""
+    """Return at most `most` bytes of a file in the folder of the document, or below it."""
     if folder is None:
         raise uri.error("names another file, but the document comes from memory, not from a folder")
     name = unquote(uri.text(4096))
@@ -178,7 +178,7 @@ def _beside(uri: Value, folder: str | None, most: int) -> bytes:
 
 
 def _content(path: str, most: int, *, start: bool = False) -> bytes:
-    """All bytes of a file of at most `most` bytes; with `start`, the first `most` bytes of a longer one."""
+    """Return all bytes of a file, at most `most`; with `start`, the first `most` of a longer one."""
     file, size = open_source(path)
     with file:
         if size > most and not start:

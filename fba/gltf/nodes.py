@@ -16,7 +16,7 @@ from fba.gltf.values import Value
 def read_nodes(
     document: Document, meshes: tuple[Mesh, ...], skins: tuple[Skin, ...]
 ) -> tuple[tuple[Node, ...], tuple[int, ...]]:
-    """All nodes, and their indices with parents before children.
+    """Return all nodes, and their indices with parents before children.
 
     ModelError where a node has two parents or is its own ancestor, or a transform is unusable.
     """
@@ -64,7 +64,7 @@ def read_nodes(
 
 
 def read_roots(document: Document, nodes: tuple[Node, ...]) -> tuple[int, ...]:
-    """Nodes at the top of the default scene; of all nodes, where the file has no scenes."""
+    """Return nodes at the top of the default scene; of all nodes, where the file has no scenes."""
     scenes = document.entries("scenes")
     if not scenes:
         return tuple(number for number, node in enumerate(nodes) if node.parent is None)
@@ -137,7 +137,7 @@ def _highest_joint(mesh: Mesh) -> int:
 
 
 def read_skins(document: Document, accessors: Accessors, nodes: int) -> tuple[Skin, ...]:
-    """All skins, in order; nodes: how many there are."""
+    """Return all skins, in order; nodes: how many there are."""
     return tuple(
         _skin(document, accessors, entry, n, nodes) for n, entry in enumerate(document.entries("skins"))
     )

@@ -18,14 +18,14 @@ LEVEL = 9
 
 
 def pack(array: Array) -> bytes:
-    """Compressed bytes of an array of 32-bit numbers, in its own order."""
+    """Return compressed bytes of an array of 32-bit numbers, in its own order."""
     words = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).ravel()
     planes = words.view(np.uint8).reshape(-1, 4).T
     return zlib.compress(planes.tobytes(), LEVEL)
 
 
 def unpack(document: Document, reference: Value, dtype: type[np.generic], shape: tuple[int, ...]) -> Array:
-    """The array of 32-bit numbers in the buffer view that `reference` names; its shape must be known.
+    """Return the array of 32-bit numbers in the buffer view that `reference` names; its shape must be known.
 
     Raises ModelError where the stream is damaged, or holds more or fewer numbers.
     """

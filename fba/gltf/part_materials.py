@@ -34,7 +34,7 @@ class PartWriter:
         self._textures: dict[int, int] = {}
 
     def primitive(self, part: MeshPart) -> dict[str, Any]:
-        """The primitive of a part, for the list of a mesh. ModelError where glTF cannot hold it."""
+        """Return the primitive of a part, for the list of a mesh. ModelError where glTF cannot hold it."""
         if not len(part.triangles):
             raise ModelError(
                 f"part {part.name!r} has no triangles; a glTF mesh needs some: leave the part out"
@@ -83,8 +83,11 @@ class PartWriter:
 
 
 def read_material(entry: Value, gltf: Gltf, index: int | None) -> Material:
-    """The material of a part. entry: its entry in our extension, which keeps a colour that the colours of
-    vertices replace. index: the document's material, or None."""
+    """Return the material of a part.
+
+    entry: its entry in our extension, which has the colour that colours of vertices replace. index: of the
+    document's material, or None.
+    """
     given = entry.get("colour")
     if index is None:
         return Material()

@@ -40,7 +40,7 @@ def read_gltf(path: Path) -> Gltf:
 
 
 def read_document(document: Document) -> Gltf:
-    """The content of an opened document; errors and warnings as `read_gltf`."""
+    """Return the content of an opened document; errors and warnings as `read_gltf`."""
     _check_extensions(document)
     accessors = Accessors(document)
     materials = read_materials(document)

@@ -130,7 +130,7 @@ class Gltf:
     accessors: Accessors
 
     def shown(self) -> tuple[int, ...]:
-        """Nodes of the default scene, parents first."""
+        """Return nodes of the default scene, parents first."""
         inside: set[int] = set()
         for number in self.order:
             parent = self.nodes[number].parent

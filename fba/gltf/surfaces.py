@@ -39,7 +39,7 @@ class Surface:
 
 
 def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
-    """Every surface of the default scene, parents first.
+    """Yield every surface of the default scene, parents first.
 
     Raises ModelError where they take more than 1 GiB together, as a mesh shown a million times can.
     """
@@ -105,7 +105,7 @@ def _surface(
 
 
 def _frames(gltf: Gltf, node: Node, primitive: Primitive) -> Float64:
-    """float64 (4, 4), or (V, 4, 4) where joints carry the vertices: a skin replaces the node's place."""
+    """Return float64 (4, 4), or (V, 4, 4) if joints carry the vertices: a skin replaces the node's matrix."""
     if node.skin is None or primitive.joints is None or primitive.weights is None:
         return node.world
     skin = gltf.skins[node.skin]
@@ -126,7 +126,7 @@ def _moved(linear: Float64, vectors: Float32) -> Float64:
 
 
 def _turned(linear: Float64, normals: Float32) -> Float32:
-    """Normals transformed by the inverse transpose, which keeps them upright under uneven scales."""
+    """Return normals transformed by the inverse transpose, which keeps them upright under uneven scales."""
     cofactors = np.stack(
         [np.cross(linear[..., (i + 1) % 3, :], linear[..., (i + 2) % 3, :]) for i in range(3)], axis=-2
     )

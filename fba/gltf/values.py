@@ -43,28 +43,28 @@ class Value:
         self.path = path
 
     def error(self, text: str) -> ModelError:
-        """The error to raise about this value."""
+        """Return the error to raise about this value."""
         return ModelError(f"{self.file}: {self.path}: {text}" if self.path else f"{self.file}: {text}")
 
     def get(self, key: str) -> Value | None:
-        """Member of an object, or None where it has none of that name."""
+        """Return a member of an object; None if there is none of that name."""
         members = self._object()
         return self._member(key, members[key]) if key in members else None
 
     def member(self, key: str) -> Value:
-        """Member of an object that must be there."""
+        """Return a member of an object, which must be there."""
         found = self.get(key)
         if found is None:
             raise self.error(f"{key!r} is missing")
         return found
 
     def members(self) -> Iterator[tuple[str, Value]]:
-        """Names and members of an object."""
+        """Return names and members of an object."""
         for key, data in self._object().items():
             yield key, self._member(key, data)
 
     def entries(self, key: str, most: int) -> list[tuple[str, Value]]:
-        """Names and members of the object in member `key`, at most `most`; empty where there is none."""
+        """Return names and members of the object in member `key`, at most `most`; empty without one."""
         content = self.get(key)
         if content is None:
             return []
@@ -76,7 +76,7 @@ class Value:
         return entries
 
     def elements(self, most: int, key: str | None = None) -> list[Value]:
-        """Elements of this list, or of the list in member `key` (empty where there is none)."""
+        """Return the elements of this list, or of the list in member `key` (empty without one)."""
         if key is not None:
             found = self.get(key)
             return [] if found is None else found.elements(most)
@@ -87,7 +87,7 @@ class Value:
         return [Value(data, self.file, f"{self.path}[{n}]") for n, data in enumerate(self.data)]
 
     def integer(self, low: int, high: int) -> int:
-        """A whole number within low..high."""
+        """Return a whole number within low..high."""
         data = self.data
         if isinstance(data, float) and data.is_integer():
             data = int(data)  # some writers say 3.0
@@ -98,13 +98,13 @@ class Value:
         return data
 
     def index(self, count: int, what: str) -> int:
-        """A whole number below `count`: the index of a `what`."""
+        """Return a whole number below `count`: the index of a `what`."""
         if not count:
             raise self.error(f"names {what} {_short(self.data)}, but there are none")
         return self.integer(0, count - 1)
 
     def number(self, low: float = -math.inf, high: float = math.inf) -> float:
-        """A finite number within low..high."""
+        """Return a finite number within low..high."""
         if isinstance(self.data, bool) or not isinstance(self.data, int | float):
             raise self._unexpected("a number")
         try:
@@ -118,13 +118,13 @@ class Value:
         return number
 
     def numbers(self, count: int, low: float = -math.inf, high: float = math.inf) -> tuple[float, ...]:
-        """A list of exactly `count` finite numbers."""
+        """Return a list of exactly `count` finite numbers."""
         if not isinstance(self.data, list) or len(self.data) != count:
             raise self._unexpected(f"a list of {count} numbers")
         return tuple(element.number(low, high) for element in self.elements(count))
 
     def text(self, most: int = MAX_TEXT) -> str:
-        """A text of at most `most` characters, all of which can be written as UTF-8."""
+        """Return a text of at most `most` characters, all of which can be written as UTF-8."""
         if not isinstance(self.data, str):
             raise self._unexpected("a text")
         if len(self.data) > most:
@@ -136,13 +136,13 @@ class Value:
         return self.data
 
     def choice(self, *words: str) -> str:
-        """One of the given words."""
+        """Return the text, which must be one of the given words."""
         if not isinstance(self.data, str) or self.data not in words:
             raise self.error(f"{_short(self.data)} is none of {', '.join(words)}")
         return self.data
 
     def boolean(self) -> bool:
-        """true or false."""
+        """Return the value, which must be true or false."""
         if not isinstance(self.data, bool):
             raise self._unexpected("true or false")
         return self.data
@@ -173,7 +173,7 @@ def locating_errors(value: Value) -> Iterator[None]:
 
 
 def optional_member(value: Value | None, key: str) -> Value | None:
-    """Member `key` of a value that may be missing itself."""
+    """Return member `key` of a value that may be missing itself."""
     return None if value is None else value.get(key)
 
 

@@ -41,13 +41,13 @@ class Builder:
         self._pictures: dict[bytes, int] = {}
 
     def add(self, key: str, entry: dict[str, Any]) -> int:
-        """Append to a list of the document, such as "nodes"; the entry's index."""
+        """Return append to a list of the document, such as "nodes"; the entry's index."""
         entries: list[dict[str, Any]] = self.root.setdefault(key, [])
         entries.append(entry)
         return len(entries) - 1
 
     def attribute(self, values: npt.ArrayLike, *, bounds: bool = False) -> int:
-        """Accessor of a vertex attribute, (V, width); floats become float32.
+        """Return accessor of a vertex attribute, (V, width); floats become float32.
 
         bounds: with the smallest and largest of each component, as positions need them.
         """
@@ -57,7 +57,7 @@ class Builder:
         return self._accessor(array, bounds, view, offset)
 
     def colours(self, colours: npt.ArrayLike) -> int:
-        """Accessor of COLOR_0, (V, 4): in 8 or 16 bits where these say exactly the same, else in floats."""
+        """Add COLOR_0, (V, 4), in 8 or 16 bits if these are exact, else in floats; return the accessor."""
         array = _native(colours)
         for kind in (np.uint8, np.uint16):
             top = np.float32(np.iinfo(kind).max)
@@ -69,30 +69,30 @@ class Builder:
         return self.attribute(array)
 
     def triangles(self, triangles: npt.ArrayLike) -> int:
-        """Accessor of the corners of triangles, (F, 3)."""
+        """Add the corners of triangles, (F, 3); return the accessor."""
         corners = _unsigned(np.asarray(triangles).reshape(-1, 1), RESTART - 1)
         view, offset = self._append(corners, (ELEMENTS, None))
         return self._accessor(corners, False, view, offset)
 
     def data(self, values: npt.ArrayLike, *, bounds: bool = False) -> int:
-        """Accessor of numbers other than vertex attributes (keys, matrices, tables), (N, width) or (N,)."""
+        """Add keys, matrices or tables, (N, width) or (N,); return the accessor."""
         array = _native(values)
         array = array[:, None] if array.ndim == 1 else array
         view, offset = self._append(array, (None, None))
         return self._accessor(array, bounds, view, offset)
 
     def matrices(self, values: npt.ArrayLike) -> int:
-        """Accessor of matrices, (N, 4, 4), in a view of their own: a skin shares none with an animation."""
+        """Add matrices (N, 4, 4), in a view that no animation shares; return the accessor."""
         array = _native(np.swapaxes(np.asarray(values, dtype=np.float64), -1, -2).reshape(-1, 16))
         view = self._blob(array.astype(array.dtype.newbyteorder("<")).tobytes())
         return self._accessor(array, False, view, 0)
 
     def packed(self, array: Array) -> int:
-        """Buffer view of 32-bit numbers, compressed without loss, for data that other viewers do not need."""
+        """Add 32-bit numbers, compressed, which other viewers do not need; return the buffer view."""
         return self._blob(pack(array))
 
     def displacements(self, values: Floating) -> int:
-        """Accessor of a morph target, (V, 3): sparse where most vertices stay."""
+        """Add a morph target, (V, 3), sparse if most vertices stay; return the accessor."""
         array = np.asarray(values, dtype=np.float32)
         rows = np.flatnonzero(array.any(axis=1))
         index_bytes = 2 if len(array) <= RESTART + 1 else 4
@@ -111,7 +111,7 @@ class Builder:
         return self.add("accessors", entry)
 
     def image(self, data: bytes, name: str = "") -> int:
-        """Picture in PNG or JPEG, kept in the file once; ModelError for another content."""
+        """Add a PNG or JPEG picture once; return its index. ModelError for other content."""
         if data not in self._pictures:
             kind = media_type(data)
             if kind is None:
@@ -121,7 +121,7 @@ class Builder:
         return self._pictures[data]
 
     def glb(self) -> bytes:
-        """The whole file. Raises ModelError where it would be too large, or a text is no Unicode."""
+        """Return the whole file. Raises ModelError where it would be too large, or a text is no Unicode."""
         chunks: list[bytes] = []
         at = 0
         views = self.root.get("bufferViews", [])

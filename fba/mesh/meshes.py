@@ -28,7 +28,7 @@ class Material:
 
 
 def vertex_normals(vertices: Floating, triangles: Integer) -> Float32:
-    """Unit normals weighted by area: float32 (V, 3); +z where no triangle touches a vertex."""
+    """Return unit normals weighted by area: float32 (V, 3); +z where no triangle touches a vertex."""
     corners = np.asarray(vertices, dtype=np.float64)[triangles]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     summed = np.zeros((len(vertices), 3))
@@ -79,7 +79,7 @@ def mesh_arrays(
 
 
 def checked_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Float32:
-    """A finite float32 copy of a given shape: rows (-1: any number) and columns. Else ModelError."""
+    """Return a finite float32 copy of a given shape: rows (-1: any number) and columns. Else ModelError."""
     array = np.array(values, dtype=np.float32)
     if array.ndim != 2 or array.shape[1] != shape[1] or (shape[0] >= 0 and len(array) != shape[0]):
         wanted = f"({'V' if shape[0] < 0 else shape[0]}, {shape[1]})"
@@ -91,7 +91,7 @@ def checked_rows(values: npt.ArrayLike, shape: tuple[int, int], what: str) -> Fl
 
 
 def normalise_rows(normals: Float32) -> Float32:
-    """The normals scaled to length 1, in place; those that already have it keep their exact values."""
+    """Return the normals scaled to length 1, in place; those that already have it keep their exact values."""
     length = np.linalg.norm(normals.astype(np.float64), axis=1)
     off = np.abs(length - 1.0) > NORMAL_TOLERANCE
     if off.any():
@@ -144,7 +144,7 @@ class Meshes(Generic[Part]):
         return {part.name: int(start) for part, start in zip(self.parts, counts[:-1], strict=True)}
 
     def part(self, name: str) -> Part:
-        """A part by name; ModelError where there is none."""
+        """Return a part by name; ModelError where there is none."""
         for part in self.parts:
             if part.name == name:
                 return part
@@ -152,14 +152,14 @@ class Meshes(Generic[Part]):
 
 
 def join_rows(arrays: Sequence[npt.NDArray[Number]]) -> npt.NDArray[Number]:
-    """The rows of all arrays, concatenated; read-only."""
+    """Return the rows of all arrays, concatenated; read-only."""
     rows = np.concatenate(arrays)
     rows.flags.writeable = False
     return rows
 
 
 def result_array(shape: tuple[int, ...], out: Float32 | None, normals: Float32 | None) -> Float32:
-    """The array to write vertices to: `out`, or a new one if None. Both given arrays are checked.
+    """Return the array to write vertices to: `out`, or a new one if None. Both given arrays are checked.
 
     Raises ValueError where one is not a writable, C-contiguous float32 array of the shape, or they overlap.
     """

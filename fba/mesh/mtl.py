@@ -16,7 +16,7 @@ PICTURES = (b"\x89PNG", b"\xff\xd8\xff")
 
 
 def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
-    """Materials by name of an .mtl file that lies beside an OBJ file; none where it is missing.
+    """Return materials by name of an .mtl file that lies beside an OBJ file; none where it is missing.
 
     Kd is the colour (sRGB, as writers put it there), Ns the shine, map_Kd the picture: PNG or JPEG
     beside the file, others are left out with an FbaWarning. Raises ModelError naming the line.

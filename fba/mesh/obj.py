@@ -14,7 +14,7 @@ from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_inte
 
 
 def read_obj(path: str | os.PathLike[str]) -> Polygons:
-    """All polygons of an OBJ file, in the file's own units and axes.
+    """Return all polygons of an OBJ file, in the file's own units and axes.
 
     Negative indices count from the end, polygons may have any number of corners from three on, lines
     end with a backslash to go on; curves, smoothing groups and normals are skipped. Texture coordinates
@@ -140,5 +140,5 @@ class _Reader:
 
 
 def _linear(colour: Float32) -> Float32:
-    """Linear light from the sRGB values that OBJ files hold."""
+    """Return linear light from the sRGB values that OBJ files hold."""
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).astype(np.float32)

@@ -38,7 +38,7 @@ class _Element:
 
 
 def read_ply(path: str | os.PathLike[str]) -> Polygons:
-    """Vertices, texture coordinates, colours and polygons of a PLY file, in its own units.
+    """Return vertices, texture coordinates, colours and polygons of a PLY file, in its own units.
 
     Raises ModelError naming the file and the place of what is wrong, and for more than
     `MAX_VERTICES` vertices.
@@ -171,7 +171,7 @@ class _Reader:
         return {name: flat[i :: len(names)] for i, name in enumerate(names)}, {}
 
     def _with_lists(self, element: _Element) -> tuple[dict[str, Float64], dict[str, tuple[Int64, Int64]]]:
-        """Rows of different lengths; only the lists are kept."""
+        """Return rows of different lengths; only the lists are kept."""
         even = self._even_lists(element) if self.order and element.count else None
         if even is not None:
             return {}, even
@@ -200,7 +200,7 @@ class _Reader:
         return {}, lists
 
     def _even_lists(self, element: _Element) -> dict[str, tuple[Int64, Int64]] | None:
-        """All rows at once, if every list is as long as that of the first row, as in a mesh of triangles."""
+        """Return all rows at once, if every list is as long as the first, as in a mesh of triangles."""
         lengths = [(name, length) for name, _, length in element.properties if length]
         at, row = self.at, []
         for place, (_, kind, length) in enumerate(element.properties):

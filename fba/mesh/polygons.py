@@ -33,12 +33,12 @@ class Polygons:
         return len(self.starts) - 1
 
     def in_groups(self, *names: str) -> Bool:
-        """Mask bool (F,) of the polygons in groups or objects of these names, whatever their material."""
+        """Return bool (F,): the polygons in groups or objects of these names, whatever their material."""
         wanted = [index for index, (group, _) in enumerate(self.groups) if group in names]
         return np.isin(self.group, wanted)
 
     def used(self, faces: Bool) -> Int32:
-        """Vertices of some polygons, in ascending order."""
+        """Return vertices of some polygons, in ascending order."""
         return np.unique(self.corners[np.repeat(faces, np.diff(self.starts))]).astype(np.int32)
 
 
@@ -56,7 +56,7 @@ class Triangles:
 
 
 def triangulate(polygons: Polygons, faces: Bool) -> Triangles:
-    """The chosen polygons cut into triangles; those of fewer than three corners are dropped."""
+    """Return the chosen polygons cut into triangles; those of fewer than three corners are dropped."""
     sizes = np.diff(polygons.starts)
     chosen = np.flatnonzero(faces & (sizes >= 3))
     counts = sizes[chosen] - 2

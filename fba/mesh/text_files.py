@@ -23,7 +23,7 @@ MAX_TEXT = 1 << 26
 
 
 def read_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
-    """Line numbers from 1 and lines of a text file, without their ends, read one by one.
+    """Yield line numbers from 1 and lines of a text file, without their ends, read one by one.
 
     UTF-8, else Latin-1; UTF-16 as its byte order mark says is refused, as are zero bytes: such a file is
     no text. Raises ModelError as `open_source` raises FormatError, and for a line beyond `MAX_LINE`.
@@ -55,7 +55,7 @@ def read_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
 
 
 def read_words(path: str | os.PathLike[str]) -> Iterator[tuple[str, list[str]]]:
-    """Each line's position for messages, and its words without comments (#). Errors as `read_lines`."""
+    """Yield each line's position for messages, and its words without comments (#). Errors as `read_lines`."""
     for line, text in read_lines(path):
         tokens = text.split("#", 1)[0].split()
         if tokens:
@@ -70,7 +70,7 @@ def _opened(name: str) -> tuple[BinaryIO, int]:
 
 
 def read_bytes(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
-    """All bytes of a file; ModelError where it cannot be read or is larger than `limit`."""
+    """Return all bytes of a file; ModelError where it cannot be read or is larger than `limit`."""
     name = os.fspath(path)
     file, size = _opened(name)
     with file:
@@ -83,7 +83,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> bytes:
 
 
 def parse_number(token: str, where: str, what: str) -> float:
-    """A finite number, else ModelError naming the place."""
+    """Return a finite number, else ModelError naming the place."""
     try:
         value = float(token)
     except ValueError:
@@ -94,7 +94,7 @@ def parse_number(token: str, where: str, what: str) -> float:
 
 
 def parse_integer(token: str, where: str, what: str) -> int:
-    """A whole number, else ModelError naming the place."""
+    """Return a whole number, else ModelError naming the place."""
     try:
         # int() takes underscores, other scripts' digits and numbers of any length
         if len(token) <= 20 and token.isascii() and "_" not in token:
@@ -105,7 +105,7 @@ def parse_integer(token: str, where: str, what: str) -> int:
 
 
 def find_beside(path: str | os.PathLike[str], name: str) -> Path | None:
-    """Path of a file that another file names, in the same folder; None if there is no such file.
+    """Return the path of a file that another file names, in the same folder; None if there is no such file.
 
     Names come from files of strangers: folders in them are dropped, so none reaches outside.
     """

@@ -16,7 +16,7 @@ LISTS = ("point", "coordIndex", "texCoordIndex")
 
 
 def read_vrml(path: str | os.PathLike[str]) -> list[Polygons]:
-    """Each IndexedFaceSet of a VRML file in order, in the file's unit; transforms are not applied.
+    """Return each IndexedFaceSet of a VRML file in order, in the file's unit; transforms are not applied.
 
     Raises ModelError where the file is damaged or has none.
     """

@@ -13,7 +13,7 @@ from fba.mesh.text_files import MAX_FACES, MAX_VERTICES, parse_integer, parse_nu
 
 
 def read_wfm(path: str | os.PathLike[str]) -> Polygons:
-    """Vertices and triangles of a .wfm file, in its own unit (Candide: a face is about 2 high).
+    """Return vertices and triangles of a .wfm file, in its own unit (Candide: a face is about 2 high).
 
     The lists of animation and shape units after the faces are not read. Raises ModelError naming the
     line.
@@ -44,7 +44,7 @@ def read_wfm(path: str | os.PathLike[str]) -> Polygons:
 def _table(
     rows: Iterator[tuple[str, list[str]]], path: str, what: str, most: int
 ) -> list[tuple[str, list[str]]]:
-    """A count, then as many rows of three."""
+    """Return a count, then as many rows of three."""
     where, tokens = next(rows, (path, []))
     if len(tokens) != 1:
         raise ModelError(f"{where}: the number of {what} is expected here, alone on its line")

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @cache
 def default() -> BodyModel:
-    """The built-in person; read on first use."""
+    """Return the built-in person; read on first use."""
     from fba.body.storage import load
 
     with as_file(files(__package__) / "body.glb") as path:

@@ -58,7 +58,7 @@ class Anatomy:
 
     @classmethod
     def measure(cls, skeleton: Skeleton) -> Anatomy:
-        """The anatomy of a skeleton. Raises ModelError where it lacks legs or arms, or cannot stand."""
+        """Return the anatomy of a skeleton; ModelError if it lacks legs or arms, or cannot stand."""
         wanted = [ROOT, "sacroiliac"]
         for letter in "lr":
             wanted += [f"{letter}_{j}" for j in ("hip", "knee", "ankle", "subtalar", "metatarsal")]

@@ -146,7 +146,7 @@ class Character:
 
     @staticmethod
     def named(name: str) -> Character:
-        """A character of the table; ModelError with the names that there are."""
+        """Return a character of the table; ModelError with the names that there are."""
         known = _characters()
         if not isinstance(name, str) or name not in known:
             close = difflib.get_close_matches(str(name), known, 1)
@@ -155,7 +155,7 @@ class Character:
         return known[name]
 
     def edited(self, pose: str, leg: str, **changes: float) -> Character:
-        """The character with changed values in one pose: `edited("passing", "swing", knee=80)`."""
+        """Return the character with changed values in one pose: `edited("passing", "swing", knee=80)`."""
         if (pose, leg) not in self.poses:
             raise ModelError(
                 f"no pose {pose!r} of a {leg!r} leg; poses are {', '.join(POSES)}, legs {', '.join(LEGS)}"
@@ -168,12 +168,12 @@ class Character:
         return replace(self, poses=poses)
 
     def curve(self, field: str) -> list[float]:
-        """A field of the poses through one cycle of a leg: eight values, from the contact of its foot on."""
+        """Return eight values of a field in one cycle of a leg, from the contact of its foot on."""
         return [getattr(self.poses[pose, leg], field) for leg in LEGS for pose in POSES]
 
 
 def characters() -> tuple[str, ...]:
-    """Names of all characters, `normal` first."""
+    """Return names of all characters, `normal` first."""
     return tuple(_characters())
 
 

@@ -14,14 +14,14 @@ Interpolation = Literal["linear", "smooth"]
 
 
 def check_interpolation(interpolation: Interpolation) -> Interpolation:
-    """The given kind of interpolation; ValueError for an unknown one."""
+    """Return the given kind of interpolation; ValueError for an unknown one."""
     if interpolation not in ("linear", "smooth"):
         raise ValueError(f"interpolation must be linear or smooth, not {interpolation!r}")
     return interpolation
 
 
 def cosine_wave(knots: npt.ArrayLike, phase: Float64, interpolation: Interpolation) -> Float64:
-    """A cosine wave at phases (T,), 1 at phase 0; "linear" interpolates it between the knots."""
+    """Return a cosine wave at phases (T,), 1 at phase 0; "linear" interpolates it between the knots."""
     if interpolation == "smooth":
         return np.cos(2.0 * np.pi * phase)
     return periodic_curve(knots, np.cos(2.0 * np.pi * np.asarray(knots)), phase, interpolation)
@@ -30,7 +30,7 @@ def cosine_wave(knots: npt.ArrayLike, phase: Float64, interpolation: Interpolati
 def periodic_curve(
     knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike, interpolation: Interpolation = "smooth"
 ) -> Float64:
-    """A periodic, monotone curve through values, at phases: flat between equal neighbours.
+    """Return a periodic, monotone curve through values, at phases: flat between equal neighbours.
 
     knots: increasing phases in 0..1, values: one each. Cubic pieces, tangents by Fritsch and Butland (1984).
     """
@@ -54,7 +54,7 @@ def periodic_curve(
 def spline(
     knots: npt.ArrayLike, values: Float64, first: Float64, last: Float64, phase: npt.ArrayLike
 ) -> Float64:
-    """The cubic spline through values (K, ...) at knots (K,) that leaves and arrives with given slopes."""
+    """Return the cubic spline through values (K, ...) at knots (K,) with given slopes at its ends."""
     x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
     count, h = len(x), np.diff(x)
     slope = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))

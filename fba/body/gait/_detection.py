@@ -108,7 +108,7 @@ class Gait:
         return result
 
     def as_dict(self) -> dict[str, Any]:
-        """The gait as a dict for JSON, in frames, seconds, metres and degrees."""
+        """Return the gait as a dict for JSON, in frames, seconds, metres and degrees."""
         return {
             "frames": self.frames,
             "walking": int(self.walking.sum()),
@@ -125,7 +125,7 @@ class Gait:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """The gait in lines of text."""
+        """Return the gait in lines of text."""
         if not self.steps:
             return ["no steps found: nobody walks here, or less than one step"]
         result = [
@@ -146,7 +146,7 @@ class Gait:
 
 
 def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Gait:
-    """The steps, cycles and characteristic poses in which a body walks forward.
+    """Return the steps, cycles and characteristic poses in which a body walks forward.
 
     skeleton: the one whose joints the BAPs turn, the default body where None. axes: a convention's name.
     A foot that never swings past the other, sideways and backward steps, and the first and last step of a

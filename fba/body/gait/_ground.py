@@ -48,18 +48,18 @@ class Leg:
     foot: Float64
 
     def ankle(self) -> tuple[Float64, Float64, Float64]:
-        """Ankle flexion about x, twisting about y, and the subtalar joint's roll about z, radians."""
+        """Return ankle flexion about x, twisting about y, and the subtalar joint's roll about z, radians."""
         shin = self.thigh @ axis_matrices(0, self.bend)
         return foot_angles(np.swapaxes(shin, -1, -2) @ self.foot)
 
 
 def foot_turn(pitch: Float64, yaw: Float64 | float) -> Float64:
-    """Rotation of a foot with its toes raised by pitch and pointing aside by yaw (about +y), radians."""
+    """Return the rotation of a foot with toes raised by pitch and turned by yaw (about +y), radians."""
     return axis_matrices(1, np.broadcast_to(yaw, pitch.shape)) @ axis_matrices(0, -pitch)
 
 
 def place_standing_foot(side: Side, place: Float64, pitch: Float64, yaw: float) -> Footing:
-    """The poses of a foot on the ground.
+    """Return the poses of a foot on the ground.
 
     place: (T, 3), the point on the ground (y = 0) below the ankle's centre when the foot is flat. pitch:
     (T,), yaw: radians.
@@ -72,14 +72,14 @@ def place_standing_foot(side: Side, place: Float64, pitch: Float64, yaw: float) 
 
 
 def ankle_position(side: Side, footing: Footing, roll: Float64 | float = 0.0) -> Float64:
-    """(T, 3) position of the ankle above a foot, for a roll of the subtalar joint, metres."""
+    """Return (T, 3) position of the ankle above a foot, for a roll of the subtalar joint, metres."""
     shape = footing.subtalar.shape[:-1]
     turn = footing.turn @ axis_matrices(2, -np.broadcast_to(roll, shape))
     return footing.subtalar - apply(turn, side.subtalar)
 
 
 def solve_leg(side: Side, hip: Float64, footing: Footing, knee_yaw: float, level_roll: float = 0.0) -> Leg:
-    """The leg from a hip (T, 3) to a foot. knee_yaw: direction of the knee about +y, radians.
+    """Return the leg from a hip (T, 3) to a foot. knee_yaw: direction of the knee about +y, radians.
 
     The ankle rolls with the shin, the foot does not. So that neither heel nor ball moves, a flat foot turns a
     little about the metatarsal joint: not at all where the roll is level_roll, and less as the heel rises.
@@ -99,7 +99,7 @@ def solve_leg(side: Side, hip: Float64, footing: Footing, knee_yaw: float, level
 
 
 def place_swinging_foot(side: Side, hip: Float64, thigh: Float64, bend: Float64, foot: Float64) -> Footing:
-    """The poses of a foot with rotation (T, 3, 3), at the end of a leg with given hip, thigh and knee."""
+    """Return the poses of a foot with rotation (T, 3, 3) at the end of a given hip, thigh and knee."""
     shin = thigh @ axis_matrices(0, bend)
     angles = foot_angles(np.swapaxes(shin, -1, -2) @ foot)
     ankle = shin @ axis_matrices(0, angles[0]) @ axis_matrices(1, angles[1])
@@ -108,7 +108,7 @@ def place_swinging_foot(side: Side, hip: Float64, thigh: Float64, bend: Float64,
 
 
 def lowest_height(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> Float64:
-    """(T,) height of the lowest of heel, ball and tip of the toes, metres; toes: bent up, radians."""
+    """Return (T,) height of the lowest of heel, ball and tip of the toes, metres; toes: bent up, radians."""
     heel = footing.subtalar + apply(footing.turn, side.heel)
     joint = footing.subtalar + apply(footing.turn, side.toe)
     bent = footing.turn @ axis_matrices(0, -np.broadcast_to(toes, footing.subtalar.shape[:-1]))
@@ -119,14 +119,14 @@ def lowest_height(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> 
 
 
 def hip_angles(pelvis: Float64, thigh: Float64) -> tuple[Float64, Float64, Float64]:
-    """Angles (x, y, z) of the hip, radians, between pelvis and thigh, both (T, 3, 3) in the world."""
+    """Return angles (x, y, z) of the hip, radians, between pelvis and thigh, both (T, 3, 3) in the world."""
     return limb_angles(np.swapaxes(pelvis, -1, -2) @ thigh)
 
 
 def hip_position(
     side: Side, pelvis_centre: Float64, root: Float64, lean: Float64, pelvis: Float64
 ) -> Float64:
-    """(T, 3) position of a hip, metres.
+    """Return (T, 3) position of a hip, metres.
 
     root: (T, 3), its centre. lean: (T, 3, 3), its rotation. pelvis: (T, 3, 3), rotation relative to it.
     """
@@ -135,7 +135,7 @@ def hip_position(
 
 
 def hip_height(side: Side, hip: Float64, ankle: Float64, bend: Float64) -> Float64:
-    """(T,) height of the hip over the ground at which the leg to the ankle has that bend, metres."""
+    """Return (T,) height of the hip over the ground at which the leg to the ankle has that bend, metres."""
     gap = hip - ankle
     rest = np.square(side.leg.length(bend)) - np.square(gap[..., 0]) - np.square(gap[..., 2])
     result: Float64 = ankle[..., 1] + np.sqrt(np.maximum(rest, 1e-6))

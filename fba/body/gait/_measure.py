@@ -61,7 +61,7 @@ class Soles:
 
 
 def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Soles:
-    """The soles of an animation's body in every frame. Raises ValueError without a body track."""
+    """Return the soles of an animation's body in every frame. Raises ValueError without a body track."""
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     skeleton = Skeleton.default() if skeleton is None else skeleton
@@ -70,7 +70,7 @@ def soles(animation: Animation, skeleton: Skeleton | None = None, axes: str = "i
 
 
 def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
-    """The soles in poses given by joint matrices (T, J, 4, 4)."""
+    """Return the soles in poses given by joint matrices (T, J, 4, 4)."""
     points = np.zeros((2, 3, len(matrices), 3))
     for number, letter in enumerate("lr"):
         side = anatomy.sides[letter]
@@ -85,7 +85,7 @@ def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
 
 
 def advance(animation: Animation, axes: str = "iso") -> float:
-    """Straight distance over the ground from the first frame's root to the last's, millimetres."""
+    """Return straight distance over the ground from the first frame's root to the last's, millimetres."""
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     columns = convention(axes).translation

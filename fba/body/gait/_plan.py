@@ -80,7 +80,7 @@ class Plan:
         return float(np.radians(self.character.toes_out))
 
     def pitch(self, phase: Float64) -> Float64:
-        """(T,) pitch of a foot at phases of its own leg, radians."""
+        """Return (T,) pitch of a foot at phases of its own leg, radians."""
         phase = np.mod(phase, 1.0)
         # between its contact and lying flat, a foot falls freely; the other poses lead to the contact
         flat = min(self._foot[0], self._foot[1])
@@ -90,7 +90,7 @@ class Plan:
         return np.where(phase < FLAT, landing, later)
 
     def knee(self, phase: Float64) -> Float64:
-        """(T,) bend of the knee by the poses, at phases of its own leg, radians."""
+        """Return (T,) bend of the knee by the poses, at phases of its own leg, radians."""
         return periodic_curve(KNOTS, self._knee, phase, self.interpolation)
 
     def toes(self, phase: Float64) -> Float64:
@@ -100,11 +100,11 @@ class Plan:
         return np.where(phase < 0.9, flat * (1.0 - smoothstep((phase - TOE_OFF) / 0.15)), 0.0)
 
     def lean(self, phase: Float64) -> Float64:
-        """(T, 3, 3) rotation of the root."""
+        """Return (T, 3, 3) rotation of the root."""
         return axis_matrices(0, np.full(phase.shape, np.radians(self.character.pelvis.tilt)))
 
     def pelvis_angles(self, phase: Float64) -> tuple[Float64, Float64]:
-        """(torsion about y, roll about z) of the pelvis relative to the root, each (T,), radians."""
+        """Return (torsion about y, roll about z) of the pelvis relative to the root, each (T,), radians."""
         pelvis = self.character.pelvis
         turn = np.radians(pelvis.turn) * np.clip(self.size, 0.0, 1.5)
         ahead = cosine_wave(KNOTS, phase, self.interpolation)
@@ -119,7 +119,7 @@ class Plan:
         return phase if side.letter == "r" else phase - 0.5
 
     def footprint(self, side: Side, phase: Float64) -> Float64:
-        """(T, 3) footprint at which a foot stands, or stood last, at phases of the cycle, metres."""
+        """Return (T, 3) footprint at which a foot stands, or stood last, at phases of the cycle, metres."""
         own = self.side_phase(side, phase)
         result = np.zeros((*phase.shape, 3))
         result[..., 0] = side.way * self.character.width / 2.0 * self.anatomy.scale
@@ -134,7 +134,7 @@ class Plan:
         )
 
     def _root_along(self, phase: Float64) -> Float64:
-        """(T, 3) the root's position over the ground, its height still 0, metres."""
+        """Return (T, 3) the root's position over the ground, its height still 0, metres."""
         pelvis, scale = self.character.pelvis, self.anatomy.scale
         result = np.zeros((*phase.shape, 3))
         result[..., 0] = -pelvis.sway * scale * np.sin(2.0 * np.pi * (phase - 0.02))
@@ -146,7 +146,7 @@ class Plan:
         return ground.hip_position(side, self.anatomy.pelvis, root, self.lean(phase), self.pelvis(phase))
 
     def _root_height(self, side: Side, root: Float64, phase: Float64, bend: Float64 | None = None) -> Float64:
-        """(T,) height of the root at which a standing leg has the bend of its poses, or the given one."""
+        """Return (T,) heights of the root at which a standing leg bends as in its poses, or as given."""
         own = self.side_phase(side, phase)
         hip = self.hip(side, root, phase)
         ankle = ground.ankle_position(side, self.footing(side, phase))
@@ -191,13 +191,13 @@ class Plan:
         )
 
     def root(self, phase: Float64) -> Float64:
-        """(T, 3) position of the root, metres, at the height that the standing leg gives."""
+        """Return (T, 3) position of the root, metres, at the height that the standing leg gives."""
         root, wanted, limit = self._heights(phase)
         root[..., 1] = np.minimum(wanted, limit)
         return root
 
     def _heights(self, phase: Float64) -> tuple[Float64, Float64, Float64]:
-        """((T, 3) root over the ground, (T,) its height by the poses, (T,) the largest its legs allow)."""
+        """Return the root over the ground (T, 3), its height (T,) in the poses, and the largest possible."""
         root = self._root_along(phase) - (0.0, 0.0, self._ahead)
         share = smoothstep(np.mod(phase, 0.5) / _DOUBLE)
         right_leads = np.mod(phase, 1.0) < 0.5
@@ -213,12 +213,12 @@ class Plan:
         return root, share * front + (1.0 - share) * rear, np.minimum(*limits)
 
     def largest_hold_down(self) -> float:
-        """Largest lowering of the body, metres, by legs that are too short for the stride."""
+        """Return the largest lowering of the body, metres, by legs that are too short for the stride."""
         _, wanted, limit = self._heights(np.arange(2 * CYCLE) / (2 * CYCLE))
         return float((wanted - limit).max())
 
     def standing_leg(self, side: Side, phase: Float64, root: Float64 | None = None) -> Leg:
-        """The leg while its foot is on the ground."""
+        """Return the leg while its foot is on the ground."""
         root = self.root(phase) if root is None else root
         footing = self.footing(side, phase)
         yaw, roll = side.way * self._yaw, side.way * self._level_roll
@@ -266,7 +266,7 @@ class Plan:
         return float(-np.degrees(limb_angles(plan.standing_leg(side, start).thigh)[0][0]))
 
     def leg(self, side: Side, phase: Float64, root: Float64) -> Leg:
-        """The leg at any phase, standing or swinging, for positions (T, 3) of the root."""
+        """Return the leg at any phase, standing or swinging, for positions (T, 3) of the root."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
         stands = own <= TOE_OFF
         yaw = side.way * self._yaw

@@ -77,7 +77,7 @@ def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64
 
 
 def _palm_goals(side: Side, character: Character, size: float) -> Float64:
-    """(8, 3), metres from the shoulder to the palm at the eight poses of a cycle of the leg on this side."""
+    """Return (8, 3), metres from the shoulder to the palm at the eight poses of this side's leg."""
     out, down, forward = (np.array(character.curve(field)) for field in ("out", "down", "forward"))
     swing = forward - forward.mean()
     forward = forward.mean() + swing * np.clip(size, 0.0, 1.4)

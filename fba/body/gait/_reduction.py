@@ -41,7 +41,7 @@ class Reduced:
         return self.walking / self.poses
 
     def whole(self, interpolation: Interpolation = "smooth") -> Animation:
-        """Every frame from the first key to the last, evenly spaced.
+        """Return every frame from the first key to the last, evenly spaced.
 
         interpolation: "linear", as in the digest, or "smooth": cubic curves that rise and fall only where the
         keys do. ValueError on another.
@@ -97,7 +97,7 @@ def reduce(animation: Animation, found: Gait | None = None, skeleton: Skeleton |
 
 
 def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
-    """Differences of two bodies in their common frames, over the joints that turn in `one`.
+    """Return differences of two bodies in their common frames, over the joints that turn in `one`.
 
     ValueError where rates differ, or no frame is in both.
     """
@@ -130,7 +130,7 @@ def _values(animation: Animation) -> Int32:
 
 
 def _unwrap(values: Int32) -> Float64:
-    """float64 (T, 296): BAPs with whole turns between successive angles removed."""
+    """Return float64 (T, 296): BAPs with whole turns between successive angles removed."""
     result = values.astype(np.float64)
     angles = [bap.number - 1 for bap in baps() if bap.unit == "1e-5 rad"]
     result[:, angles] = np.unwrap(result[:, angles], axis=0, period=2e5 * np.pi)
@@ -138,7 +138,7 @@ def _unwrap(values: Int32) -> Float64:
 
 
 def _local_rotations(matrices: Float64, skeleton: Skeleton) -> Float64:
-    """(T, J, 3, 3) rotation of each joint relative to its parent."""
+    """Return (T, J, 3, 3) rotation of each joint relative to its parent."""
     turns = matrices[:, :, :3, :3]
     result = turns.copy()
     result[:, 1:] = np.swapaxes(turns[:, skeleton.parents[1:]], -1, -2) @ turns[:, 1:]
@@ -146,7 +146,7 @@ def _local_rotations(matrices: Float64, skeleton: Skeleton) -> Float64:
 
 
 def _angles_between(a: Float64, b: Float64) -> Float64:
-    """Radians between rotations; by the chord, which keeps its accuracy near 0."""
+    """Return radians between rotations; by the chord, which keeps its accuracy near 0."""
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
     result: Float64 = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
     return result

@@ -74,7 +74,7 @@ class Curves:
         return cls(times, heel, toes, knee, thigh, place, lowest, heading, anatomy.sides["l"].leg.reach)
 
     def contacts(self, letter: str) -> list[int]:
-        """Frames in which a foot meets the ground, ahead of the other."""
+        """Return frames in which a foot meets the ground, ahead of the other."""
         height, other = self.lowest[letter], self.heel["l" if letter == "r" else "r"]
         found = []
         for peak in self._peaks(self.heel[letter]):
@@ -85,7 +85,7 @@ class Curves:
         return found
 
     def departures(self, letter: str) -> list[int]:
-        """Frames in which a foot has just left the ground."""
+        """Return frames in which a foot has just left the ground."""
         height = self.lowest[letter]
         found = []
         for peak in self._peaks(-self.toes[letter]):
@@ -97,11 +97,11 @@ class Curves:
         return found
 
     def _frames(self, seconds: float) -> int:
-        """Number of frames in some seconds, at least one."""
+        """Return number of frames in some seconds, at least one."""
         return max(1, round(seconds / max(float(np.median(np.diff(self.times))), 1e-9)))
 
     def _peaks(self, curve: Float64) -> list[int]:
-        """Maxima that stand out; also of a curve that begins or ends at one, as loops do."""
+        """Return maxima that stand out; also of a curve that begins or ends at one, as loops do."""
         from scipy.signal import find_peaks
 
         edge = [float(curve.min()) - 1.0]
@@ -113,7 +113,7 @@ class Curves:
 
 
 def _smooth(curve: Float64, width: float) -> Float64:
-    """The curve smoothed by a Gaussian of `width` frames, the ends extended by their values."""
+    """Return the curve smoothed by a Gaussian of `width` frames, the ends extended by their values."""
     if width < 0.3:
         return curve.copy()
     from scipy.ndimage import gaussian_filter1d

@@ -34,7 +34,7 @@ def walk(
     in_place: bool = False,
     skeleton: Skeleton | None = None,
 ) -> Animation:
-    """An animation of a walk along +z, from the contact of the right foot on: legs, arms, spine and root.
+    """Return a walk along +z, from the contact of the right foot on: legs, arms, spine and root.
 
     stride: metres from one contact of a foot to its next, two steps; the character's own, at the size of
         the skeleton, where None. As the time of a cycle is the character's, it sets the speed. Rounded to mm.
@@ -79,7 +79,7 @@ def walk(
 
 
 def write_cycle(plan: Plan, period: int) -> Writer:
-    """The BAPs of one cycle of `period` frames."""
+    """Return the BAPs of one cycle of `period` frames."""
     anatomy, character = plan.anatomy, plan.character
     phase = np.arange(period) / period
     writer = Writer(period)
@@ -137,7 +137,7 @@ def _check_stride(stride: float | None, character: Character, anatomy: Anatomy) 
 
 
 def _frame_count(cycles: float | None, seconds: float | None, rate: Fraction, period: int) -> int:
-    """Number of frames of a walk; raises ValueError for lengths that make no sense."""
+    """Return number of frames of a walk; raises ValueError for lengths that make no sense."""
     if cycles is not None and seconds is not None:
         raise ValueError("walk: give either cycles or seconds, not both")
     wanted = seconds if seconds is not None else 4 if cycles is None else cycles

@@ -68,7 +68,7 @@ RIG_FILE, WEIGHTS_FILE = "default.mhskel", "default_weights.mhw"
 
 
 def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -> BodyModel:
-    """The body of MakeHuman's base mesh on the standard's joints.
+    """Return the body of MakeHuman's base mesh on the standard's joints.
 
     path: the folder with base.obj, default.mhskel and default_weights.mhw, or that base.obj. Its own head is
     a part of kind "head", left out where a face is put on the body. Raises FormatError where a file is
@@ -128,19 +128,19 @@ def _json(path: Path) -> Value:
 
 
 def _require_file(path: Path) -> Path:
-    """The path, if there is a file; else FormatError."""
+    """Return the path, if there is a file; else FormatError."""
     if not path.is_file():
         raise FormatError("cannot be read: there is no such file", path=path)
     return path
 
 
 def _triangles(mesh: Polygons, *groups: str) -> Int64:
-    """int64 (F, 3): triangles of the named groups."""
+    """Return int64 (F, 3): triangles of the named groups."""
     return triangulate(mesh, mesh.in_groups(*groups)).corners.astype(np.int64)
 
 
 def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _RigPositions]:
-    """Each bone's parent, and the positions of the joints."""
+    """Return each bone's parent, and the positions of the joints."""
     bones: dict[str, str | None] = {}
     for name, entry in rig.member("bones").members():
         parent = entry.get("parent")
@@ -152,7 +152,7 @@ def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _RigPosi
 
 @cache
 def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
-    """Rows (joint, from, to, share, bones) of makehuman.csv, for both sides."""
+    """Return rows (joint, from, to, share, bones) of makehuman.csv, for both sides."""
     found = []
     with (files(__package__) / "makehuman.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -164,7 +164,7 @@ def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
 
 
 def _joint_positions(at: _RigPositions, rig: Value) -> Float64:
-    """(J, 3) positions of the standard's joints, metres."""
+    """Return (J, 3) positions of the standard's joints, metres."""
     default = Skeleton.default()
     places = np.full((len(default), 3), np.nan)
     for joint, start, end, share, _ in _rows():
@@ -183,7 +183,7 @@ def _joint_positions(at: _RigPositions, rig: Value) -> Float64:
 
 
 def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, places: Float64) -> Float64:
-    """(V, J) weight of each of the standard's joints for each vertex."""
+    """Return (V, J) weight of each of the standard's joints for each vertex."""
     default = Skeleton.default()
     given = {name: np.zeros(len(vertices)) for name in bones}
     for bone, listed in content.member("weights").members():
@@ -242,7 +242,7 @@ def _neckline() -> tuple[int, ...]:
 
 
 def _above_neckline(triangles: Int64, vertices: Float64) -> Bool:
-    """(F,) mask of the triangles above the neckline, where head models made of this mesh end too."""
+    """Return (F,) mask of the triangles above the neckline, where head models made of this mesh end too."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -257,7 +257,7 @@ def _above_neckline(triangles: Int64, vertices: Float64) -> Bool:
 
 
 def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPart, ...]:
-    """The parts: body, neck, head, and the head's eyes."""
+    """Return the parts: body, neck, head, and the head's eyes."""
     default = Skeleton.default()
     skull = weights[:, default.number("skullbase")]
     body = _triangles(mesh, "body")

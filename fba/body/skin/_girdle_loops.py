@@ -55,7 +55,7 @@ def turn_girdles(duals: Float32, girdle: Girdle) -> None:
 
 @inlined
 def _relative(duals: Float32, one: int, other: int) -> tuple[float, float, float, float]:
-    """The rotation of one joint seen from another: the quaternion w, x, y, z."""
+    """Return the rotation of one joint seen from another: the quaternion w, x, y, z."""
     w, x, y, z = duals[one, 0], duals[one, 1], duals[one, 2], duals[one, 3]
     a, b, c, d = duals[other, 0], duals[other, 1], duals[other, 2], duals[other, 3]
     return (

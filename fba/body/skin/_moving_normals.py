@@ -20,7 +20,7 @@ CACHE_VERSION = 1
 
 
 def normal_rings(vertices: Float32, normals: Float32, triangles: Integer) -> tuple[Int32, Float32]:
-    """(four neighbours of each vertex (V, 4), -1 where these give no normal; coefficients (V, 3)).
+    """Return (four neighbours of each vertex (V, 4), -1 where these give no normal; coefficients (V, 3)).
 
     With t = v[0] - v[2] and u = v[1] - v[3] of the neighbours, x t + y u + z (t x u) is the normal of the
     mesh as modelled, for the coefficients x, y, z, and stays so under any rotation of the mesh.
@@ -72,7 +72,7 @@ def _find_rings(vertices: Float32, normals: Float32, triangles: Integer) -> tupl
 
 
 def _neighbours(triangles: Int64) -> tuple[Int64, Int64]:
-    """(first, second) of all pairs of joined vertices, in both directions, sorted by the first."""
+    """Return (first, second) of all pairs of joined vertices, in both directions, sorted by the first."""
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     sides = sides[sides[:, 0] != sides[:, 1]]
     count = int(triangles.max()) + 1  # pairs as one number: rows take ten times as long to sort
@@ -82,7 +82,7 @@ def _neighbours(triangles: Int64) -> tuple[Int64, Int64]:
 
 
 def _angles_about_normals(ways: Float64, upright: Float64, starts: Int64) -> Float64:
-    """Angle of each edge about its vertex's normal, from the vertex's first edge, 0 to 2 pi."""
+    """Return angle of each edge about its vertex's normal, from the vertex's first edge, 0 to 2 pi."""
     sizes = np.diff(np.append(starts, len(ways)))
     reference = np.repeat(ways[starts], sizes, axis=0)
     aside = np.cross(upright, reference)
@@ -93,7 +93,7 @@ def _angles_about_normals(ways: Float64, upright: Float64, starts: Int64) -> Flo
 
 
 def _nearest_to_angle(turn: Float64, wanted: float, other: Int64, centre: Int64, starts: Int64) -> Int64:
-    """For each vertex the neighbour nearest to an angle; the vertex itself if none is within 60 degrees."""
+    """Return each vertex's neighbour nearest to an angle; the vertex itself if none is within 60 degrees."""
     off = np.abs(np.mod(turn - wanted + np.pi, 2 * np.pi) - np.pi)
     order = np.lexsort((off, centre))
     best = order[starts]

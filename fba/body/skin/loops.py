@@ -142,7 +142,7 @@ def _twist_limbs(
 
 @inlined
 def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
-    """Angle by which a joint turns about an axis, seen from its parent, radians.
+    """Return angle by which a joint turns about an axis, seen from its parent, radians.
 
     It fades to 0 where the limb points the opposite way, as the twist is undefined there.
     """
@@ -164,7 +164,7 @@ def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
 
 @inlined
 def _quaternion(s: Float64) -> tuple[float, float, float, float]:
-    """Unit quaternion w, x, y, z of the rotation in a matrix (3, 4), from its largest component."""
+    """Return unit quaternion w, x, y, z of the rotation in a matrix (3, 4), from its largest component."""
     trace = s[0, 0] + s[1, 1] + s[2, 2]
     if trace > 0.0:
         r = np.sqrt(1.0 + trace)

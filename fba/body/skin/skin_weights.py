@@ -46,7 +46,7 @@ def checked_weights(
 
 
 def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int32, Float32]:
-    """(joints, weights), each (V, 4), of dense weights (V, J).
+    """Return (joints, weights), each (V, 4), of dense weights (V, J).
 
     Where there are more than four joints, the fifth weight is subtracted from all, so that weights fade in
     and out over the surface without a step. alike: (J,) whether a joint belongs to a chain of neighbours that
@@ -70,7 +70,7 @@ def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tu
 
 
 def _thin_chain(dense: Float64, alike: Bool) -> Float64:
-    """(V, J) weights with chain joints dropped so that each vertex has at most `INFLUENCES` joints."""
+    """Return (V, J) weights with chain joints dropped so that each vertex has at most `INFLUENCES` joints."""
     dense = np.maximum(dense - LEAST, 0.0)
     dense /= np.maximum(dense.sum(axis=1, keepdims=True), 1e-12)
     rooms = np.clip(INFLUENCES - (dense[:, ~alike] > 0).sum(axis=1), 1, INFLUENCES)

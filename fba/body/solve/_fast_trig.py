@@ -23,7 +23,7 @@ T3, T5, T7, T9, T11, T13, T15, T17, T19, T21, T23 = ((-1.0) ** (n // 2) / n for 
 
 @inlined
 def sine_cosine(angle: float) -> tuple[float, float]:
-    """Sine and cosine of an angle in radians, |angle| < 10^6, within 3e-16."""
+    """Return sine and cosine of an angle in radians, |angle| < 10^6, within 3e-16."""
     quarters = math.floor(angle * PER_RADIAN + 0.5)
     x = (angle - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW
     z = x * x
@@ -41,7 +41,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
 
 @inlined
 def arc_tangent(y: float, x: float) -> float:
-    """The angle of the direction (x, y) as `math.atan2`, within 1e-11; 0 for (0, 0)."""
+    """Return the angle of the direction (x, y) as `math.atan2`, within 1e-11; 0 for (0, 0)."""
     high = max(abs(x), abs(y))
     low = min(abs(x), abs(y))
     ratio = low / (high if high > 0.0 else 1.0)

@@ -16,7 +16,7 @@ FINGERS = ("index", "middle", "ring", "pinky")
 
 
 def bind_matrices(positions: Float64) -> Float64:
-    """Bind matrices, float64 (J, 4, 4), for positions (J, 3) of the default skeleton's joints, metres.
+    """Return bind matrices, float64 (J, 4, 4), for positions (J, 3) of the default skeleton's joints, metres.
 
     The figure stands upright, feet flat, looking along +z. Limbs are rotated as their bones are; trunk and
     head are not rotated.
@@ -65,7 +65,7 @@ def bind_matrices(positions: Float64) -> Float64:
 
 
 def skeleton_in_default_posture(bind: Float64) -> Skeleton:
-    """The skeleton in the default posture of a figure with bind matrices (J, 4, 4)."""
+    """Return the skeleton in the default posture of a figure with bind matrices (J, 4, 4)."""
     default = Skeleton.default()
     centres = bind[:, :3, 3].copy()
     for number in range(1, len(default)):
@@ -93,7 +93,7 @@ def place_vertebrae(positions: Float64, knots: Float64, neck: int) -> None:
 
 
 def vertebrae_between(first: str, last: str) -> list[str]:
-    """Names of the vertebrae from `first` to `last`, upwards, both included."""
+    """Return names of the vertebrae from `first` to `last`, upwards, both included."""
     default = Skeleton.default()
     names = [name for name in default.names if name.startswith("v")]
     order = sorted(names, key=lambda name: default.centres[default.number(name), 1])
@@ -101,7 +101,7 @@ def vertebrae_between(first: str, last: str) -> list[str]:
 
 
 def chain_weights(height: Float64, joints_at: Float64, eased: int = 1) -> Float64:
-    """(V, K) weights of a vertical chain of joints at heights (K,) for vertices at heights (V,), metres.
+    """Return (V, K) weights of a vertical chain of joints for vertices, at heights (K,) and (V,), metres.
 
     eased: how often weights are smoothed over the neighbours in the chain. At first two joints share a
     vertex, and two more after each smoothing; a vertex can have four.
@@ -122,7 +122,7 @@ def chain_weights(height: Float64, joints_at: Float64, eased: int = 1) -> Float6
 
 
 def orthonormal_frame(direction: Float64, side: Float64) -> Float64:
-    """(3, 3), orthonormal columns: the direction, the side made perpendicular to it, their cross product."""
+    """Return (3, 3), orthonormal columns: direction, side made perpendicular to it, cross product."""
     first = direction / max(float(np.linalg.norm(direction)), 1e-12)
     second = side - first * (first @ side)
     second = second / max(float(np.linalg.norm(second)), 1e-12)

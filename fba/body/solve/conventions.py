@@ -43,20 +43,20 @@ class Convention:
     translation_sign: Float64
 
     def freedoms(self, joint: str) -> tuple[int, ...]:
-        """0-based BAP columns of a joint's rotations, outermost first; empty where it has none."""
+        """Return the 0-based BAP columns of a joint's rotations, outermost first; empty without any."""
         if joint not in self.joints:
             return ()
         return tuple(int(b) for b in self.bap[self.joints.index(joint)] if b != NO_BAP)
 
 
 def convention_names() -> tuple[str, ...]:
-    """Names of all conventions; the first is the default."""
+    """Return names of all conventions; the first is the default."""
     return tuple(_table())
 
 
 @cache
 def convention(name: str = "iso") -> Convention:
-    """The convention of a name; raises ValueError for an unknown one."""
+    """Return the convention of a name; raises ValueError for an unknown one."""
     if name not in _table():
         raise ValueError(f"axes must be one of {', '.join(_table())}, not {name!r}")
     row = _table()[name]
@@ -99,7 +99,7 @@ def _order(row: dict[str, Any], joint: str) -> str:
 
 
 def _axis_in_body_frame(row: dict[str, Any], joint: str, axis: int, sign: float) -> tuple[int, float]:
-    """(axis, sign) in the body's frame of an axis of a joint's own: hands are a quarter turn about y."""
+    """Return axis and sign in the body's frame for a joint's own axis: hands are a quarter turn about y."""
     for rule in row["turned"]:
         if re.fullmatch(rule["joints"], joint) and axis != 1:
             quarter = rule["quarter_turns_about_y"]

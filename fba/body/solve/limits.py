@@ -65,16 +65,16 @@ class Limits:
 
     @staticmethod
     def human() -> Limits:
-        """Typical limits of normal human motion, by segment; some are limits of the sum over vertebrae."""
+        """Return limits of normal human motion, by segment; some are limits of the sum over vertebrae."""
         return Limits(_human())
 
     @staticmethod
     def iso() -> Limits:
-        """The ranges of the standard's BAP table at its own quantiser steps, joint by joint."""
+        """Return the ranges of the standard's BAP table at its own quantiser steps, joint by joint."""
         return Limits(_iso())
 
     def check(self, values: npt.ArrayLike) -> tuple[Excess, ...]:
-        """The limits that BAPs (T, 296) or (296,), 1e-5 rad, exceed; empty if they exceed none.
+        """Return the limits that BAPs (T, 296) or (296,), 1e-5 rad, exceed; empty if they exceed none.
 
         Whole turns are ignored. Raises ValueError for other shapes or values that are not finite.
         """
@@ -89,7 +89,7 @@ class Limits:
         return tuple(found)
 
     def clamp(self, values: npt.ArrayLike) -> Int32:
-        """The BAPs clamped to the limits, int32. Where several share a limit, all are scaled by one factor.
+        """Return the BAPs clamped to the limits, int32; those that share a limit are scaled by one factor.
 
         Values within a limit do not change. Raises ValueError as `check`.
         """
@@ -112,7 +112,7 @@ class Limits:
 
 @cache
 def widest_limits() -> Float64:
-    """float64 (296, 2), degrees: the range that human limits or the standard allow each BAP by itself.
+    """Return float64 (296, 2), degrees: the range that human limits or the standard allow each BAP by itself.
 
     Body turn, roll and tilt, which are unlimited for a person, get half a turn either way (roll a quarter).
     """
@@ -137,7 +137,7 @@ def _frames(values: npt.ArrayLike) -> Float64:
 
 
 def _excess(limit: Limit, array: Float64) -> tuple[Float64, Float64]:
-    """(totals (T,) in degrees, shifted by whole turns as close to the range as possible; excess (T,))."""
+    """Return totals (T,) in degrees, shifted by whole turns to the range if possible, and excess (T,)."""
     total = array[:, list(limit.baps)].sum(axis=1) * DEGREES
     if len(limit.baps) == 1:
         total = total - FULL_TURN * np.rint((total - (limit.low + limit.high) / 2) / FULL_TURN)

@@ -32,13 +32,13 @@ TURN = 2.0 * math.pi
 
 @inlined
 def _nearest(angle: float, wanted: float) -> float:
-    """The angle plus the number of whole turns that bring it closest to the wanted one."""
+    """Return the angle plus the number of whole turns that bring it closest to the wanted one."""
     return angle + TURN * math.floor((wanted - angle) / TURN + 0.5)
 
 
 @inlined
 def _excess(angle: float, low: float, high: float) -> float:
-    """Amount by which an angle is outside a range, 0 inside."""
+    """Return amount by which an angle is outside a range, 0 inside."""
     return max(0.0, low - angle, angle - high)
 
 
@@ -68,7 +68,7 @@ def _turn_rows(m: Float64, axis: int, sine: float, cosine: float) -> None:
 
 @inlined
 def _angle_about(m: Float64, axis: int) -> float:
-    """The angle about one axis whose rotation is closest to m (largest trace of their quotient)."""
+    """Return the angle about one axis whose rotation is closest to m (largest trace of their quotient)."""
     a = axis + 1 if axis < 2 else 0
     b = axis - 1 if axis > 0 else 2
     return arc_tangent(m[b, a] - m[a, b], m[a, a] + m[b, b])
@@ -106,7 +106,7 @@ def _refine_two(m: Float64, f: int, a1: int, a2: int, start: Float64, work: Floa
 def _third_angle_at_lock(
     m: Float64, f: int, a1: int, a2: int, a3: int, outer: float, middle: float, work: Float64
 ) -> float:
-    """The third angle at gimbal lock, where the outer one is given."""
+    """Return the third angle at gimbal lock, where the outer one is given."""
     for i in range(3):
         for k in range(3):
             work[i, k] = m[i, k, f]

@@ -87,7 +87,7 @@ def _print(rows: list[dict[str, Any]]) -> None:
 
 
 def statistics(info: StreamInfo) -> dict[str, Any]:
-    """Bits of a stream: size, bits_per_second, the busiest second, and how planes share them.
+    """Return bits of a stream: size, bits_per_second, the busiest second, and how planes share them.
 
     intra_bits_mean, predicted_bits_median, predicted_bits_95: bits a plane; 0 where there are none of
     that kind. intra_share: what part of the planes' bits the I planes take.
@@ -113,7 +113,7 @@ def statistics(info: StreamInfo) -> dict[str, Any]:
 
 
 def _peak(bits: np.ndarray, times: np.ndarray) -> int:
-    """Most bits within any one second that starts with a plane."""
+    """Return the most bits within any one second that starts with a plane."""
     sums = np.concatenate([[0], np.cumsum(bits)])
     stops = np.searchsorted(times, times + 1.0 - 1e-9)
     return int((sums[stops] - sums[: len(bits)]).max())

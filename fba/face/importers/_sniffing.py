@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fba.errors import FormatError, ModelError
-from fba.recognition import but_recognised
+from fba.recognition import recognition_hint
 from fba.source import read_head
 
 KINDS: Mapping[str, str] = {
@@ -37,8 +37,8 @@ def sniff(path: str | os.PathLike[str]) -> str:
     kind = _kind_of_content(head, path)
     if kind is None:
         reads = "; ".join(KINDS.values())
-        recognised = but_recognised(head)
-        raise ModelError(f"{path}: no face can be read from this file{recognised}. Read are: {reads}")
+        hint = recognition_hint(head)
+        raise ModelError(f"{path}: no face can be read from this file{hint}. Read are: {reads}")
     return kind
 
 

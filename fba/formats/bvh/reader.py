@@ -20,7 +20,7 @@ from fba.arrays import Float64
 from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture.skeleton import MOST_FRAMES
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.recognition import HEAD_BYTES, but_recognised
+from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.source import read_whole
 
 MAX_JOINTS = 4096
@@ -84,7 +84,7 @@ def read(
 def read_motion(path: str | Path) -> SkeletonMotion:
     """Return the skeleton and its motion as they are in the file. Raises FormatError, warns (FbaWarning)."""
     data = read_whole(path)
-    kind = but_recognised(data[:HEAD_BYTES])
+    kind = recognition_hint(data[:HEAD_BYTES])
     if kind and not re.match(rb"(?:\xef\xbb\xbf)?\s*HIERARCHY\b", data, re.IGNORECASE):
         raise FormatError(f"a BVH file begins with HIERARCHY{kind}", path=path)
     text = data.decode("utf-8-sig", errors="replace")
@@ -92,7 +92,7 @@ def read_motion(path: str | Path) -> SkeletonMotion:
 
 
 def parse(text: str, *, name: str = "", path: str | Path | None = None) -> SkeletonMotion:
-    """Do the same as `read_motion`, from text. path: named in errors."""
+    """Return the same as `read_motion`, from text. path: named in errors."""
     if max(text.count("\n"), text.count("\r")) > MAX_LINES:
         raise FormatError(f"more than {MAX_LINES} lines; cut the motion into pieces", path=path)
     lines = text.splitlines()
@@ -111,18 +111,18 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
     seen_header = False
     for number, line in enumerate(lines):
         words = line.replace("{", " { ").replace("}", " } ").split()
-        at = 0
-        while at < len(words):
-            word = words[at].upper()
+        position = 0
+        while position < len(words):
+            word = words[position].upper()
 
-            def fail(message: str, number: int = number, token: str = words[at]) -> FormatError:
+            def fail(message: str, number: int = number, token: str = words[position]) -> FormatError:
                 return FormatError(message, path=path, line=number + 1, token=token)
 
             if not seen_header:
                 if word != "HIERARCHY":
                     raise fail("a BVH file begins with HIERARCHY")
                 seen_header = True
-                at += 1
+                position += 1
             elif word in ("ROOT", "JOINT"):
                 if word == "ROOT" and tree.names:
                     raise fail("this file has several ROOTs; split it into files of one skeleton each")
@@ -131,32 +131,32 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                 if len(tree.names) >= MAX_JOINTS:
                     raise fail(f"more than {MAX_JOINTS} joints")
                 pending = len(tree.names)
-                end = next((i for i in range(at + 1, len(words)) if words[i] == "{"), len(words))
-                tree.names.append(" ".join(words[at + 1 : end]) or f"joint{pending}")
+                end = next((i for i in range(position + 1, len(words)) if words[i] == "{"), len(words))
+                tree.names.append(" ".join(words[position + 1 : end]) or f"joint{pending}")
                 tree.parents.append(stack[-1] if stack else -1)
                 tree.offsets.append((0.0, 0.0, 0.0))
                 tree.channels.append([])
-                at = end
+                position = end
             elif word == "END":
                 if not stack or stack[-1] < 0:
                     raise fail("an End Site must stand inside a joint")
                 pending = -1
                 tree.end_parents.append(stack[-1])
                 tree.end_offsets.append((0.0, 0.0, 0.0))
-                at = next((i for i in range(at + 1, len(words)) if words[i] == "{"), len(words))
+                position = next((i for i in range(position + 1, len(words)) if words[i] == "{"), len(words))
             elif word == "{":
                 if pending is None:
                     raise fail("a brace opens, but no ROOT, JOINT or End Site stands before it")
                 stack.append(pending)
                 pending = None
-                at += 1
+                position += 1
             elif word == "}":
                 if not stack:
                     raise fail("a brace closes that was never opened")
                 stack.pop()
-                at += 1
+                position += 1
             elif word == "OFFSET":
-                values = [_number(w, path, number) for w in words[at + 1 : at + 4]]
+                values = [_number(w, path, number) for w in words[position + 1 : position + 4]]
                 if not stack or len(values) != 3:
                     raise fail("OFFSET needs three numbers, inside a joint or End Site")
                 offset = (values[0], values[1], values[2])
@@ -164,9 +164,9 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
                     tree.end_offsets[-1] = offset
                 else:
                     tree.offsets[stack[-1]] = offset
-                at += 4
+                position += 4
             elif word == "CHANNELS":
-                at = _channels(tree, stack, words, at, path, number)
+                position = _channels(tree, stack, words, position, path, number)
             elif word == "MOTION":
                 if stack or pending is not None:
                     raise fail(f"MOTION begins, but {len(stack)} braces are still open")
@@ -181,13 +181,13 @@ def _hierarchy(lines: list[str], path: str | Path | None) -> tuple[_Hierarchy, i
 
 
 def _channels(
-    tree: _Hierarchy, stack: list[int], words: list[str], at: int, path: str | Path | None, line: int
+    tree: _Hierarchy, stack: list[int], words: list[str], position: int, path: str | Path | None, line: int
 ) -> int:
     """Read CHANNELS of a joint; return the position of the next word. line: 0-based."""
-    text = words[at + 1] if at + 1 < len(words) else ""
+    text = words[position + 1] if position + 1 < len(words) else ""
     if not stack or stack[-1] < 0 or not re.fullmatch(r"[0-9]{1,2}", text):
         raise FormatError("CHANNELS needs a count, inside a joint", path=path, line=line + 1, token=text)
-    names = [w.lower() for w in words[at + 2 : at + 2 + int(text)]]
+    names = [w.lower() for w in words[position + 2 : position + 2 + int(text)]]
     for channel in names:
         if not re.fullmatch(r"[xyz](rotation|position)", channel):
             raise FormatError(
@@ -197,16 +197,16 @@ def _channels(
     if len(names) != int(text) or tree.channels[stack[-1]]:
         raise FormatError(f"expected {text} channels, once for this joint", path=path, line=line + 1)
     tree.channels[stack[-1]] = names
-    return at + 2 + int(text)
+    return position + 2 + int(text)
 
 
-def _motion_header(lines: list[str], at: int, path: str | Path | None) -> tuple[int | None, str, int]:
+def _motion_header(lines: list[str], start: int, path: str | Path | None) -> tuple[int | None, str, int]:
     """Return the stated number of frames, the frame time as text, and the line (0-based) after it."""
-    claimed: int | None = None
-    for number in range(at, min(at + 50, len(lines))):
+    stated: int | None = None
+    for number in range(start, min(start + 50, len(lines))):
         frames = re.search(r"\bFrames\s*:?\s*([0-9]{1,18})\b", lines[number], re.IGNORECASE)
         if frames:
-            claimed = int(frames[1])
+            stated = int(frames[1])
         time = re.search(r"\bFrame\s+Time\s*:?\s*(\S+)\s*$", lines[number], re.IGNORECASE)
         if time:
             value = _number(time[1], path, number)
@@ -215,26 +215,26 @@ def _motion_header(lines: list[str], at: int, path: str | Path | None) -> tuple[
                     f"the frame time must lie between 1/{MAX_RATE} s and an hour",
                     path=path, line=number + 1, token=time[1],
                 )  # fmt: skip
-            return claimed, time[1], number + 1
-    raise FormatError("there is no 'Frame Time: <seconds>' after MOTION", path=path, line=at + 1)
+            return stated, time[1], number + 1
+    raise FormatError("there is no 'Frame Time: <seconds>' after MOTION", path=path, line=start + 1)
 
 
 def _numbers(
-    lines: list[str], first: int, channels: int, claimed: int | None, path: str | Path | None
+    lines: list[str], first: int, channels: int, stated: int | None, path: str | Path | None
 ) -> Float64:
     """Return float64 (T, channels). The stated number of frames allocates no memory."""
     if not channels:
         raise FormatError("no joint has channels, so nothing can move", path=path)
-    read: list[Float64] = []
-    at: list[int] = []  # the line of each row, and how many numbers it has
-    counts: list[int] = []
+    blocks: list[Float64] = []
+    row_lines: list[int] = []  # the line of each row
+    counts: list[int] = []  # how many numbers it has
     batch: list[str] = []
     total = 0
     for number in range(first, len(lines)):
         words = lines[number].split()
         if not words:
             continue
-        at.append(number)
+        row_lines.append(number)
         counts.append(len(words))
         total += len(words)
         batch += words
@@ -242,36 +242,36 @@ def _numbers(
             raise FormatError(
                 f"more than {MOST_FRAMES} frames; cut the motion into pieces", path=path, line=number + 1
             )
-        if len(at) % BATCH_LINES == 0:
-            read.append(_floats(batch, lines, at, path))
+        if len(row_lines) % BATCH_LINES == 0:
+            blocks.append(_floats(batch, lines, row_lines, path))
             batch = []
-    read.append(_floats(batch, lines, at, path))
+    blocks.append(_floats(batch, lines, row_lines, path))
     frames, lost = divmod(total, channels)
     if not frames:
         raise FormatError("there is no frame of motion after 'Frame Time'", path=path, line=first + 1)
     bad = next((row for row, count in enumerate(counts) if count != channels), None)
     if bad is not None:
-        wrapped = claimed is not None and total == claimed * channels
+        wrapped = stated is not None and total == stated * channels
         cut = bad == len(counts) - 1 and counts[bad] < channels
         if not (wrapped or cut):
             raise FormatError(
                 f"expected {channels} numbers, one for each channel, found {counts[bad]}",
-                path=path, line=at[bad] + 1,
+                path=path, line=row_lines[bad] + 1,
             )  # fmt: skip
         if cut and not wrapped:
             warnings.warn(
-                f"{path or 'BVH'}:{at[bad] + 1}: the last frame is cut short "
+                f"{path or 'BVH'}:{row_lines[bad] + 1}: the last frame is cut short "
                 f"({lost} of {channels} numbers); left out",
                 FbaWarning,
                 stacklevel=4,
             )
-    if claimed is not None and claimed != frames:
+    if stated is not None and stated != frames:
         warnings.warn(
-            f"{path or 'BVH'}: the header says {claimed} frames, the file has {frames}; those are used",
+            f"{path or 'BVH'}: the header says {stated} frames, the file has {frames}; those are used",
             FbaWarning,
             stacklevel=4,
         )
-    values = np.concatenate(read)[: frames * channels]
+    values = np.concatenate(blocks)[: frames * channels]
     wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
     if len(wrong):
         ends = np.cumsum(counts)
@@ -279,18 +279,18 @@ def _numbers(
         raise FormatError(
             "motion must be finite, plausible numbers",
             path=path,
-            line=at[row] + 1,
-            token=lines[at[row]].split()[int(wrong[0] - ends[row])],
+            line=row_lines[row] + 1,
+            token=lines[row_lines[row]].split()[int(wrong[0] - ends[row])],
         )
     return values.reshape(frames, channels)
 
 
-def _floats(batch: list[str], lines: list[str], at: list[int], path: str | Path | None) -> Float64:
+def _floats(batch: list[str], lines: list[str], row_lines: list[int], path: str | Path | None) -> Float64:
     """Return the numbers of the last rows; FormatError with the line of a word that is no number."""
     try:
         return np.array([float(word) for word in batch], dtype=np.float64)
     except ValueError:
-        for number in at[-BATCH_LINES:]:
+        for number in row_lines[-BATCH_LINES:]:
             for word in lines[number].split():
                 _number(word, path, number, any_size=True)
         raise
@@ -344,21 +344,21 @@ def _motion(
     stretched = []
     column = 0
     for joint, channels in enumerate(tree.channels):
-        place = np.tile(offsets[joint], (frames, 1))
+        translation = np.tile(offsets[joint], (frames, 1))
         for channel in channels:
             axis = "xyz".index(channel[0])
             if channel.endswith("position"):
-                place[:, axis] = numbers[:, column]
+                translation[:, axis] = numbers[:, column]
             else:
                 turn = rotations.axis_quaternions(axis, np.deg2rad(numbers[:, column]))
                 turned[:, joint] = rotations.multiply(turned[:, joint], turn)
             column += 1
         if joint == 0:
-            positions = place
+            positions = translation
         elif any(c.endswith("position") for c in channels):
-            if np.abs(place - place[0]).max() > STRETCH * size:
+            if np.abs(translation - translation[0]).max() > STRETCH * size:
                 stretched.append(tree.names[joint])
-            offsets[joint] = np.median(place, axis=0)
+            offsets[joint] = np.median(translation, axis=0)
     if stretched:
         warnings.warn(
             f"{path or 'BVH'}: joints that move against their parents are held at their median place: "

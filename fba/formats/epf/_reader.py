@@ -28,7 +28,7 @@ from fba.errors import FbaWarning
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part
 from fba.formats.text.lines import Lines, content, decoded
 from fba.formats.text.values import FRAME_NUMBER_MAX
-from fba.recognition import but_recognised
+from fba.recognition import recognition_hint
 from fba.source import Path, open_source
 
 SKIP_MAX = 1_000_000
@@ -332,7 +332,7 @@ def read_epf(path: Path) -> list[PlaneSettings]:
                 continue
             tag = decoded(name)
             if tag not in TAGS:
-                kind = but_recognised(lines.head)
+                kind = recognition_hint(lines.head)
                 raise lines.error(
                     f"unknown tag; an EPF line begins with FBM, FFR, ISI, FMT, ...{kind}", token=tag
                 )

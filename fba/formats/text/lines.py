@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from fba.errors import FormatError, Remedy
 from fba.formats.text.frame_rates import parse_rate
-from fba.recognition import HEAD_BYTES, but_recognised
+from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.source import Path
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Lines:
             if b"\0" in block:
                 line_number = self.number + (rest + block[: block.index(b"\0")]).count(b"\n") + 1
                 raise self.error(
-                    f"holds NUL bytes: binary data or a damaged file, not text{but_recognised(self.head)}",
+                    f"holds NUL bytes: binary data or a damaged file, not text{recognition_hint(self.head)}",
                     line=line_number,
                 )
             data = rest + block
@@ -153,7 +153,7 @@ def parse_header(line: bytes, lines: Lines, rate: Fraction | None = None) -> Hea
     tokens = line.split()
     if not is_header(tokens):
         what = "expected a header `<version> <name> <frame rate> <number of frames>`"
-        raise lines.error(what + but_recognised(lines.head), token=line.strip())
+        raise lines.error(what + recognition_hint(lines.head), token=line.strip())
     try:
         frames = int(float(tokens[-1]))  # some programs write 107.0
     except (ValueError, OverflowError):
