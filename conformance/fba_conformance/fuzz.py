@@ -365,19 +365,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--save", type=Path, metavar="FOLDER", help="save streams with findings here")
     parser.add_argument("streams", nargs="*", type=Path, help="streams to mutate instead of those made here")
-    chosen = parser.parse_args(arguments)
-    streams = [path.read_bytes() for path in chosen.streams] or None
+    options = parser.parse_args(arguments)
+    streams = [path.read_bytes() for path in options.streams] or None
     report = fuzz(
-        chosen.count, chosen.seed, streams=streams, first=chosen.first, compare_every=chosen.compare_every
+        options.count, options.seed, streams=streams, first=options.first, compare_every=options.compare_every
     )
     for finding in report.findings:
         sys.stdout.write(
             f"\n{finding.reason}\nto repeat: python -m fba_conformance.fuzz --seed {finding.seed} "
-            f"--first {finding.number} --count 1 --compare-every 1 {' '.join(map(str, chosen.streams))}\n"
+            f"--first {finding.number} --count 1 --compare-every 1 {' '.join(map(str, options.streams))}\n"
         )
-        if chosen.save:
-            chosen.save.mkdir(parents=True, exist_ok=True)
-            (chosen.save / f"seed{finding.seed}_{finding.number}.fba").write_bytes(finding.data)
+        if options.save:
+            options.save.mkdir(parents=True, exist_ok=True)
+            (options.save / f"seed{finding.seed}_{finding.number}.fba").write_bytes(finding.data)
     sys.stdout.write(report.line() + "\n")
     return 1 if report.findings else 0
 

@@ -120,11 +120,11 @@ def _dense_weights(neck: list[BodyPart], joints: int) -> Float64:
 
 
 def _blend_weights(
-    tree: Any, dense: Float64, places: Float64, skull: int, below: Bool
+    tree: Any, dense: Float64, positions: Float64, skull: int, below: Bool
 ) -> tuple[Int32, Float32]:
     """Return joints and weights of the nearest anchors, which fade into the skull's unless `below`."""
-    away, rows = tree.query(places, k=min(NEIGHBOURS, len(dense)))
-    away, rows = away.reshape(len(places), -1), rows.reshape(len(places), -1)
+    away, rows = tree.query(positions, k=min(NEIGHBOURS, len(dense)))
+    away, rows = away.reshape(len(positions), -1), rows.reshape(len(positions), -1)
     share = 1 / np.maximum(away, 1e-6) ** 2
     share /= share.sum(axis=1, keepdims=True)
     result = np.einsum("vk,vkj->vj", share, dense[rows])
@@ -172,12 +172,12 @@ def _low_rims(anchors: Float32, open_sides: Int64) -> Int64:
     return np.concatenate(result)
 
 
-def _beyond_edge(tree: Any, edge: Int64, outward: Float64, anchors: Float32, places: Float64) -> Bool:
+def _beyond_edge(tree: Any, edge: Int64, outward: Float64, anchors: Float32, positions: Float64) -> Bool:
     """Return (V,) mask of the positions beyond the edge."""
-    away, rows = tree.query(places)
+    away, rows = tree.query(positions)
     number = np.full(len(anchors), -1)
     number[edge] = np.arange(len(edge))
-    at = number[rows]
-    past: Bool = (at >= 0) & (away > SEAM)
-    past &= ((places - anchors[rows]) * outward[at]).sum(axis=1) > 0
+    edge_number = number[rows]
+    past: Bool = (edge_number >= 0) & (away > SEAM)
+    past &= ((positions - anchors[rows]) * outward[edge_number]).sum(axis=1) > 0
     return past

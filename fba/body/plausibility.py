@@ -104,16 +104,16 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
     numbers = np.asarray(index, dtype=np.int64)[moving]
     if len(moving) < 2 or numbers[-1] - numbers[0] < LEAST * rate:
         return None
-    chosen = _samples(len(moving))
-    levels, rests = np.divmod(body.values[moving[chosen]].astype(np.int64), steps)
+    sampled = _samples(len(moving))
+    levels, rests = np.divmod(body.values[moving[sampled]].astype(np.int64), steps)
     if rests.any():
         return None
-    now = measure(levels * steps, numbers[chosen], rate)
+    now = measure(levels * steps, numbers[sampled], rate)
     for other in BAP_STEP_TABLES:
         changed = (steps != bap_steps(other)) & levels.any(axis=0)
         if other == used or not changed.any():
             continue
-        findings = _new_faults(now, measure(levels * bap_steps(other), numbers[chosen], rate))
+        findings = _new_faults(now, measure(levels * bap_steps(other), numbers[sampled], rate))
         if findings:
             return Doubt(used, other, findings)
     return None

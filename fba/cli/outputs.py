@@ -96,15 +96,15 @@ class Outputs:
     def __init__(
         self, outputs: Iterable[Output], inputs: Iterable[Path | None] = (), *, no_clobber: bool = False
     ) -> None:
-        found = list(outputs)
+        listed = list(outputs)
         read = [path for path in inputs if path is not None]
-        self.standard = any(output.standard for output in found)
+        self.standard = any(output.standard for output in listed)
         if read.count(STANDARD) > 1:
             raise click.UsageError("standard input (-) can be read only once")
-        for output in found:
+        for output in listed:
             _check_inputs(output, read)
-        _check_each_other(found)
-        for output in found:
+        _check_each_other(listed)
+        for output in listed:
             if output.standard:
                 _check_terminal(output)
             else:

@@ -134,21 +134,21 @@ def format_of(path: Path, format: str | None = None) -> Format:
     head, suffix = read_head(path), _suffix(path)
     by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
     others = [entry for entry in formats() if entry not in by_suffix]
-    chosen = next((entry for entry in (*by_suffix, *others) if entry.sniff(head, suffix)), None)
-    if chosen is None and by_suffix:
+    match = next((entry for entry in (*by_suffix, *others) if entry.sniff(head, suffix)), None)
+    if match is None and by_suffix:
         return by_suffix[0]  # the error of its reader will say what is wrong
-    if chosen is None:
+    if match is None:
         kind = recognition_hint(head)
         error = FormatError(f"is in no format known here: {_list_formats()}{kind}", path=path)
         raise error if kind else error.with_remedies(UNKNOWN)
-    if by_suffix and chosen not in by_suffix:
+    if by_suffix and match not in by_suffix:
         warnings.warn(
-            f"{os.fspath(path)}: is named {suffix}, but holds {chosen.name.upper()} content; "
-            f"read as {chosen.name}",
+            f"{os.fspath(path)}: is named {suffix}, but holds {match.name.upper()} content; "
+            f"read as {match.name}",
             FbaWarning,
             stacklevel=3,
         )
-    return chosen
+    return match
 
 
 def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
@@ -158,9 +158,9 @@ def read(path: Path, *, format: str | None = None, **options: Any) -> Animation:
     `formats()` and e.g. `fba.formats.text.fap.read_fap`. Raises FormatError, BitstreamError,
     UnsupportedError or OptionError.
     """
-    chosen = format_of(path, format)
-    _check_options(chosen.name, "reading", options, chosen.read_options)
-    return chosen.read(path, **options)
+    reader = format_of(path, format)
+    _check_options(reader.name, "reading", options, reader.read_options)
+    return reader.read(path, **options)
 
 
 def write(path: Path, animation: Animation, *, format: str | None = None, **options: Any) -> None:
@@ -170,16 +170,16 @@ def write(path: Path, animation: Animation, *, format: str | None = None, **opti
     FbaWarning.
     Raises FormatError, RangeError, UnsupportedError or OptionError.
     """
-    chosen = writer_for(path, format)
-    _check_options(chosen.name, "writing", options, chosen.write_options)
+    writer = writer_for(path, format)
+    _check_options(writer.name, "writing", options, writer.write_options)
     present = [part for part in ("face", "body") if getattr(animation, part) is not None]
-    left_out = [part for part in present if part not in chosen.carries]
-    assert chosen.write is not None  # or writer_for had raised
-    chosen.write(path, animation, **options)
+    left_out = [part for part in present if part not in writer.carries]
+    assert writer.write is not None  # or writer_for had raised
+    writer.write(path, animation, **options)
     if left_out:
         warnings.warn(
-            f"{os.fspath(path)}: {chosen.name.upper()} holds no {left_out[0]}; only the "
-            f"{chosen.carries[0]} was written",
+            f"{os.fspath(path)}: {writer.name.upper()} holds no {left_out[0]}; only the "
+            f"{writer.carries[0]} was written",
             FbaWarning,
             stacklevel=2,
         )
@@ -191,7 +191,7 @@ def writer_for(path: Path, format: str | None = None) -> Format:
     Raises FormatError for an unknown suffix, UnsupportedError for a format that can be read only.
     """
     if format is not None:
-        chosen = _find_format(format)
+        writer = _find_format(format)
     else:
         suffix = _suffix(path)
         by_suffix = [entry for entry in formats() if suffix in entry.suffixes]
@@ -201,14 +201,14 @@ def writer_for(path: Path, format: str | None = None) -> Format:
                 path=path,
                 token=suffix or None,
             ).with_remedies(Remedy("format", "or name it with {}", "'fba'", "fba.write"))
-        chosen = by_suffix[0]
-    if chosen.write is None:
+        writer = by_suffix[0]
+    if writer.write is None:
         raise UnsupportedError(
-            f"{os.fspath(path)}: {chosen.name.upper()} can be read only; write one of "
+            f"{os.fspath(path)}: {writer.name.upper()} can be read only; write one of "
             f"{_list_formats(writing=True)}",
-            what=f"writing {chosen.name.upper()}",
+            what=f"writing {writer.name.upper()}",
         )
-    return chosen
+    return writer
 
 
 def probe(
@@ -231,13 +231,13 @@ def probe(
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
         return probe_stream(data_or_path, bap_steps=bap_steps)
-    chosen = format_of(data_or_path, format)
-    if chosen.name == "fba":
+    reader = format_of(data_or_path, format)
+    if reader.name == "fba":
         with naming_file(data_or_path):
             return probe_stream(read_whole(data_or_path), bap_steps=bap_steps)
-    _check_options(chosen.name, "reading", options, chosen.read_options)
-    animation = chosen.read(data_or_path, **options)
-    return StreamInfo.of_animation(animation, chosen.name, os.stat(data_or_path).st_size)
+    _check_options(reader.name, "reading", options, reader.read_options)
+    animation = reader.read(data_or_path, **options)
+    return StreamInfo.of_animation(animation, reader.name, os.stat(data_or_path).st_size)
 
 
 def _find_format(name: str) -> Format:

@@ -16,7 +16,7 @@ def read_animations(
     document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[Mesh, ...]
 ) -> tuple[Animation, ...]:
     """Return all animations, in order, without channels of no node, or of extensions."""
-    found = []
+    animations = []
     for number, entry in enumerate(document.entries("animations")):
         document.budget.charge(1024, entry)
         name = entry.get("name")
@@ -35,8 +35,8 @@ def read_animations(
                 # many channels may share keys: what is looked through has a limit too
                 document.budget.charge(channel.times.nbytes + channel.values.nbytes, each)
                 channels.append(channel)
-        found.append(Animation(f"animation {number}" if name is None else name.text(), tuple(channels)))
-    return tuple(found)
+        animations.append(Animation(f"animation {number}" if name is None else name.text(), tuple(channels)))
+    return tuple(animations)
 
 
 def _width(target: Value, path: str, node: Node, meshes: tuple[Mesh, ...]) -> int:

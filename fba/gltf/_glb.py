@@ -46,19 +46,21 @@ def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | No
 
 def _chunks(data: memoryview, file: str) -> list[tuple[bytes, memoryview]]:
     """Return the first chunks; others come after JSON and bytes, and may be skipped."""
-    found: list[tuple[bytes, memoryview]] = []
-    at = HEADER_BYTES
-    while at < len(data) and len(found) < 2:
-        where = f"{file}: chunk {len(found)}"
-        if len(data) - at < CHUNK_HEADER_BYTES:
+    chunks: list[tuple[bytes, memoryview]] = []
+    position = HEADER_BYTES
+    while position < len(data) and len(chunks) < 2:
+        where = f"{file}: chunk {len(chunks)}"
+        if len(data) - position < CHUNK_HEADER_BYTES:
             raise ModelError(f"{where}: the container ends within the chunk's header")
-        length, kind = struct.unpack_from("<I4s", data, at)
-        at += CHUNK_HEADER_BYTES
-        if length > len(data) - at:
-            raise ModelError(f"{where}: {length} bytes long, but the container ends after {len(data) - at}")
-        found.append((kind, data[at : at + length]))
-        at += length
-    return found
+        length, kind = struct.unpack_from("<I4s", data, position)
+        position += CHUNK_HEADER_BYTES
+        if length > len(data) - position:
+            raise ModelError(
+                f"{where}: {length} bytes long, but the container ends after {len(data) - position}"
+            )
+        chunks.append((kind, data[position : position + length]))
+        position += length
+    return chunks
 
 
 def join_container(text: bytes, binary: bytes) -> bytes:

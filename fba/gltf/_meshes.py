@@ -33,7 +33,7 @@ def read_meshes(document: Document, accessors: Accessors, materials: int) -> tup
 def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, materials: int) -> Mesh:
     name = entry.get("name")
     entries = entry.member("primitives").elements(MAX_ITEMS)
-    found = []
+    primitives = []
     for each in entries:
         document.budget.charge(1024, each)
         mode = each.get("mode")
@@ -44,19 +44,19 @@ def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, m
                 stacklevel=5,
             )
             continue
-        found.append(_Reader(document, accessors, each, materials).primitive())
-    counts = {len(primitive.morphs) for primitive in found}
+        primitives.append(_Reader(document, accessors, each, materials).primitive())
+    counts = {len(primitive.morphs) for primitive in primitives}
     if len(counts) > 1:
         raise entry.error(f"its primitives have {sorted(counts)} morph targets; all must have as many")
     count = counts.pop() if counts else 0
     weights = entry.get("weights")
-    if weights is not None and found and len(weights.elements(MAX_TARGETS)) != count:
+    if weights is not None and primitives and len(weights.elements(MAX_TARGETS)) != count:
         raise weights.error(f"{len(weights.data)} weights for {count} morph targets")
     return Mesh(
         name=f"mesh {number}" if name is None else name.text(),
-        primitives=tuple(found),
+        primitives=tuple(primitives),
         morph_names=_names(entry, entries, count),
-        weights=(0.0,) * count if weights is None or not found else weights.numbers(count),
+        weights=(0.0,) * count if weights is None or not primitives else weights.numbers(count),
     )
 
 
@@ -110,13 +110,13 @@ class _Reader:
         )
 
     def _sets(self, name: str) -> list[Value]:
-        found = []
+        sets = []
         for number in range(MAX_SETS):
             value = self._attributes.get(f"{name}_{number}")
             if value is None:
                 break
-            found.append(value)
-        return found
+            sets.append(value)
+        return sets
 
     def _colours(self, count: int) -> Float32 | None:
         value = self._attributes.get("COLOR_0")
@@ -146,9 +146,9 @@ class _Reader:
         )
         if (share < 0).any():
             raise weights[0].error("a weight is negative")
-        chosen = which.astype(np.int32)
-        chosen.flags.writeable = share.flags.writeable = False
-        return chosen, share
+        joint_numbers = which.astype(np.int32)
+        joint_numbers.flags.writeable = share.flags.writeable = False
+        return joint_numbers, share
 
     def _triangles(self, count: int) -> Int32:
         mode, reference = self._entry.get("mode"), self._entry.get("indices")
@@ -159,8 +159,8 @@ class _Reader:
             raw = self._accessors.integers(reference, "SCALAR")[:, 0]
             self._document.budget.charge(len(raw) * 8, reference)
             if int(raw.max()) >= count:
-                at = int(raw.argmax())
-                raise reference.error(f"element {at} names vertex {raw.max()}, but there are {count}")
+                position = int(raw.argmax())
+                raise reference.error(f"element {position} names vertex {raw.max()}, but there are {count}")
             corners = raw.astype(np.int64)
         where = self._entry if reference is None else reference
         shape = TRIANGLES if mode is None else mode.integer(0, MODES - 1)
@@ -173,12 +173,12 @@ class _Reader:
         return triangles
 
     def _morphs(self, count: int) -> tuple[Float32 | None, ...]:
-        found: list[Float32 | None] = []
+        morphs: list[Float32 | None] = []
         for target in self._entry.elements(MAX_TARGETS, "targets"):
             self._document.budget.charge(256, target)
             value = target.get("POSITION")
-            found.append(None if value is None else self._accessors.floats(value, "VEC3", count=count))
-        return tuple(found)
+            morphs.append(None if value is None else self._accessors.floats(value, "VEC3", count=count))
+        return tuple(morphs)
 
 
 Corners = np.ndarray[tuple[int, ...], np.dtype[np.int64]]

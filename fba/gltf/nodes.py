@@ -68,8 +68,8 @@ def read_roots(document: Document, nodes: tuple[Node, ...]) -> tuple[int, ...]:
     scenes = document.entries("scenes")
     if not scenes:
         return tuple(number for number, node in enumerate(nodes) if node.parent is None)
-    chosen = document.root.get("scene")
-    scene = scenes[0 if chosen is None else chosen.index(len(scenes), "scene")]
+    default = document.root.get("scene")
+    scene = scenes[0 if default is None else default.index(len(scenes), "scene")]
     roots: dict[int, None] = {}
     for value in scene.elements(MAX_ITEMS, "nodes"):
         root = value.index(len(nodes), "node")

@@ -39,12 +39,12 @@ class Surface:
 
 
 def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
-    """Yield every surface of the default scene, parents first.
+    """Return every surface of the default scene, parents first.
 
     Raises ModelError where they take more than 1 GiB together, as a mesh shown a million times can.
     """
     budget = Budget(MAX_UNPACKED)
-    found: list[Surface] = []
+    result: list[Surface] = []
     taken: set[str] = set()
     for number in gltf.shown():
         node = gltf.nodes[number]
@@ -58,17 +58,17 @@ def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
             budget.charge(len(primitive.positions) * each, gltf.document)
             name = _unique(node.name if not node.name.startswith("node ") else mesh.name, taken)
             with np.errstate(all="ignore"):  # what overflows is found at the end
-                found.append(_surface(gltf, node, number, primitive, mesh.morph_names, name))
-    return tuple(found)
+                result.append(_surface(gltf, node, number, primitive, mesh.morph_names, name))
+    return tuple(result)
 
 
 def _unique(name: str, taken: set[str]) -> str:
-    chosen, count = name, 1
-    while chosen in taken:
+    unique, count = name, 1
+    while unique in taken:
         count += 1
-        chosen = f"{name} {count}"
-    taken.add(chosen)
-    return chosen
+        unique = f"{name} {count}"
+    taken.add(unique)
+    return unique
 
 
 def _surface(
@@ -89,13 +89,13 @@ def _surface(
         raise gltf.document.error(f"nodes[{number}]: positions overflow in the frame of the scene")
     mirrored = float(np.linalg.det(linear.reshape(-1, 3, 3)[0])) < 0
     material = None if primitive.material is None else gltf.materials[primitive.material]
-    chosen = 0 if material is None else material.texcoord
+    texcoord = 0 if material is None else material.texcoord
     return Surface(
         name=name,
         positions=placed,
         triangles=primitive.triangles[:, ::-1].copy() if mirrored else primitive.triangles,
         normals=None if primitive.normals is None else _turned(linear, primitive.normals),
-        texcoords=primitive.texcoords[chosen] if chosen < len(primitive.texcoords) else None,
+        texcoords=primitive.texcoords[texcoord] if texcoord < len(primitive.texcoords) else None,
         colours=primitive.colours,
         morphs=morphs,
         material=material,

@@ -53,10 +53,10 @@ class Value:
 
     def member(self, key: str) -> Value:
         """Return a member of an object, which must be there."""
-        found = self.get(key)
-        if found is None:
+        value = self.get(key)
+        if value is None:
             raise self.error(f"{key!r} is missing")
-        return found
+        return value
 
     def members(self) -> Iterator[tuple[str, Value]]:
         """Return names and members of an object."""
@@ -78,8 +78,8 @@ class Value:
     def elements(self, most: int, key: str | None = None) -> list[Value]:
         """Return the elements of this list, or of the list in member `key` (empty without one)."""
         if key is not None:
-            found = self.get(key)
-            return [] if found is None else found.elements(most)
+            value = self.get(key)
+            return [] if value is None else value.elements(most)
         if not isinstance(self.data, list):
             raise self._unexpected("a list")
         if len(self.data) > most:

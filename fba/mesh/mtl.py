@@ -22,16 +22,16 @@ def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
     beside the file, others are left out with an FbaWarning. Raises ModelError naming the line.
     """
     file = find_beside(path, library)
-    found: dict[str, Material] = {}
+    materials: dict[str, Material] = {}
     if file is None:
         warnings.warn(f"{path}: its materials {library!r} do not lie beside it", FbaWarning, stacklevel=4)
-        return found
+        return materials
     name: str | None = None
     colour, rough, picture = (0.8, 0.8, 0.8), 0.6, b""
 
     def finish() -> None:
         if name is not None:
-            found[name] = Material(name, (1.0, 1.0, 1.0) if picture else colour, rough, picture or None)
+            materials[name] = Material(name, (1.0, 1.0, 1.0) if picture else colour, rough, picture or None)
 
     for where, tokens in read_words(file):
         if len(tokens) < 2:
@@ -47,7 +47,7 @@ def read_mtl(path: str | os.PathLike[str], library: str) -> dict[str, Material]:
         elif tokens[0] == "map_Kd":
             picture = _picture(file, tokens[-1], where)
     finish()
-    return found
+    return materials
 
 
 def _picture(file: os.PathLike[str], name: str, where: str) -> bytes:

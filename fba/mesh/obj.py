@@ -127,13 +127,13 @@ class _Reader:
 
     def _index(self, token: str, count: int, what: str) -> int:
         index = int(token) if token.isdecimal() and len(token) < 9 else self._signed(token, what)
-        place = index - 1 if index > 0 else count + index
-        if index == 0 or not 0 <= place < count:
+        position = index - 1 if index > 0 else count + index
+        if index == 0 or not 0 <= position < count:
             raise ModelError(
                 f"{self.where}: {what} {index} does not exist; {count} were defined before this line, "
                 "counted from 1, or from -1 backwards"
             )
-        return place
+        return position
 
     def _signed(self, token: str, what: str) -> int:
         return parse_integer(token, self.where, f"the number of a {what}")

@@ -115,10 +115,10 @@ class _Reader:
             if element.name == "vertex":
                 columns = scalars
             elif element.name == "face":
-                chosen = [lists[key] for key in FACE_LISTS if key in lists]
-                if not chosen:
+                lists_of_faces = [lists[key] for key in FACE_LISTS if key in lists]
+                if not lists_of_faces:
                     raise ModelError(f"{self.path}: element face has no list vertex_indices")
-                starts, corners = chosen[0]
+                starts, corners = lists_of_faces[0]
         if not {"x", "y", "z"} <= set(columns):
             raise ModelError(f"{self.path}: element vertex with properties x, y and z is expected")
         vertices = np.stack([columns[axis] for axis in "xyz"], axis=1)
@@ -131,10 +131,10 @@ class _Reader:
                 "(a cloud of points has no surface to deform)"
             )
         if len(corners) and (corners.min() < 0 or corners.max() >= len(vertices)):
-            place = int(np.flatnonzero((corners < 0) | (corners >= len(vertices)))[0])
+            position = int(np.flatnonzero((corners < 0) | (corners >= len(vertices)))[0])
             raise ModelError(
-                f"{self.path}: face {int(np.searchsorted(starts, place, side='right')) - 1} names vertex "
-                f"{corners[place]}, but there are {len(vertices)}"
+                f"{self.path}: face {int(np.searchsorted(starts, position, side='right')) - 1} names vertex "
+                f"{corners[position]}, but there are {len(vertices)}"
             )
         texcoords = self._texcoords(columns)
         return Polygons(
@@ -175,7 +175,7 @@ class _Reader:
         even = self._even_lists(element) if self.order and element.count else None
         if even is not None:
             return {}, even
-        kept: dict[str, list[Float64]] = {n: [] for n, _, length in element.properties if length}
+        rows_of: dict[str, list[Float64]] = {n: [] for n, _, length in element.properties if length}
         total = 0
         for number in range(element.count):
             for name, kind, length in element.properties:
@@ -189,9 +189,9 @@ class _Reader:
                         f"{self.path}: {element.name[:20]} {number}: a list of {count}; all together may "
                         f"have {MAX_CORNERS}"
                     )
-                kept[name].append(self._take(kind, count, element, number))
+                rows_of[name].append(self._take(kind, count, element, number))
         lists = {}
-        for name, rows in kept.items():
+        for name, rows in rows_of.items():
             starts = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
             values = np.concatenate(rows) if rows else np.zeros(0)
             if name in FACE_LISTS and not (np.abs(values) < 2**53).all():

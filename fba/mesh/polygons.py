@@ -58,11 +58,13 @@ class Triangles:
 def triangulate(polygons: Polygons, faces: Bool) -> Triangles:
     """Return the chosen polygons cut into triangles; those of fewer than three corners are dropped."""
     sizes = np.diff(polygons.starts)
-    chosen = np.flatnonzero(faces & (sizes >= 3))
-    counts = sizes[chosen] - 2
-    polygon = np.repeat(chosen, counts)
+    rows = np.flatnonzero(faces & (sizes >= 3))
+    counts = sizes[rows] - 2
+    polygon = np.repeat(rows, counts)
     # the place of each triangle in its fan: 0, 1, ... for every polygon anew
-    place = np.arange(len(polygon)) - np.repeat(np.cumsum(counts) - counts, counts)
+    position = np.arange(len(polygon)) - np.repeat(np.cumsum(counts) - counts, counts)
     first = polygons.starts[polygon]
-    at = np.stack([first, first + place + 1, first + place + 2], axis=1)
-    return Triangles(polygons.corners[at], polygons.corner_texcoords[at], polygon.astype(np.int32))
+    corner_rows = np.stack([first, first + position + 1, first + position + 2], axis=1)
+    return Triangles(
+        polygons.corners[corner_rows], polygons.corner_texcoords[corner_rows], polygon.astype(np.int32)
+    )

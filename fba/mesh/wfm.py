@@ -51,12 +51,12 @@ def _table(
     count = parse_integer(tokens[0], where, f"the number of {what}")
     if not 1 <= count <= most:
         raise ModelError(f"{where}: {count} {what}; a face has 1 to {most}")
-    found: list[tuple[str, list[str]]] = []
+    table: list[tuple[str, list[str]]] = []
     for _ in range(count):
         where, tokens = next(rows, (path, []))
         if not tokens:
-            raise ModelError(f"{path}: ends after {len(found)} of {count} {what}")
+            raise ModelError(f"{path}: ends after {len(table)} of {count} {what}")
         if len(tokens) != 3:
             raise ModelError(f"{where}: three numbers are expected of each of the {what}, not {len(tokens)}")
-        found.append((where, tokens))
-    return found
+        table.append((where, tokens))
+    return table

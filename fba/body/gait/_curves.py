@@ -46,9 +46,9 @@ def periodic_curve(
     safe = [np.where(turns, 1.0, s) for s in (before, slope)]
     tangent: Float64 = np.where(turns, np.zeros(len(x)), (one + two) / (two / safe[0] + one / safe[1]))
     u = np.mod(u - x[0], 1.0) + x[0]
-    at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)
-    after = (at + 1) % len(x)
-    return _hermite((u - x[at]) / step[at], step[at], y[at], y[after], tangent[at], tangent[after])
+    k = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)
+    after = (k + 1) % len(x)
+    return _hermite((u - x[k]) / step[k], step[k], y[k], y[after], tangent[k], tangent[after])
 
 
 def spline(
@@ -67,9 +67,9 @@ def spline(
     solved = np.linalg.solve(matrix, right.reshape(count, -1))
     tangent = np.asarray(solved, dtype=np.float64).reshape(y.shape)
     u = np.asarray(phase, dtype=np.float64)
-    at = np.clip(np.searchsorted(x, u, side="right") - 1, 0, count - 2)
+    k = np.clip(np.searchsorted(x, u, side="right") - 1, 0, count - 2)
     tail = (...,) + (None,) * (y.ndim - 1)
-    return _hermite(((u - x[at]) / h[at])[tail], h[at][tail], y[at], y[at + 1], tangent[at], tangent[at + 1])
+    return _hermite(((u - x[k]) / h[k])[tail], h[k][tail], y[k], y[k + 1], tangent[k], tangent[k + 1])
 
 
 def _hermite(s: Float64, step: Float64, y0: Float64, y1: Float64, d0: Float64, d1: Float64) -> Float64:

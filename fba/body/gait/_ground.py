@@ -103,8 +103,8 @@ def place_swinging_foot(side: Side, hip: Float64, thigh: Float64, bend: Float64,
     shin = thigh @ axis_matrices(0, bend)
     angles = foot_angles(np.swapaxes(shin, -1, -2) @ foot)
     ankle = shin @ axis_matrices(0, angles[0]) @ axis_matrices(1, angles[1])
-    at = hip + apply(thigh, side.leg.upper) + apply(shin, side.leg.lower)
-    return Footing(foot, at + apply(ankle, side.subtalar))
+    end = hip + apply(thigh, side.leg.upper) + apply(shin, side.leg.lower)
+    return Footing(foot, end + apply(ankle, side.subtalar))
 
 
 def lowest_height(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> Float64:

@@ -161,13 +161,13 @@ class Plan:
         the stride is too long.
         """
         right, left = self.anatomy.sides["r"], self.anatomy.sides["l"]
-        at = np.zeros(1)
+        start = np.zeros(1)
         legs = right.leg.reach + left.leg.reach
 
         def gap(ahead: float) -> float:
-            root = self._root_along(at) - (0.0, 0.0, ahead)
-            front = self._root_height(right, root, at)
-            rear = self._root_height(left, root, at)
+            root = self._root_along(start) - (0.0, 0.0, ahead)
+            front = self._root_height(right, root, start)
+            rear = self._root_height(left, root, start)
             return float((front - rear)[0])
 
         low, high = -0.25 * legs, 0.5 * self.stride + 0.25 * legs
@@ -176,8 +176,8 @@ class Plan:
         for _ in range(60):
             middle = (low + high) / 2.0
             low, high = (middle, high) if gap(middle) > 0.0 else (low, middle)
-        root = self._root_along(at) - (0.0, 0.0, low)
-        root[..., 1] = self._root_height(right, root, at)
+        root = self._root_along(start) - (0.0, 0.0, low)
+        root[..., 1] = self._root_height(right, root, start)
         if float(root[0, 1]) < 0.45 * self.anatomy.skeleton.centres[0][1]:
             raise self.too_long()
         return low

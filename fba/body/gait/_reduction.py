@@ -89,10 +89,10 @@ def reduce(animation: Animation, found: Gait | None = None, skeleton: Skeleton |
     span[keys[0] : keys[-1] + 1] = True
     keep = span & ~found.walking
     keep[list(keys)] = True
-    places = np.flatnonzero(keep)
+    rows = np.flatnonzero(keep)
     assert animation.body is not None
-    track = BodyTrack(animation.body.values[places], animation.body.mask[places])
-    thin = Animation(animation.rate, animation.index[places], None, track, animation.name)
+    track = BodyTrack(animation.body.values[rows], animation.body.mask[rows])
+    thin = Animation(animation.rate, animation.index[rows], None, track, animation.name)
     return Reduced(thin, int(span.sum()), int((span & found.walking).sum()), len(keys))
 
 
@@ -109,14 +109,14 @@ def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) 
         raise ValueError("compare: the two have no frame in common")
     solver = BapSolver(skeleton)
     a, b = solver.pose(_values(one)[first]), solver.pose(_values(other)[second])
-    places = a[:, :, :3, 3] - b[:, :, :3, 3]
-    inner = places - places[:, :1]
+    offsets = a[:, :, :3, 3] - b[:, :, :3, 3]
+    inner = offsets - offsets[:, :1]
     own = _local_rotations(a, skeleton)
     moved = np.flatnonzero(np.ptp(own, axis=0).max(axis=(1, 2)) > _STILL)
     if not len(moved):
         moved = np.arange(len(skeleton))
     angles = np.degrees(_angles_between(own, _local_rotations(b, skeleton)))[:, moved]
-    far, near = (100.0 * np.linalg.norm(p[:, moved], axis=-1) for p in (places, inner))
+    far, near = (100.0 * np.linalg.norm(p[:, moved], axis=-1) for p in (offsets, inner))
     return Errors(
         float(angles.mean()), float(angles.max()), skeleton.names[moved[int(angles.max(axis=0).argmax())]],
         float(far.mean()), float(far.max()), float(near.mean()), float(near.max()),

@@ -76,25 +76,25 @@ class Curves:
     def contacts(self, letter: str) -> list[int]:
         """Return frames in which a foot meets the ground, ahead of the other."""
         height, other = self.lowest[letter], self.heel["l" if letter == "r" else "r"]
-        found = []
+        frames = []
         for peak in self._peaks(self.heel[letter]):
             if self.heel[letter][peak] - other[peak] < SHORTEST_STEP * self.reach:
                 continue
             coming = height[peak : peak + self._frames(SINKING) + 1]
-            found.append(peak + int(np.argmax(coming <= coming.min() + TOUCH * self.reach)))
-        return found
+            frames.append(peak + int(np.argmax(coming <= coming.min() + TOUCH * self.reach)))
+        return frames
 
     def departures(self, letter: str) -> list[int]:
         """Return frames in which a foot has just left the ground."""
         height = self.lowest[letter]
-        found = []
+        frames = []
         for peak in self._peaks(-self.toes[letter]):
             near = self._frames(LEAVING)
             first = max(0, peak - near)
             low = height[max(0, first - near) : peak + 1].min()
             down = np.flatnonzero(height[first : peak + near // 2 + 1] <= low + TOUCH * self.reach)
-            found.append(first + int(down[-1]) + 1 if len(down) else peak)
-        return found
+            frames.append(first + int(down[-1]) + 1 if len(down) else peak)
+        return frames
 
     def _frames(self, seconds: float) -> int:
         """Return number of frames in some seconds, at least one."""

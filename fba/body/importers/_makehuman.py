@@ -87,9 +87,9 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
     vertices = (mesh.vertices - (0.0, low, 0.0)) * METRES
     rig = _json(folder / RIG_FILE)
     bones, at = _rig(rig, vertices)
-    places = _joint_positions(at, rig)
-    bind = bind_matrices(places)
-    weights = _weights(_json(folder / WEIGHTS_FILE), bones, vertices, places)
+    positions = _joint_positions(at, rig)
+    bind = bind_matrices(positions)
+    weights = _weights(_json(folder / WEIGHTS_FILE), bones, vertices, positions)
     pupils = np.array([at(rig, f"eye.{side}____head") for side in "LR"])
     pupils[:, 2] += _eye_radius(mesh, vertices)
     return BodyModel(
@@ -153,36 +153,36 @@ def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _RigPosi
 @cache
 def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
     """Return rows (joint, from, to, share, bones) of makehuman.csv, for both sides."""
-    found = []
+    rows = []
     with (files(__package__) / "makehuman.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             for mine, theirs in (("l", "L"), ("r", "R")) if "?" in row["joint"] else (("", ""),):
                 words = [row[key].replace("?", theirs) for key in ("from", "to", "bones")]
                 joint = row["joint"].replace("?", mine)
-                found.append((joint, words[0], words[1], float(row["share"]), tuple(words[2].split())))
-    return tuple(found)
+                rows.append((joint, words[0], words[1], float(row["share"]), tuple(words[2].split())))
+    return tuple(rows)
 
 
 def _joint_positions(at: _RigPositions, rig: Value) -> Float64:
     """Return (J, 3) positions of the standard's joints, metres."""
     default = Skeleton.default()
-    places = np.full((len(default), 3), np.nan)
+    positions = np.full((len(default), 3), np.nan)
     for joint, start, end, share, _ in _rows():
         first = at(rig, start)
-        places[default.number(joint)] = first + ((at(rig, end) - first) * share if end else 0.0)
+        positions[default.number(joint)] = first + ((at(rig, end) - first) * share if end else 0.0)
     for side in "lr":  # the foot's joints lie lower than the line between ankle and toes
-        ankle = places[default.number(f"{side}_ankle")]
-        places[default.number(f"{side}_subtalar"), 1] = ankle[1] * 0.55
+        ankle = positions[default.number(f"{side}_ankle")]
+        positions[default.number(f"{side}_subtalar"), 1] = ankle[1] * 0.55
     knots = np.array([at(rig, f"{bone}____head") for bone in SPINE])
-    knots = np.concatenate([places[default.number("HumanoidRoot")][None], knots])
+    knots = np.concatenate([positions[default.number("HumanoidRoot")][None], knots])
     knots = knots[np.concatenate([[True], np.diff(np.maximum.accumulate(knots[:, 1])) > 0])]
-    places[default.number("skullbase")] = knots[-1]
+    positions[default.number("skullbase")] = knots[-1]
     neck = int(np.abs(knots[:, 1] - at(rig, "neck01____head")[1]).argmin())
-    place_vertebrae(places, knots, neck)
-    return places
+    place_vertebrae(positions, knots, neck)
+    return positions
 
 
-def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, places: Float64) -> Float64:
+def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, positions: Float64) -> Float64:
     """Return (V, J) weight of each of the standard's joints for each vertex."""
     default = Skeleton.default()
     given = {name: np.zeros(len(vertices)) for name in bones}
@@ -209,14 +209,14 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, pl
         numbers = [default.number(name) for name in row]
         share = np.sum([given[name] for name in names if name in given], axis=0)
         weights[:, numbers] += share[:, None] * chain_weights(
-            vertices[:, 1], places[numbers, 1], 1 if names is TRUNK else 0
+            vertices[:, 1], positions[numbers, 1], 1 if names is TRUNK else 0
         )
     for side in "lr":  # the shoulder girdle: weight near the arm goes to the blade
         inner, outer, arm = (
             default.number(f"{side}_{name}") for name in ("sternoclavicular", "acromioclavicular", "shoulder")
         )
-        way = places[arm] - places[inner]
-        along = (vertices - places[inner]) @ way / max(float(way @ way), 1e-12)
+        way = positions[arm] - positions[inner]
+        along = (vertices - positions[inner]) @ way / max(float(way @ way), 1e-12)
         far = smoothstep((along - BLADE[0]) / (BLADE[1] - BLADE[0]))
         weights[:, outer] += weights[:, inner] * far
         weights[:, inner] -= weights[:, outer]
@@ -268,18 +268,18 @@ def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPar
     joints, strong = strongest_weights(weights, spine)
     normals = vertex_normals(vertices, body)
     eyes = _triangles(mesh, "helper-l-eye", "helper-r-eye")
-    chosen = (
+    rows = (
         ("skin", "skin", body[~head & ~throat], normals, SKIN),
         ("neck", "neck", body[throat], normals, SKIN),
         ("head", "head", body[head], normals, SKIN),
         ("eyes", "head", eyes, vertex_normals(vertices, eyes) if len(eyes) else normals, EYE),
     )
-    found = []
-    for name, kind, triangles, upright, material in chosen:
+    parts = []
+    for name, kind, triangles, upright, material in rows:
         if not len(triangles):
             continue
         used, corners = np.unique(triangles, return_inverse=True)
-        found.append(
+        parts.append(
             BodyPart(
                 name,
                 kind,
@@ -291,4 +291,4 @@ def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPar
                 material=material,
             )
         )
-    return tuple(found)
+    return tuple(parts)

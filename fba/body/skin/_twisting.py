@@ -48,9 +48,9 @@ def find_twists(
             turned = np.flatnonzero(bone & (np.maximum(np.abs(own), np.abs(child)) > SMALL))
             rows.append(turned)
             shares.append(np.stack([own[turned], child[turned]], axis=1))
-            place = np.clip(along[1], 0.0, 1.0)
-            own = place - carried[1]
-            child = smoothstep((place - WRIST_FROM) / (1 - WRIST_FROM)) - carried[2]
+            share_along = np.clip(along[1], 0.0, 1.0)
+            own = share_along - carried[1]
+            child = smoothstep((share_along - WRIST_FROM) / (1 - WRIST_FROM)) - carried[2]
         bones += [(shoulder, elbow), (elbow, wrist)]
         axes += [_axis(bind, shoulder, elbow), _axis(bind, elbow, wrist)]
     pairs = np.array(bones, dtype=np.int64).reshape(-1, 2)

@@ -24,11 +24,11 @@ def bind_matrices(positions: Float64) -> Float64:
     default = Skeleton.default()
     bind = np.tile(np.eye(4), (len(default), 1, 1))
     bind[:, :3, 3] = positions
-    at = {name: positions[number] for number, name in enumerate(default.names)}
+    centres = {name: positions[number] for number, name in enumerate(default.names)}
     rest = {name: default.centres[number] for number, name in enumerate(default.names)}
 
     def bone(joint: str, tip: str) -> tuple[Float64, Float64]:
-        return rest[tip] - rest[joint], at[tip] - at[joint]
+        return rest[tip] - rest[joint], centres[tip] - centres[joint]
 
     def turn(joint: str, bones: tuple[Float64, Float64], sides: tuple[Float64, Float64]) -> None:
         before, after = (
@@ -53,7 +53,7 @@ def bind_matrices(positions: Float64) -> Float64:
         for k in (1, 2):
             turn(f"{s}_thumb{k}", bone(f"{s}_thumb{k}", f"{s}_thumb{k + 1}"), across)
         follow(f"{s}_thumb3", f"{s}_thumb2")
-        foot = at[f"{s}_metatarsal"] - at[f"{s}_ankle"]
+        foot = centres[f"{s}_metatarsal"] - centres[f"{s}_ankle"]
         ahead = (np.array([0.0, 0, 1]), np.array([foot[0], 0.0, foot[2]]))
         turn(f"{s}_hip", bone(f"{s}_hip", f"{s}_knee"), ahead)
         turn(f"{s}_knee", bone(f"{s}_knee", f"{s}_ankle"), ahead)
@@ -107,18 +107,18 @@ def chain_weights(height: Float64, joints_at: Float64, eased: int = 1) -> Float6
     vertex, and two more after each smoothing; a vertex can have four.
     """
     middles = np.concatenate([(joints_at[:-1] + joints_at[1:]) / 2, [joints_at[-1] + 0.01]])
-    found = np.zeros((len(height), len(joints_at)))
-    place = np.interp(height, middles, np.arange(len(middles)))
-    low = np.floor(place).astype(int)
+    weights = np.zeros((len(height), len(joints_at)))
+    level = np.interp(height, middles, np.arange(len(middles)))
+    low = np.floor(level).astype(int)
     high = np.minimum(low + 1, len(middles) - 1)
     rows = np.arange(len(height))
-    found[rows, low] += 1 - (place - low)
-    found[rows, high] += place - low
+    weights[rows, low] += 1 - (level - low)
+    weights[rows, high] += level - low
     for _ in range(eased):
-        padded = np.pad(found, ((0, 0), (1, 1)), mode="edge")
-        found = (padded[:, :-2] + 2 * padded[:, 1:-1] + padded[:, 2:]) / 4
-        found /= found.sum(axis=1, keepdims=True)
-    return found
+        padded = np.pad(weights, ((0, 0), (1, 1)), mode="edge")
+        weights = (padded[:, :-2] + 2 * padded[:, 1:-1] + padded[:, 2:]) / 4
+        weights /= weights.sum(axis=1, keepdims=True)
+    return weights
 
 
 def orthonormal_frame(direction: Float64, side: Float64) -> Float64:

@@ -79,14 +79,14 @@ class Limits:
         Whole turns are ignored. Raises ValueError for other shapes or values that are not finite.
         """
         array = _frames(values)
-        found = []
+        excesses = []
         for limit in self.limits:
             _, excess = _excess(limit, array)
             out = np.abs(excess) > DEGREES * len(limit.baps)  # less is rounding
             if out.any():
                 worst = float(np.abs(excess).max())
-                found.append(Excess(limit, int(out.sum()), int(np.argmax(out)), worst))
-        return tuple(found)
+                excesses.append(Excess(limit, int(out.sum()), int(np.argmax(out)), worst))
+        return tuple(excesses)
 
     def clamp(self, values: npt.ArrayLike) -> Int32:
         """Return the BAPs clamped to the limits, int32; those that share a limit are scaled by one factor.

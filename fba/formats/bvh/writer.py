@@ -122,7 +122,7 @@ def _select_joints(solver: BapSolver, values: Int32, moving: bool) -> list[int]:
 def _hierarchy(solver: BapSolver, written: list[int], unit: float) -> tuple[Int64, Float64, Float64, str]:
     """Return for every channel BAP column (-1: none), factor and summand; and the text of the hierarchy."""
     skeleton, rules = solver.skeleton, solver.convention
-    parents, place = _parents(skeleton, written), {number: row for row, number in enumerate(written)}
+    parents, row_of = _parents(skeleton, written), {number: row for row, number in enumerate(written)}
     children: list[list[int]] = [[] for _ in written]
     for row, parent in enumerate(parents):
         if parent >= 0:
@@ -150,8 +150,8 @@ def _hierarchy(solver: BapSolver, written: list[int], unit: float) -> tuple[Int6
         ]
         own, axes, signs = _turns(solver, name)
         letters = " ".join(f"{'XYZ'[axis]}rotation" for axis in axes)
-        places = "" if depth else "Xposition Yposition Zposition "
-        lines.append(f"{pad}  CHANNELS {3 if depth else 6} {places}{letters}")
+        position_channels = "" if depth else "Xposition Yposition Zposition "
+        lines.append(f"{pad}  CHANNELS {3 if depth else 6} {position_channels}{letters}")
         columns += own
         factors += [sign * np.degrees(1e-5) for sign in signs]
         shifts += [0.0, 0.0, 0.0]
@@ -166,20 +166,20 @@ def _hierarchy(solver: BapSolver, written: list[int], unit: float) -> tuple[Int6
                 f"{pad}    OFFSET {_format_vector(end)}",
                 f"{pad}  }}",
             ]
-    assert len(place) == len(written)
+    assert len(row_of) == len(written)
     text = "\n".join(lines) + "\n"
     return np.array(columns), np.array(factors), np.array(shifts), text
 
 
 def _parents(skeleton: Skeleton, written: list[int]) -> list[int]:
     """Return for every written joint the row of the closest written joint above it, -1 for the root."""
-    place = {number: row for row, number in enumerate(written)}
+    row_of = {number: row for row, number in enumerate(written)}
     result = []
     for number in written:
         parent = int(skeleton.parents[number])
-        while parent >= 0 and parent not in place:
+        while parent >= 0 and parent not in row_of:
             parent = int(skeleton.parents[parent])
-        result.append(place.get(parent, -1))
+        result.append(row_of.get(parent, -1))
     return result
 
 

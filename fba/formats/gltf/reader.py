@@ -232,14 +232,14 @@ def _choose_clip(gltf: Gltf, clip: str | int | None, nodes: set[int]) -> Clip:
             )
         return moving[0]
     if isinstance(clip, int):
-        chosen = gltf.animations[clip] if 0 <= clip < len(gltf.animations) else None
+        match = gltf.animations[clip] if 0 <= clip < len(gltf.animations) else None
     else:
-        chosen = next((a for a in gltf.animations if a.name == clip), None)
-    if chosen is None or not any(channel.node in nodes for channel in chosen.channels):
+        match = next((a for a in gltf.animations if a.name == clip), None)
+    if match is None or not any(channel.node in nodes for channel in match.channels):
         raise ModelError(
             f"{gltf.file}: no animation {clip!r} moves the skeleton; there are {names or 'none'}"
         )
-    return chosen
+    return match
 
 
 def _rate(times: Float64) -> Fraction:
