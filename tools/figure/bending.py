@@ -36,39 +36,41 @@ EASING_ROUNDS = 10
 """Rounds of smoothing the weights of trunk, arms and legs over neighbours."""
 
 
-def ease_limb_weights(person: Person, places: dict[str, Float64], weights: Float64) -> Float64:
-    """(V, J) weights, with those about the joints of limbs replaced. places: joints' positions by name."""
+def ease_limb_weights(person: Person, positions: dict[str, Float64], weights: Float64) -> Float64:
+    """(V, J) weights, with those about the joints of limbs replaced. positions: of the joints, by name."""
     weights = weights.copy()
-    _ease_shoulders(person, places, weights)
+    _ease_shoulders(person, positions, weights)
     number = {name: n for n, name in enumerate(Skeleton.default().names)}
     for upper, joint, lower, inside, fold, stretch in HINGES:
         for side in "lr":
             above, middle, below = (name.replace("?", side) for name in (upper, joint, lower))
-            bones = [places[middle] - places[above], places[below] - places[middle]]
+            bones = [positions[middle] - positions[above], positions[below] - positions[middle]]
             along = sum(bone / np.linalg.norm(bone) for bone in bones)
             along = along / np.linalg.norm(along)
-            away = person.vertices - places[middle]
+            away = person.vertices - positions[middle]
             turned = np.clip(away @ np.array(inside) / LIMB, -1.0, 1.0) / 2 + 0.5
             reach = stretch + (fold - stretch) * turned
             share = smoothstep(away @ along / (2 * reach) + 0.5)
             both = weights[:, number[above]] + weights[:, number[middle]]
             weights[:, number[middle]] = both * share
             weights[:, number[above]] = both * (1 - share)
-    body = np.linalg.norm(person.vertices[:, None] - [places[f"{s}_wrist"] for s in "lr"], axis=2).min(axis=1)
+    body = np.linalg.norm(person.vertices[:, None] - [positions[f"{s}_wrist"] for s in "lr"], axis=2).min(
+        axis=1
+    )
     free = smoothstep((body - 0.12) / 0.08) * smoothstep((1.45 - person.vertices[:, 1]) / 0.06)
     free *= smoothstep((person.vertices[:, 1] - 0.14) / 0.06)
     for side in "lr":  # an armpit keeps its fold
-        pit = places[f"{side}_shoulder"] + np.array(PIT) * (1 if side == "l" else -1, 1, 1)
+        pit = positions[f"{side}_shoulder"] + np.array(PIT) * (1 if side == "l" else -1, 1, 1)
         free *= 1 - 0.7 * np.exp(-((np.linalg.norm(person.vertices - pit, axis=1) / 0.06) ** 2))
     mesh = Cloth(person.vertices, person.vertices, weights, weights, person.triangles)
     return mesh.smooth_rows(weights, free, EASING_ROUNDS)
 
 
-def _ease_shoulders(person: Person, places: dict[str, Float64], weights: Float64) -> None:
+def _ease_shoulders(person: Person, positions: dict[str, Float64], weights: Float64) -> None:
     """Replace weights about the shoulders, in place: they change at the plane of a sleeve's seam."""
     names = Skeleton.default().names
     for side, sign in (("l", 1.0), ("r", -1.0)):
-        joint = places[f"{side}_shoulder"]
+        joint = positions[f"{side}_shoulder"]
         away = (person.vertices - joint) * (sign, 1.0, 1.0)
         high = smoothstep((away[:, 1] - ARMPIT[0]) / (ARMPIT[1] - ARMPIT[0]))
         top = smoothstep((away[:, 1] + 0.05) / 0.10)

@@ -183,16 +183,18 @@ def _make_garment(
     return Garment(everything, faces, colours, weights, value, tone == INSIDE)
 
 
-def _move_onto_edge(places: Float64, level: float, way: Callable[[Float64], Float64]) -> Float64:
+def _move_onto_edge(positions: Float64, level: float, way: Callable[[Float64], Float64]) -> Float64:
     """Points (N, 3) moved to where their distance to the edge, way(points), is exactly `level`."""
     step = 1e-4
     for _ in range(4):
-        value = way(places) - level
-        slope = np.stack([(way(places + step * axis) - level - value) / step for axis in np.eye(3)], axis=1)
+        value = way(positions) - level
+        slope = np.stack(
+            [(way(positions + step * axis) - level - value) / step for axis in np.eye(3)], axis=1
+        )
         move = -(value / np.maximum((slope**2).sum(axis=1), 0.25))[:, None] * slope
         length = np.linalg.norm(move, axis=1, keepdims=True)
-        places = places + move * np.minimum(1.0, 0.02 / np.maximum(length, 1e-9))
-    return places
+        positions = positions + move * np.minimum(1.0, 0.02 / np.maximum(length, 1e-9))
+    return positions
 
 
 def _even_rim(vertices: Float64, border: Int64, rim: Int64) -> Float64:
@@ -215,14 +217,14 @@ def _mirror(
     used, left = np.unique(faces[half], return_inverse=True)
     left = left.reshape(-1, 3)
     middle = np.abs(side[used]) < MIDLINE
-    places, carried = vertices[used].copy(), weights[used].copy()
+    positions, carried = vertices[used].copy(), weights[used].copy()
     other = carried[:, MIRROR]
-    places[middle, 0] = 0.0
+    positions[middle, 0] = 0.0
     carried[middle] = (carried[middle] + other[middle]) / 2
     number = np.arange(len(used))
     number[~middle] = len(used) + np.arange((~middle).sum())
     return (
-        np.concatenate([places, places[~middle] * (-1.0, 1.0, 1.0)]),
+        np.concatenate([positions, positions[~middle] * (-1.0, 1.0, 1.0)]),
         np.concatenate([carried, other[~middle]]),
         np.concatenate([left, number[left][:, ::-1]]),
         np.tile(shade[half], 2),
@@ -234,6 +236,6 @@ def _split_by_shade(
 ) -> tuple[Float64, Float64, Int64, Float64]:
     """The mesh with vertices doubled where shades meet; the last array is each vertex's shade."""
     pairs = np.stack([faces.ravel(), np.repeat(np.unique(shade, return_inverse=True)[1], 3)], axis=1)
-    found, number = np.unique(pairs, axis=0, return_inverse=True)
-    rows = found[:, 0]
-    return vertices[rows], weights[rows], number.reshape(-1, 3), np.unique(shade)[found[:, 1]]
+    unique, number = np.unique(pairs, axis=0, return_inverse=True)
+    rows = unique[:, 0]
+    return vertices[rows], weights[rows], number.reshape(-1, 3), np.unique(shade)[unique[:, 1]]

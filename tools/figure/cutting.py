@@ -66,14 +66,14 @@ class Cloth:
         share = height[a] / (height[a] - height[b])
         # Each corner near the line goes to its nearest crossing.
         best = np.full(len(height), SNAP)
-        for corner, at in ((a, share), (b, 1 - share)):
-            np.minimum.at(best, corner, at)
+        for corner, distance in ((a, share), (b, 1 - share)):
+            np.minimum.at(best, corner, distance)
         moved = self.interpolate_rows(a, b, share)
-        for corner, at in ((a, share), (b, 1 - share)):
-            chosen = at == best[corner]
+        for corner, distance in ((a, share), (b, 1 - share)):
+            nearest = distance == best[corner]
             for array, rows in zip(arrays, moved, strict=True):
-                array[corner[chosen]] = rows[chosen]
-            height[corner[chosen]] = 0.0
+                array[corner[nearest]] = rows[nearest]
+            height[corner[nearest]] = 0.0
         for array in arrays[:2]:  # vertices on the midline stay on it
             array[np.abs(self.vertices[:, 0]) < MIDLINE, 0] = 0.0
         on_line = Cloth(arrays[0], arrays[1], arrays[2], arrays[3], self.triangles)

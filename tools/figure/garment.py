@@ -33,9 +33,9 @@ ARCH = -0.24
 """Greatest height at which they meet: at the sides they hang from the arch over the shoulder (m)."""
 
 
-def neckline(places: Float64) -> Float64:
+def neckline(positions: Float64) -> Float64:
     """(N,) height of the neckline in the direction of points (N, 3), metres, in the head's frame."""
-    turn = np.arctan2(np.abs(places[:, 0]), places[:, 2] - AXIS)
+    turn = np.arctan2(np.abs(positions[:, 0]), positions[:, 2] - AXIS)
     from scipy.interpolate import PchipInterpolator
 
     degrees = np.array([-75, -40, 0, 40, 75, 110, 180, 250])
@@ -62,8 +62,8 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     rim = np.unique(open_edges(torso.quads[:, :3]))
     top = rim[torso.vertices[rim, 1] > -0.21]
     vertices = torso.vertices.copy()
-    rim_places = _evenly_around_neck(torso, top)
-    vertices[top] = _on_skin(rim_places, neckline(rim_places) - 0.006, whole_skin)
+    rim_positions = _evenly_around_neck(torso, top)
+    vertices[top] = _on_skin(rim_positions, neckline(rim_positions) - 0.006, whole_skin)
     turn = np.arctan2(vertices[top, 0], vertices[top, 2] - AXIS)
     outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
     for _ in range(4):  # the rows below follow
@@ -87,11 +87,11 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     return vertices, np.concatenate([cloth.triangles, band, closing]), colours
 
 
-def _within_bust(places: Float64) -> Float64:
+def _within_bust(positions: Float64) -> Float64:
     """(N,) for points (N, 3): positive within the edge of the bust's cloth, 0 on it."""
     wide, deep, height, power = BUST
-    down = np.maximum(height - places[:, 1], 0.0) / deep
-    return 1 - ((np.abs(places[:, 0]) / wide) ** power + down**power) ** (1 / power)
+    down = np.maximum(height - positions[:, 1], 0.0) / deep
+    return 1 - ((np.abs(positions[:, 0]) / wide) ** power + down**power) ** (1 / power)
 
 
 def _close_below(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
@@ -103,13 +103,13 @@ def _close_below(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
     sides = sides[(_within_bust(cloth.vertices)[sides] < ON_EDGE).all(axis=1)]
     edge, sides = np.unique(sides, return_inverse=True)
     sides = sides.reshape(-1, 2)
-    places = cloth.vertices[edge]
-    beyond = np.where(places[:, 2] > CORE, CORE - OVERLAP, CORE + OVERLAP)
-    core = np.stack([places[:, 0], np.minimum(places[:, 1], ARCH), beyond], axis=1)
+    positions = cloth.vertices[edge]
+    beyond = np.where(positions[:, 2] > CORE, CORE - OVERLAP, CORE + OVERLAP)
+    core = np.stack([positions[:, 0], np.minimum(positions[:, 1], ARCH), beyond], axis=1)
     a, b = start + sides[:, 0], start + sides[:, 1]
     rows = len(edge)
     triangles = [np.stack([b, a, a + rows], axis=1), np.stack([b, a + rows, b + rows], axis=1)]
-    return np.concatenate([places, core]), np.concatenate(triangles)
+    return np.concatenate([positions, core]), np.concatenate(triangles)
 
 
 def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
@@ -120,14 +120,12 @@ def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
     ring = np.stack([np.sin(turn), np.zeros(AROUND), np.cos(turn)], axis=1)
     rows = []
     for down, out in BAND:
-        at = ring + np.array([0.0, 0.0, AXIS])
-        place = _on_skin(at, neckline(at) - down, skin)
-        away = np.hypot(place[:, 0], place[:, 2] - AXIS)
+        around = ring + np.array([0.0, 0.0, AXIS])
+        rim = _on_skin(around, neckline(around) - down, skin)
+        away = np.hypot(rim[:, 0], rim[:, 2] - AXIS)
         tight = np.maximum(gaussian_filter1d(away, 4.0, mode="wrap"), away - 0.0015)  # no lumps
         tight = gaussian_filter1d(tight, 1.5, mode="wrap") + out
-        rows.append(
-            np.stack([ring[:, 0] * tight, place[:, 1] + out * 0.25, AXIS + ring[:, 2] * tight], axis=1)
-        )
+        rows.append(np.stack([ring[:, 0] * tight, rim[:, 1] + out * 0.25, AXIS + ring[:, 2] * tight], axis=1))
     return np.concatenate(rows), start + tube(len(BAND), AROUND)
 
 
@@ -141,19 +139,19 @@ def _evenly_around_neck(torso: figure.Surface, top: Int64) -> Float64:
     chain = [int(top[torso.vertices[top, 2].argmax()])]
     while after[chain[-1]] != chain[0]:
         chain.append(after[chain[-1]])
-    places = torso.vertices[chain]
-    turn = np.unwrap(np.arctan2(places[:, 0], places[:, 2] - AXIS))
+    positions = torso.vertices[chain]
+    turn = np.unwrap(np.arctan2(positions[:, 0], positions[:, 2] - AXIS))
     steps = np.diff(turn, append=turn[0] + np.sign(turn[-1] - turn[0]) * 2 * np.pi)
     for _ in range(30):
         steps = (steps + np.roll(steps, 1) + np.roll(steps, -1)) / 3
     even = turn[0] + np.concatenate([[0.0], np.cumsum(steps)[:-1]])
-    away = np.hypot(places[:, 0], places[:, 2] - AXIS)
-    moved = np.stack([away * np.sin(even), places[:, 1], AXIS + away * np.cos(even)], axis=1)
+    away = np.hypot(positions[:, 0], positions[:, 2] - AXIS)
+    moved = np.stack([away * np.sin(even), positions[:, 1], AXIS + away * np.cos(even)], axis=1)
     row = {vertex: k for k, vertex in enumerate(chain)}
     return moved[[row[int(vertex)] for vertex in top]]
 
 
-def _on_skin(places: Float64, height: Float64, skin: Float64) -> Float64:
+def _on_skin(positions: Float64, height: Float64, skin: Float64) -> Float64:
     """(N, 3) points of the neck's skin in the directions of points (N, 3) from its axis, at heights (N,)."""
     from scipy.interpolate import LinearNDInterpolator
 
@@ -164,9 +162,9 @@ def _on_skin(places: Float64, height: Float64, skin: Float64) -> Float64:
     chart = np.stack([around(neck), neck[:, 1]], axis=1)
     chart = np.concatenate([chart + np.array([turn, 0]) for turn in (-2 * np.pi, 0, 2 * np.pi)])
     away = np.tile(np.hypot(neck[:, 0], neck[:, 2] - AXIS), 3)
-    turn = around(places)
+    turn = around(positions)
     radius = LinearNDInterpolator(chart, away)(turn, height)
-    radius = np.where(np.isfinite(radius), radius, np.hypot(places[:, 0], places[:, 2] - AXIS))
+    radius = np.where(np.isfinite(radius), radius, np.hypot(positions[:, 0], positions[:, 2] - AXIS))
     return np.stack([radius * np.sin(turn), height, AXIS + radius * np.cos(turn)], axis=1)
 
 

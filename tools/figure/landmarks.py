@@ -61,34 +61,34 @@ class Skin:
         return int(np.where(candidates, score, np.inf).argmin())
 
 
-def _near(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
+def _near(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, Bool]:
     mouth = skin.marks.mouth
     face = skin.outside & ((mouth == sculpt.FAR) | (mouth > 2))
-    on_midline = np.abs(places[:, 0]) < 1e-6
-    return np.linalg.norm(places - target / 1000, axis=1), face & (on_midline == (target[0] == 0))
+    on_midline = np.abs(positions[:, 0]) < 1e-6
+    return np.linalg.norm(positions - target / 1000, axis=1), face & (on_midline == (target[0] == 0))
 
 
-def _on_lip(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
+def _on_lip(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, Bool]:
     ring = np.abs(skin.marks.mouth - sculpt.CONTACT_RING) < 1e-6
-    widest = places[ring, 0].max()
+    widest = positions[ring, 0].max()
     lips = ring & (skin.marks.lip * target[1] > 0) if target[1] else ring
-    return np.abs(places[:, 0] - target[0] * widest), lips
+    return np.abs(positions[:, 0] - target[0] * widest), lips
 
 
-def _on_lid(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
-    ring = (np.abs(skin.marks.eye - sculpt.MARGIN_RING) < 1e-6) & (places[:, 0] > 0)
+def _on_lid(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, Bool]:
+    ring = (np.abs(skin.marks.eye - sculpt.MARGIN_RING) < 1e-6) & (positions[:, 0] > 0)
     if target[0]:
-        return -places[:, 0] * target[0], ring
+        return -positions[:, 0] * target[0], ring
     centre = sculpt.EYE_CENTRE - sculpt.ORIGIN
-    return np.abs(places[:, 0] - centre[0]), ring & (places[:, 1] * target[1] > 0.002)
+    return np.abs(positions[:, 0] - centre[0]), ring & (positions[:, 1] * target[1] > 0.002)
 
 
-def _at_top(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
-    return -places[:, 1], np.abs(places[:, 0]) < 1e-6
+def _at_top(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, Bool]:
+    return -positions[:, 1], np.abs(positions[:, 0]) < 1e-6
 
 
-def _at_back(skin: Skin, places: Float64, target: Float64) -> tuple[Float64, Bool]:
-    return places[:, 2], (np.abs(places[:, 0]) < 1e-6) & (places[:, 1] > -0.03)
+def _at_back(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, Bool]:
+    return positions[:, 2], (np.abs(positions[:, 0]) < 1e-6) & (positions[:, 1] > -0.03)
 
 
 RULES = {"near": _near, "lip": _on_lip, "lid": _on_lid, "top": _at_top, "back": _at_back}

@@ -46,8 +46,10 @@ SKULL_ALONE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One mesh of the body, as modelled: vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J),
-    normals (V, 3)."""
+    """One mesh of the body in the posture of the figure.
+
+    vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J), normals (V, 3).
+    """
 
     kind: str
     vertices: Float64
@@ -72,23 +74,23 @@ def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
     triangles, of_tile = person.triangles, person.tile
     normals = vertex_normals(person.vertices, triangles).astype(np.float64)
     inside = person.vertices_of(person.inner)
-    whole = Cloth(person.vertices, normals, weights, hidden[:, None], triangles)
+    surface = Cloth(person.vertices, normals, weights, hidden[:, None], triangles)
     free = (hidden[triangles] < UNDER).any(axis=1)
     colour = np.array([*complexion(), GLOSS])
-    skin = whole.select(free & (of_tile != 0) & ~inside[triangles].any(axis=1))
-    found = {
+    skin = surface.select(free & (of_tile != 0) & ~inside[triangles].any(axis=1))
+    pieces = {
         "skin": _piece("skin", skin, colour),
-        "neck": _piece("neck", _neck(whole, of_tile == 0, bones), colour),
+        "neck": _piece("neck", _neck(surface, of_tile == 0, bones), colour),
     }
     for name, garment in made.items():
         kind = "shoe" if name == "shoes" else "cloth"
-        found[name] = Piece(
+        pieces[name] = Piece(
             kind, garment.vertices, garment.triangles, garment.colours, garment.weights,
             _welded_normals(garment),
         )  # fmt: skip
-    found["skin"].colours[:, :3] *= _flush_factors(found["skin"], bones)
-    _shade([piece for piece in found.values() if piece.kind != "neck"])
-    return found, bones
+    pieces["skin"].colours[:, :3] *= _flush_factors(pieces["skin"], bones)
+    _shade([piece for piece in pieces.values() if piece.kind != "neck"])
+    return pieces, bones
 
 
 def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
@@ -104,16 +106,16 @@ def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
     return 1 - share[:, None] * (0.03, 0.20, 0.22)
 
 
-def _shade(found: list[Piece]) -> None:
+def _shade(pieces: list[Piece]) -> None:
     """Darken colours, in place, where little light falls: in folds, between fingers, under hems."""
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in found)])
-    vertices = np.concatenate([piece.vertices for piece in found]).astype(np.float32)
-    normals = np.concatenate([piece.normals for piece in found]).astype(np.float32)
-    triangles = np.concatenate([p.triangles + s for p, s in zip(found, starts, strict=False)]).astype(
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    vertices = np.concatenate([piece.vertices for piece in pieces]).astype(np.float32)
+    normals = np.concatenate([piece.normals for piece in pieces]).astype(np.float32)
+    triangles = np.concatenate([p.triangles + s for p, s in zip(pieces, starts, strict=False)]).astype(
         np.int32
     )
     free = bake(vertices, normals, triangles).open
-    for piece, start in zip(found, starts, strict=False):
+    for piece, start in zip(pieces, starts, strict=False):
         here = free[start : start + len(piece.vertices)]
         piece.colours[:, :3] *= (DARKEST + (1 - DARKEST) * np.clip(here / 0.85, 0, 1))[:, None]
 
@@ -141,9 +143,9 @@ def _skull_weights(person: Person, bones: rig.Rig) -> Float64:
     return weights
 
 
-def _neck(whole: Cloth, of_head: Bool, bones: rig.Rig) -> Cloth:
+def _neck(surface: Cloth, of_head: Bool, bones: rig.Rig) -> Cloth:
     """The head's surface from below the collar up to where the skull moves it alone."""
-    head = whole.select(of_head)
+    head = surface.select(of_head)
     head = head.cut_above(clothes.depth_below_collar(head.vertices) * -1 + TUCKED)
     skull = bones.names.index("skullbase")
     neck = head.cut_above(np.where(head.weights[:, skull] > 0.999, -0.1, 0.98 - head.weights[:, skull]))
@@ -159,14 +161,13 @@ def complexion() -> Float64:
     from PIL import Image
 
     part = FaceModel.default().part("skin")
-    places = part.vertices + ORIGIN + (0.0, figure.EYE_LEVEL, 0.0)
-    neck = (places[:, 1] > 1.46) & (places[:, 1] < 1.50) & (places[:, 2] > -0.02)
+    positions = part.vertices + ORIGIN + (0.0, figure.EYE_LEVEL, 0.0)
+    neck = (positions[:, 1] > 1.46) & (positions[:, 1] < 1.50) & (positions[:, 2] > -0.02)
     with Image.open(io.BytesIO(part.material.texture)) as image:
         pixels = np.asarray(image.convert("RGB"), dtype=np.float64) / 255
-    at = np.clip(
-        part.texcoords[neck] * (pixels.shape[1], pixels.shape[0]), 0, np.array(pixels.shape[1::-1]) - 1
-    )
-    shown = pixels[at[:, 1].astype(int), at[:, 0].astype(int)]
+    size = np.array(pixels.shape[1::-1])
+    column, row = np.clip(part.texcoords[neck] * size, 0, size - 1).astype(int).T
+    shown = pixels[row, column]
     linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
     return np.median(linear * part.colours[neck, :3], axis=0)
 
@@ -181,10 +182,10 @@ def _welded_normals(garment: clothes.Garment) -> Float64:
 
 def model() -> BodyModel:
     """The whole person without the head."""
-    found, bones = make_pieces()
+    pieces, bones = make_pieces()
     spine = [name[0] == "v" or name == "sacroiliac" for name in bones.names]
     parts = []
-    for name, piece in found.items():
+    for name, piece in pieces.items():
         joints, weights = strongest_weights(piece.weights, spine)
         roughness = {"skin": 0.55, "neck": 0.55, "cloth": 0.95, "shoe": 0.6}[piece.kind]
         parts.append(

@@ -130,12 +130,12 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
         tooth = min(int(np.searchsorted(ends, length, side="right")) - 1, len(widths) - 1)
         across = (length - ends[tooth]) / widths[tooth] * 2 - 1
         low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
-    places = [_arch(length, inset) for length in half]
+    positions = [_arch(length, inset) for length in half]
     profile = [  # out of the arch (mm), above the scallop (mm)
         (-2.0, -0.4), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), (0.7, 5.5), (-2.0, 9.5), (-8.8, -0.4),
     ]  # fmt: skip
     band = np.zeros((len(profile), len(half), 3))
-    for k, (place, turn) in enumerate(places):
+    for k, (place, turn) in enumerate(positions):
         outward = np.array([np.sin(turn), 0.0, np.cos(turn)])
         for row, (out, up) in enumerate(profile):
             reach = out / 1000 if out > -4 else out / 1000 * (1 + 0.15 * k / len(half))

@@ -81,41 +81,41 @@ def chart(vertices: Float64, values: Float64, triangles: Integer, uvs: Float64, 
     return Chart(out[..., :3], out[..., 3:], known)
 
 
-def scalp(places: Float64, soft: float = 0.004) -> Float64:
+def scalp(positions: Float64, soft: float = 0.004) -> Float64:
     """(N,) density of hair at points (N, 3): 0 on the face, 1 on the scalp.
 
     soft: width of the edge, metres.
     """
     with (Path(__file__).parent / "hairline.csv").open(encoding="utf-8") as file:
         line = np.array([[float(row["degrees"]), float(row["y"]) / 1000] for row in csv.DictReader(file)])
-    around = np.degrees(np.arctan2(np.abs(places[:, 0]), places[:, 2] - AXIS))
+    around = np.degrees(np.arctan2(np.abs(positions[:, 0]), positions[:, 2] - AXIS))
     height = PchipInterpolator(line[:, 0], line[:, 1])
     slope = height.derivative()(around) * 180 / np.pi / 0.08
-    above = (places[:, 1] - height(around)) / np.sqrt(1 + slope**2)
-    ear = (np.abs(places[:, 0]) > 0.0765) & (places[:, 1] < 0.006)
-    ear &= (places[:, 2] > -0.122) & (places[:, 2] < -0.100)
+    above = (positions[:, 1] - height(around)) / np.sqrt(1 + slope**2)
+    ear = (np.abs(positions[:, 0]) > 0.0765) & (positions[:, 1] < 0.006)
+    ear &= (positions[:, 2] > -0.122) & (positions[:, 2] < -0.100)
     return np.where(ear, 0.0, smoothstep(above / soft + 0.5))
 
 
-def brow(places: Float64) -> tuple[Float64, Float64]:
+def brow(positions: Float64) -> tuple[Float64, Float64]:
     """(position along the brow (N,): 0 inner, 1 outer end; density of its hair (N,), 0..1)."""
-    x = np.abs(places[:, 0])
+    x = np.abs(positions[:, 0])
     middle, low, high = (np.interp(x, BROW[:, 0], BROW[:, column]) for column in (1, 2, 3))
-    offset = places[:, 1] - middle
+    offset = positions[:, 1] - middle
     reach = np.where(offset < 0, low, high)
     across = 1 - smoothstep((np.abs(offset) / reach - 0.35) / 0.75)
     along = (x - BROW[0, 0]) / (BROW[-1, 0] - BROW[0, 0])
     ends = smoothstep((along + 0.03) / 0.14) * (1 - smoothstep((along - 0.90) / 0.12))
-    front = places[:, 2] > -0.03
+    front = positions[:, 2] > -0.03
     return along, np.where(front, across * ends, 0.0)
 
 
-def noise(places: Float64, scale: float, seed: int) -> Float64:
+def noise(positions: Float64, scale: float, seed: int) -> Float64:
     """(N,) smooth noise in -1..1 at points (N, 3); scale: size of its grains, metres."""
     from scipy.ndimage import map_coordinates
 
     lattice = np.random.default_rng(seed).uniform(-1, 1, (48, 48, 48))
-    return map_coordinates(lattice, (places / scale).T, order=1, mode="grid-wrap")
+    return map_coordinates(lattice, (positions / scale).T, order=1, mode="grid-wrap")
 
 
 def paint(lay: Chart) -> Image.Image:
@@ -249,12 +249,12 @@ def _strokes(picture: Image.Image, lay: Chart) -> None:
     for chosen, direction, strength in layers:
         mask = Image.new("L", (SIZE * 2, SIZE * 2), 0)
         draw = ImageDraw.Draw(mask)
-        at = np.stack([columns[chosen], rows[chosen]], axis=1).astype(np.float64)
+        roots = np.stack([columns[chosen], rows[chosen]], axis=1).astype(np.float64)
         move = _in_texels(
             step_x[rows[chosen], columns[chosen]], step_y[rows[chosen], columns[chosen]], direction
         )
         good = np.abs(move).max(axis=1) < 60
-        for (x0, y0), (dx, dy) in zip(at[good] * 2, move[good] * 2, strict=True):
+        for (x0, y0), (dx, dy) in zip(roots[good] * 2, move[good] * 2, strict=True):
             draw.line((x0 - dx / 2, y0 - dy / 2, x0 + dx / 2, y0 + dy / 2), fill=255, width=2)
         soft = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
         soft = soft.point(lambda value, s=strength: int(value * s))

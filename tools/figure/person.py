@@ -58,13 +58,13 @@ class Person:
         return used
 
 
-def make_person(surface: figure.Surface, places: dict[str, Float64], arms: Float64) -> Person:
-    """The person made from a figure. places: joints by name. arms (V,): weight of the arms per vertex."""
+def make_person(surface: figure.Surface, positions: dict[str, Float64], arms: Float64) -> Person:
+    """The person made from a figure. positions: of joints, by name. arms (V,): weight of the arms."""
     middle = surface.vertices[surface.quads].mean(axis=1)
     chosen = np.zeros(len(middle), dtype=bool)
     for joint, side, reach in BENDS:
         for letter in "lr":
-            away = middle - places[joint.replace("?", letter)]
+            away = middle - positions[joint.replace("?", letter)]
             chosen |= (np.linalg.norm(away * (0.6, 1.0, 0.6), axis=1) < reach) & (
                 away @ np.array(side) > -PAST
             )
@@ -82,15 +82,15 @@ def make_person(surface: figure.Surface, places: dict[str, Float64], arms: Float
     )
 
 
-def reproportion(places: Float64, arms: Float64) -> Float64:
+def reproportion(positions: Float64, arms: Float64) -> Float64:
     """Points (N, 3) of the figure in the person's proportions. arms (N,): weight of the arms."""
-    x, height = np.abs(places[:, 0]), places[:, 1]
+    x, height = np.abs(positions[:, 0]), positions[:, 1]
     chest = CHEST_LEAST + (1 - CHEST_LEAST) * smoothstep((height - CHEST[0]) / (CHEST[1] - CHEST[0]))
     chest *= smoothstep((height - 0.95) / 0.15)
     trunk = smoothstep((x - NECK) / (GIRDLE - NECK)) * chest
     out = WIDER * (arms + (1 - arms) * trunk)
     level = np.exp(-(((height - THIGH) / THIGH_HIGH) ** 2))
     out -= SLIMMER * (1 - arms) * level * smoothstep((x - 0.06) / 0.12)
-    moved = places.copy()
-    moved[:, 0] += np.sign(places[:, 0]) * out
+    moved = positions.copy()
+    moved[:, 0] += np.sign(positions[:, 0]) * out
     return moved

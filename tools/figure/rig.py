@@ -66,10 +66,10 @@ def make_rig() -> tuple[Person, Rig]:
     coarse = _weights(surface, data, default, given)
     arm = np.array([name[2:].startswith(ARM) for name in default.names])
     made = make_person(surface, dict(zip(default.names, given, strict=True)), coarse[:, arm].sum(axis=1))
-    places = reproportion(given, arm.astype(np.float64))
-    bind = bind_matrices(places)
+    positions = reproportion(given, arm.astype(np.float64))
+    bind = bind_matrices(positions)
     weights = bending.ease_limb_weights(
-        made, dict(zip(default.names, places, strict=True)), made.blend @ coarse
+        made, dict(zip(default.names, positions, strict=True)), made.blend @ coarse
     )
     return made, Rig(default.names, default.parents, skeleton_in_default_posture(bind).centres, bind, weights)
 
@@ -77,28 +77,28 @@ def make_rig() -> tuple[Person, Rig]:
 def _joint_positions(data: dict[str, np.ndarray], default: Skeleton) -> Float64:
     """(J, 3) positions of the joints in the figure as modelled, metres."""
     source = dict(zip(data["joint_names"].tolist(), data["joint_centres"].astype(np.float64), strict=True))
-    places = np.full((len(default), 3), np.nan)
+    positions = np.full((len(default), 3), np.nan)
     with (HERE / "rig.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             for side, word in (("l", "Left"), ("r", "Right")) if "?" in row["joint"] else (("", ""),):
                 start = source[row["from"].replace("?", word)]
                 end = source[row["to"].replace("?", word)] if row["to"] else start
                 name = row["joint"].replace("?", side)
-                places[default.number(name)] = start + (end - start) * float(row["share"])
+                positions[default.number(name)] = start + (end - start) * float(row["share"])
     for side in "lr":  # joints at the heel and in the middle of the foot
-        ankle, toe = (places[default.number(f"{side}_{joint}")] for joint in ("ankle", "metatarsal"))
-        places[default.number(f"{side}_subtalar")] = [ankle[0], ankle[1] * 0.55, ankle[2] + 0.012]
-        places[default.number(f"{side}_midtarsal")] = (ankle * 0.4 + toe * 0.6) + (0, 0.008, 0)
+        ankle, toe = (positions[default.number(f"{side}_{joint}")] for joint in ("ankle", "metatarsal"))
+        positions[default.number(f"{side}_subtalar")] = [ankle[0], ankle[1] * 0.55, ankle[2] + 0.012]
+        positions[default.number(f"{side}_midtarsal")] = (ankle * 0.4 + toe * 0.6) + (0, 0.008, 0)
     # Vertebrae are distributed along the figure's spine in the standard's proportions.
     knots = np.array([source[name] for name in ("Hips", "Spine1", "Spine2", "Chest", "Neck1", "Neck2")])
     knots = np.concatenate([knots, SKULLBASE[None]])
-    place_vertebrae(places, knots, 4)
-    places[default.number("skullbase")] = SKULLBASE
-    return places
+    place_vertebrae(positions, knots, 4)
+    positions[default.number("skullbase")] = SKULLBASE
+    return positions
 
 
 def _weights(
-    surface: figure.Surface, data: dict[str, np.ndarray], default: Skeleton, places: Float64
+    surface: figure.Surface, data: dict[str, np.ndarray], default: Skeleton, positions: Float64
 ) -> Float64:
     source = data["joint_names"].tolist()
     given = np.zeros((len(surface.vertices), len(source)))
@@ -121,11 +121,11 @@ def _weights(
         share = given[:, [source.index(name) for name in names]].sum(axis=1)
         numbers = [default.number(name) for name in groups[group]]
         weights[:, numbers] += share[:, None] * chain_weights(
-            height, places[numbers, 1], 1 if group == "torso" else 0
+            height, positions[numbers, 1], 1 if group == "torso" else 0
         )
     weights[:, default.number("skullbase")] += given[:, [source.index(name) for name in HEAD]].sum(axis=1)
     for side in "lr":  # the foot: toes bend, the rest follows the ankle
-        _share_forward(weights, default, surface, f"{side}_ankle", f"{side}_midtarsal", places)
+        _share_forward(weights, default, surface, f"{side}_ankle", f"{side}_midtarsal", positions)
         # The shoulder girdle: weight near the arm goes to the blade.
         out = np.abs(surface.vertices[:, 0])
         far = smoothstep((out - 0.07) / 0.06)
@@ -138,11 +138,11 @@ def _weights(
 
 
 def _share_forward(
-    weights: Float64, default: Skeleton, surface: figure.Surface, rear: str, front: str, places: Float64
+    weights: Float64, default: Skeleton, surface: figure.Surface, rear: str, front: str, positions: Float64
 ) -> None:
     """Give part of the rear joint's weight to the front joint, in place, by how far forward vertices are."""
     a, b = default.number(rear), default.number(front)
-    ahead = smoothstep((surface.vertices[:, 2] - places[b, 2] + 0.02) / 0.04)
+    ahead = smoothstep((surface.vertices[:, 2] - positions[b, 2] + 0.02) / 0.04)
     weights[:, b] += weights[:, a] * ahead
     weights[:, a] *= 1 - ahead
 
@@ -158,12 +158,14 @@ def slope_shoulders(person: Person, bones: Rig) -> Person:
     upright[:, :3, 3] = bones.centres
     hanging = upright @ np.linalg.inv(bones.bind)  # from the posture of the figure to the default one
     turned = np.einsum("vj,jab->vab", bones.weights, hanging)
-    places = np.einsum("vab,vb->va", turned, np.pad(person.vertices, ((0, 0), (0, 1)), constant_values=1.0))
-    shift = np.zeros_like(places[:, :3])
+    positions = np.einsum(
+        "vab,vb->va", turned, np.pad(person.vertices, ((0, 0), (0, 1)), constant_values=1.0)
+    )
+    shift = np.zeros_like(positions[:, :3])
     for side, sign in (("l", 1.0), ("r", -1.0)):
         joint = bones.centres[bones.names.index(f"{side}_shoulder")]
-        out = sign * (places[:, 0] - joint[0]) - SIDE
-        high = smoothstep((places[:, 1] - joint[1] - CAP[0]) / (CAP[1] - CAP[0]))
+        out = sign * (positions[:, 0] - joint[0]) - SIDE
+        high = smoothstep((positions[:, 1] - joint[1] - CAP[0]) / (CAP[1] - CAP[0]))
         shift[:, 0] -= sign * np.maximum(out, 0.0) * (1 - LEFT) * high
     back = np.einsum("vab,va->vb", turned[:, :3, :3], shift)  # by the inverse rotations
     return replace(person, vertices=person.vertices + back)

@@ -123,28 +123,28 @@ def _outline(flat: Float64) -> Float64:
     closed = np.concatenate([hull, hull[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
     fine = np.linspace(0, along[-1], 400, endpoint=False)
-    places = np.stack([np.interp(fine, along, closed[:, k]) for k in (0, 1)], axis=1)
+    positions = np.stack([np.interp(fine, along, closed[:, k]) for k in (0, 1)], axis=1)
     # A shoe is narrower at its waist, and rounder than toes.
-    forward = (places[:, 1] - places[:, 1].min()) / np.ptp(places[:, 1])
-    middle = np.interp(places[:, 1], *_spine(places))
+    forward = (positions[:, 1] - positions[:, 1].min()) / np.ptp(positions[:, 1])
+    middle = np.interp(positions[:, 1], *_spine(positions))
     waist = 1 - 0.10 * np.exp(-(((forward - 0.42) / 0.16) ** 2))
-    places[:, 0] = middle + (places[:, 0] - middle) * waist
-    places = places + ROOM * _outward(places)
+    positions[:, 0] = middle + (positions[:, 0] - middle) * waist
+    positions = positions + ROOM * _outward(positions)
     for _ in range(60):
-        places = 0.5 * places + 0.25 * (np.roll(places, 1, axis=0) + np.roll(places, -1, axis=0))
-    steps = np.linalg.norm(np.diff(places, axis=0, append=places[:1]), axis=1)
+        positions = 0.5 * positions + 0.25 * (np.roll(positions, 1, axis=0) + np.roll(positions, -1, axis=0))
+    steps = np.linalg.norm(np.diff(positions, axis=0, append=positions[:1]), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
-    closed = np.concatenate([places, places[:1]])
+    closed = np.concatenate([positions, positions[:1]])
     even = np.linspace(0, along[-1], AROUND, endpoint=False)
     return np.stack([np.interp(even, along, closed[:, k]) for k in (0, 1)], axis=1)
 
 
-def _spine(places: Float64) -> tuple[Float64, Float64]:
+def _spine(positions: Float64) -> tuple[Float64, Float64]:
     """(positions along the foot, middles between both sides there)."""
-    levels = np.linspace(places[:, 1].min(), places[:, 1].max(), 12)
+    levels = np.linspace(positions[:, 1].min(), positions[:, 1].max(), 12)
     middles = []
     for level in levels:
-        near = places[np.abs(places[:, 1] - level) < 0.02, 0]
+        near = positions[np.abs(positions[:, 1] - level) < 0.02, 0]
         middles.append((near.min() + near.max()) / 2)
     return levels, np.array(middles)
 
@@ -162,11 +162,11 @@ def _level(outline: Float64, lift: Float64, height: float) -> Float64:
     return np.stack([outline[:, 0], outline[:, 1], lift + height], axis=1)
 
 
-def _nearest_weights(places: Float64, foot: Float64, weights: Float64) -> Float64:
+def _nearest_weights(positions: Float64, foot: Float64, weights: Float64) -> Float64:
     """(N, J) weights averaged over the nearest vertices of the foot."""
     from scipy.spatial import cKDTree
 
-    away, rows = cKDTree(foot).query(places, k=12)
+    away, rows = cKDTree(foot).query(positions, k=12)
     share = 1 / (away + 0.01) ** 2
     share /= share.sum(axis=1, keepdims=True)
     return np.einsum("nk,nkj->nj", share, weights[rows])

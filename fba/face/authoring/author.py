@@ -35,6 +35,7 @@ from fba.face.authoring.surface.motion import Motion, build_tables, split_by_par
 from fba.face.authoring.surface.motion_limits import eased_linear_motion, stop_at_folds
 from fba.face.authoring.surface.unfold import unfold
 from fba.face.expressions import Definitions
+from fba.face.eyeball import PUPIL_FAP
 from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part
 from fba.face.points import OPEN_JAW, SHIFT_JAW, THRUST_JAW
@@ -46,9 +47,8 @@ if TYPE_CHECKING:
 
 
 MOST_VERTICES = 250_000
-"""Denser meshes are refused: they show no more, and would take minutes and gigabytes."""
+"""Denser meshes are refused: they look no better, and would take minutes and gigabytes."""
 EYE_FAPS = {"left": (23, 25, 27), "right": (24, 26, 28)}
-PUPIL_FAPS = {"left": 29, "right": 30}
 HEAD_AXES = {48: (1.0, 0.0, 0.0), 49: (0.0, 1.0, 0.0), 50: (0.0, 0.0, 1.0)}
 JAW_FAPS = (OPEN_JAW, THRUST_JAW, SHIFT_JAW)
 LIP_POINTS = tuple(name for pair in HANDLES.values() for name in pair)
@@ -67,15 +67,15 @@ def author(
 ) -> FaceModel:
     """A face whose tables are made from the shape of the mesh alone.
 
-    parts: the skin, and where there are such: eyeballs (one part each), teeth, tongue, the inside of
-    the mouth, brows, lashes, hair; upright, looking along +z, metres. points: (84, 3), rows as
+    parts: the skin, and if present eyeballs (one part each), teeth, tongue, the inside of the mouth,
+    brows, lashes, hair; upright, looking along +z, metres. points: (84, 3), rows as
     `feature_point_names()`, NaN where unknown; they are moved onto their vertices. bound: (84,) the
-    vertices they stand on, counted through the parts, -1 for the nearest. definitions, fit, notes, name:
-    as in `FaceModel`.
+    vertices they stand on, counted through the parts, -1 for the nearest vertex. definitions, fit, notes,
+    name: as in `FaceModel`.
 
     FAPs for which a point or part is missing are in the model's `lost`, with the reason. Raises
-    ModelError where there is no skin, a FAPU is not positive, most points are far from the mesh, or it
-    has more than a quarter of a million vertices.
+    ModelError without skin, if a FAPU is not positive, if most points are far from the mesh, and for more
+    than 250,000 vertices.
     """
     parts = tuple(parts)
     given = np.array(points, dtype=np.float64)
@@ -196,11 +196,11 @@ class _Authoring:
             self.lost |= dict.fromkeys(JAW_FAPS, jaw)
             return
         values, angles = opening_angles(jaw, self.marks.fapu.MNS)
-        shares = {
-            part.name: jaw_share_of_part(self.marks, part, jaw.hinge)
+        inner = [
+            (part, jaw_share_of_part(self.marks, part, jaw.hinge)[:, None])
             for part in self.parts
             if part.kind in ("teeth", "tongue")
-        }
+        ]
         points = self.marks.surface.vertices
         moving = np.flatnonzero(jaw.share)
         shifts = opening_shifts(points[moving], jaw, angles) * jaw.share[moving][:, None]
@@ -211,25 +211,22 @@ class _Authoring:
         self._add_to_surface(OPEN_JAW, motion)
         # teeth and tongue stop where the skin stops
         reached = jaw_angles_at_values(motion, values, angles)
-        for part in self.parts:
-            if part.name in shares:
-                shifts = opening_shifts(part.vertices.astype(np.float64), jaw, reached)
-                self._add_inner(OPEN_JAW, part, motion.values, shifts * shares[part.name][:, None])
+        for part, share in inner:
+            shifts = opening_shifts(part.vertices.astype(np.float64), jaw, reached) * share
+            self._add_inner(OPEN_JAW, part, motion.values, shifts)
         for fap in (THRUST_JAW, SHIFT_JAW):
-            self._add_sliding(fap, jaw, shares)
+            self._add_sliding(fap, jaw, inner)
 
-    def _add_sliding(self, fap: int, jaw: Jaw, shares: dict[str, Float64]) -> None:
-        """Add FAP 14 or 15, which slides the jaw. shares: of the parts in the mouth that move, by name."""
+    def _add_sliding(self, fap: int, jaw: Jaw, inner: list[tuple[Part, Float64]]) -> None:
+        """Add FAP 14 or 15, which slides the jaw. inner: parts in the mouth with shares (V, 1)."""
         moving = np.flatnonzero(jaw.sliding)
         pinned = self.marks.surface.mask(self.marks.vertices_of((*CHIN, *LIP_POINTS)))
         sliding = jaw.sliding[moving][:, None] * self.marks.step(fap)
         motion = eased_linear_motion(self.marks.surface, self.limiter, moving, sliding, fap, pinned)
         self._add_to_surface(fap, motion)
         chin = int(np.flatnonzero(motion.vertices == self.marks.vertex["2.1"])[0])
-        for part in self.parts:
-            if part.name in shares:
-                shifts = motion.shifts[:, chin, None] * shares[part.name][:, None]
-                self._add_inner(fap, part, motion.values, shifts)
+        for part, share in inner:
+            self._add_inner(fap, part, motion.values, motion.shifts[:, chin, None] * share)
 
     def _add_inner(self, fap: int, part: Part, values: Float64, shifts: Float64) -> None:
         """Add the shifts (K, V, 3) of a part in the mouth to a FAP."""
@@ -250,15 +247,15 @@ class _Authoring:
         for side, eye in self.eyes.items():
             if not eye.measured:
                 reason = f"there is no {side} eyeball"
-                self.lost |= dict.fromkeys((*EYE_FAPS[side], PUPIL_FAPS[side]), reason)
+                self.lost |= dict.fromkeys((*EYE_FAPS[side], PUPIL_FAP[side]), reason)
                 continue
             for fap in EYE_FAPS[side]:
                 self.turns[fap] = eye_transforms(fap, eye)
-            pupils = pupil_motions(self.marks, eye, PUPIL_FAPS[side], self.parts)
+            pupils = pupil_motions(self.marks, eye, PUPIL_FAP[side], self.parts)
             if pupils:
-                self.moves[PUPIL_FAPS[side]] = pupils
+                self.moves[PUPIL_FAP[side]] = pupils
             else:
-                self.lost[PUPIL_FAPS[side]] = f"the {side} eyeball has no vertices about its pupil"
+                self.lost[PUPIL_FAP[side]] = f"the {side} eyeball has no vertices about its pupil"
 
     def _add_tongue(self) -> None:
         tongues = [part for part in self.parts if part.kind == "tongue" and len(part.vertices)]

@@ -44,7 +44,7 @@ REGIONS = (
     (*range(4, 14), 16, 17, *range(51, 61)),
     (*range(61, 65),),
 )
-"""FAPs that move the same stretch of skin."""
+"""FAPs that move the same area of skin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,15 +186,14 @@ class Mixer:
         return np.asarray(step + self.weights @ rest)
 
     def replacement_tables(self, fap: int, shapes: list[str]) -> FaceDefTables | None:
-        """Tables of a FAP that the mesh alone cannot serve, linear along shapes, or None."""
+        """Tables of a FAP for which the mesh alone gives none, linear along shapes, or None."""
         entry = faps()[fap - 1]
         name = entry.feature_points[0]
         vertex = int(self.base.bound[row_of()[name]])
         if vertex < 0 or entry.positive not in DIRECTIONS:
             return None
         field = np.sum([self.shapes.displacements(shape) for shape in shapes], axis=0)
-        way = np.array(DIRECTIONS[entry.positive])
-        along = float(field[vertex] @ way)
+        along = float(field[vertex] @ np.array(DIRECTIONS[entry.positive]))
         if not along > 0:
             return None
         step = field * self.base.fapu[entry.unit] / along

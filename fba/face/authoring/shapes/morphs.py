@@ -1,10 +1,10 @@
-"""From a mesh with shapes (the 52 of ARKit, or one a FAP) to a face model whose FAPs use them.
+"""Makes a face model from a mesh with shapes: the 52 of ARKit, or one for each FAP.
 
-How far each shape moves each feature point is measured; for each group of FAPs that shapes move together
-(a brow, a lip) and each direction the shapes are mixed so that its points move as the standard wants and
-the others least. The remaining errors at the points are corrected with the tables that `author` makes from
-the mesh alone, so every point moves exactly as far as its FAP says, and the sculptor's shapes show between
-the points.
+How far each shape moves each feature point is measured. For each group of FAPs that shapes move together
+(a brow, a lip), in each direction, shapes are mixed so that the group's points move as the standard says and
+the others as little as possible. Errors that remain at the points are corrected with the tables that `author`
+makes from the mesh alone: every point moves exactly as far as its FAP says, and between the points the
+sculptor's shapes show.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
     from fba.face.interpolation.table import InterpolationTable
 
 FEWEST_FAPS = 5
-"""Number of shapes named after FAPs from which these names are used."""
+"""With at least this many shapes named after FAPs, only these are used."""
 ARCS = frozenset((3, *range(19, 31), *range(43, 51)))
-"""FAPs whose points move on arcs, or as bodies: jaw, lids, eyeballs, tongue, head. A shape is straight;
-it serves them only where the mesh alone cannot."""
+"""FAPs whose points move on arcs: jaw, lids, eyeballs, tongue, head. A shape is straight, and is used for
+these only where the mesh alone gives no table."""
 REPLACEMENT_SHAPES = {
     3: ("jawOpen", "mouthClose"),
     19: ("eyeBlinkLeft",),
     20: ("eyeBlinkRight",),
     45: ("tongueOut",),
 }
-"""Shapes that serve a FAP where the mesh alone cannot."""
+"""Shapes that are used for FAPs where the mesh alone gives no table."""
 
 
 def from_morphs(
@@ -54,14 +54,14 @@ def from_morphs(
     fit: InterpolationTable | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> FaceModel:
-    """A face whose tables are made from named shapes where these suffice, else from the mesh alone.
+    """A face whose tables are made from named shapes where they suffice, otherwise from the mesh alone.
 
     parts, points, bound, name, definitions, fit, notes: as `author`. morphs: displacements float32
     (V, 3), metres, at weight 1, by the name of the shape and of the part; shapes are named as ARKit's
-    blendshapes (synonyms: `arkit.csv`) or as FAPs. Others are left aside.
+    blendshapes (synonyms: `arkit.csv`) or as FAPs. Others are ignored.
 
-    FAPs that neither serves are in `lost`. Raises ModelError as `author`, and where displacements do not
-    fit their part.
+    FAPs for which neither suffices are in `lost`. Raises ModelError as `author`, and where displacements do
+    not fit their part.
     """
     base = author(parts, points, bound=bound, name=name, definitions=definitions, fit=fit, notes=notes)
     by_fap = {number: shape for shape in morphs if (number := fap_of(shape)) is not None}
@@ -84,6 +84,7 @@ def from_morphs(
 
 
 def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
+    """The face with tables from ARKit's shapes."""
     mixer = Mixer(base, shapes)
     tables: dict[int, FaceDefTables] = dict(base.table_of)
     used: set[str] = set()
@@ -107,7 +108,7 @@ def _from_arkit(base: FaceModel, shapes: Shapes) -> FaceModel:
 
 
 def _from_faps(base: FaceModel, shapes: Shapes, by_fap: Mapping[int, str]) -> FaceModel:
-    """Shapes that show one FAP each, at the values at which this project's files show them."""
+    """The face with tables from shapes that show one FAP each, at its value in `morph_values`."""
     from fba.face.gltf.morphs import morph_values
 
     tables: dict[int, FaceDefTables] = dict(base.table_of)
