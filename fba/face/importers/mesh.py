@@ -70,8 +70,8 @@ def polygon_pieces(polygons: Polygons, materials: Mapping[str, Material]) -> lis
 def _point_positions(polygons: Polygons, given: GivenPoints, path: str) -> tuple[Float64, dict[str, int]]:
     """Positions (84, 3) of the points in the mesh's unit, and their vertices.
 
-    A vertex says more than a position, which may be of another unit; an FbaWarning names those that
-    disagree. Points of the wrong side are put right.
+    Vertices decide, as positions may be in another unit; an FbaWarning names points where both disagree.
+    Points on the wrong side of the face are corrected.
     """
     positions = given.points.copy()
     vertices = dict(given.vertices)
@@ -92,7 +92,7 @@ def _point_positions(polygons: Polygons, given: GivenPoints, path: str) -> tuple
         vertices.pop(name, None)
     if swaps or mirrored:
         warnings.warn(
-            f"{path}: feature points of the wrong side of the face put right: "
+            f"{path}: feature points on the wrong side of the face corrected: "
             f"{', '.join([*mirrored, *(f'{a} with {b}' for a, b in swaps)][:8])}",
             FbaWarning,
             stacklevel=4,

@@ -30,7 +30,9 @@ WIDER = 1.2
 LEAST_PULL = 0.1
 """Share of a pull that the root of the ear makes."""
 SMOOTHINGS = 6
+"""Rounds of averaging shares with those of neighbours."""
 HEM = 0.006
+"""Shares of a motion below this are set to 0."""
 
 
 def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:

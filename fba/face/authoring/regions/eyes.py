@@ -22,7 +22,7 @@ PUPIL_OF_IRIS = 1 / 3
 PUPIL_REACH = 1.5
 """An eyeball without vertices this close to its axis, in radii of the pupil, has no pupil to move."""
 SMALLEST_PUPIL, LARGEST_PUPIL = 0.3, 0.9
-"""Share of the pupil's, and of the iris's radius, at which the pupil stops."""
+"""Radii at which the pupil stops: shares of its neutral radius, and of that of the iris."""
 
 YAW, PITCH = ("rotation", (0.0, 1.0, 0.0)), ("rotation", (1.0, 0.0, 0.0))
 THRUST = ("translation", (0.0, 0.0, 1.0))

@@ -23,30 +23,30 @@ STILL = (*EARS, "3.9", "3.10", "5.3", "5.4", "8.1", "9.1", "9.2", "9.3", "9.15",
 REACH = 1.5
 """Reach of the jaw's motion into cheeks and neck, in ES0."""
 NECK = 0.1
-"""Open edges of the skin this far below the chin, in ES0, are where the neck was cut."""
+"""Open edges of the skin further below the chin than this, in ES0, are where the neck was cut."""
 CORNER = 0.6
-"""Share of the jaw's turn that the skin over its corners makes."""
+"""Share of the jaw's rotation that the skin over its corners makes."""
 WIDEST = np.radians(30.0)
 """Largest opening of the jaw, radians."""
 SLIDE = (0.35, 0.1)
 """Motion of the hinge forwards and down per radian, in ES0: some 11 mm when wide open."""
 INTERVAL = np.radians(3.0)
-"""The arc is cut into intervals no longer than this."""
+"""Longest interval into which the arc is cut, radians."""
 LIP_RIDE = 0.5
-"""Share of a sliding jaw's motion that the lower lip makes. It does not follow an opening jaw: it has its
-own FAPs for that."""
+"""Share of a sliding jaw's motion that the lower lip makes. An opening jaw does not move the lip, which has
+FAPs of its own."""
 SLACK = 0.2
 """Distance in ES0 beyond which the skin does not overshoot."""
 HEM = 0.004
 """Shares of a motion below this are set to 0."""
 TEETH_MARGIN = 0.12
-"""In a piece of teeth the jaw's share goes from 0 to 1 within this height about their edge, in MNS0."""
+"""Height about the teeth's edge over which the jaw's share goes from 0 to 1, in MNS0."""
 CHEEK_MARGIN = 0.4
-"""The inside of the mouth stretches over at least this height above and below the teeth's edge, in MNS0."""
+"""Height above and below the teeth's edge over which the inside of the mouth may stretch, in MNS0."""
 MIXED = 0.15
-"""Teeth further than this from half above and half below their common edge belong to one jaw."""
+"""Teeth of which half plus this share lies on one side of their common edge belong to one jaw."""
 LIP_DEPTH = 0.16
-"""From this far behind the lips on, in ES0, the inside of the mouth belongs to the jaws."""
+"""Distance from the lips beyond which the inside of the mouth moves as the jaws do, in ES0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
 def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
     """(V,) share of the jaw's turn at each vertex of a part inside the mouth.
 
-    A connected piece on one side of the teeth's edge moves as one: a tooth does not bend.
+    A connected piece on one side of the teeth's edge moves as one, as teeth do not bend.
     """
     if part.kind == "tongue":
         return np.ones(len(part.vertices))
@@ -140,7 +140,7 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
         row = _by_teeth_points(marks, part)
         if row is not None:
             return np.full(len(part.vertices), row)
-        # decided for the whole set first, then for each piece: an overbite must not move upper teeth
+        # decided for the whole row first, then for each piece: an overbite must not move upper teeth
         if abs(float(each.mean()) - 0.5) > MIXED:
             return np.full(len(part.vertices), float(each.mean() > 0.5))
         count = np.bincount(shape.component)

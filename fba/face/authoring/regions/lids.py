@@ -32,7 +32,7 @@ from fba.face.authoring.surface.weights import average_with_neighbours, trim_sma
 from fba.face.model import Part
 
 STEP = 128
-"""Values between two borders of the tables: an eighth of the way."""
+"""Values between two borders of the tables: an eighth of the way from open to closed."""
 REACH = 0.6
 """Largest reach of a lid's motion into the skin around it, in ES0."""
 CREASE = 0.11
@@ -53,15 +53,17 @@ EDGE = 0.4
 FURTHER = 0.2
 """Share by which the front edge of a lid may move further than the margin."""
 OWN_SIDE = 0.6
-"""Share of the way from the other lid below which vertices follow this one less and less."""
+"""Share of the distance between the lids: vertices that are nearer to the other lid follow less."""
 NARROW = 0.4
 """Factor of distances at the corners of the eye."""
 SMOOTHINGS = 4
+"""Rounds of averaging shares with those of neighbours."""
 STILL = {
     "left": ("4.1", "4.3", "4.5", "9.7", "9.13", "5.3", "9.12"),
     "right": ("4.2", "4.4", "4.6", "9.6", "9.14", "5.4", "9.12"),
 }
 HEM = 0.006
+"""Shares of a motion below this are set to 0."""
 CORNER = 0.12
 """Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
 
@@ -89,7 +91,7 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
     shifts = push_vertices_outside(profile, points, motion.shifts, values)
     shifts = push_edges_outside(profile, marks.surface, motion.vertices, shifts, pinned, values)
     motion = Motion(values, motion.vertices, shifts)
-    # in the corners skin closes on itself
+    # in the corners of the eye, skin closes on itself
     ends = marks.surface.vertices[own[[0, -1]]]
     near = np.linalg.norm(marks.surface.vertices[margins][:, None] - ends, axis=2).min(axis=1)
     corners = margins[near < CORNER * np.linalg.norm(ends[1] - ends[0])]
@@ -97,7 +99,7 @@ def lid_motion(marks: Landmarks, limiter: Limiter, eye: Eye, fap: int, parts: Se
 
 
 def lid_values(fap: int) -> Float64:
-    """(K,) rising borders over the FAP's range, extended to all of the way to the other lid."""
+    """(K,) rising borders over the FAP's range, extended to where the lid meets the other one."""
     low, high = fap_limits(fap)
     high = max(high, float(CLOSED))
     between = np.arange(np.ceil(low / STEP) * STEP, high + 1, STEP)

@@ -49,21 +49,23 @@ ALONG = {
     16: {"lower middle": 1.0, "lower left": 0.8, "lower right": 0.8},
     17: {"upper middle": 1.0, "upper left": 0.8, "upper right": 0.8},
 }
-"""FAPs that move more handles than their own: a stretched lip keeps its points evenly spaced."""
+"""Shares of handles that FAPs move besides their own: a stretched lip keeps its points evenly spaced."""
 PUSH = (16, 17)
 OUTER_PUSH = 0.9
-"""Share of a push of the inner contour that the outer one makes, which has no such FAP."""
+"""Share of a push of the inner contour with which the outer one, which has no such FAP, follows."""
 REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.3
+"""Reach into the mouth, in ES0."""
 STILL = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
 """Feature points that the lips do not move."""
 SLACK = 0.25
 """Distance in ES0 beyond which the skin does not overshoot."""
 HEM = 0.006
+"""Shares of a motion below this are set to 0."""
 TANGENT = 1.0
-"""1 makes straight lines through the points stay straight, 0 keeps the shares of far points from dipping
-below 0; between them lies what looks best."""
+"""Slope of the curve at its points: with 1, straight lines through the points stay straight; with 0, shares
+never get negative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +154,7 @@ def _fields(marks: Landmarks) -> _Lips:
     for name, pair in HANDLES.items():
         for point in pair:
             if marks.has(point) and not np.isnan(values[marks.vertex[point], 0]):
-                # where one contour runs through a point of the other, the point comes first
+                # where one contour runs through a point of the other, the point decides
                 values[marks.vertex[point]] = np.array(names) == name
     fixed = np.flatnonzero(~np.isnan(values[:, 0]))
     es = marks.fapu.ES * 1024
@@ -187,8 +189,7 @@ def _inward(marks: Landmarks) -> Float64:
 def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int) -> tuple[Motion, Motion]:
     """(inner, outer) motions of a pair of FAPs whose sum stays linear although each alone is limited.
 
-    Where one contour gets as close to the other as the skin between them allows, it stops; from there on it
-    moves with the other one.
+    A contour that gets as close to the other as the skin between them allows goes on with the other one.
     """
     low, high = fap_limits(fap)
     vertices = np.flatnonzero((np.abs(inner) + np.abs(outer)).max(axis=1) > 0)
@@ -221,8 +222,9 @@ def _coupled_motions(limiter: Limiter, inner: Float64, outer: Float64, fap: int)
 
 
 def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) -> Float64:
-    """(M, K) weights of the vertices of a walk for the K nodes along it: smooth, 1 at the own node, 0 at the
-    others, with a sum of 1 everywhere.
+    """(M, K) weights of the vertices of a walk for the K nodes along it, with a sum of 1 everywhere.
+
+    A weight is 1 at its own node, 0 at the others, and smooth between.
 
     vertices: (N, 3). walk: (M,) vertices from the first to the last node. nodes: the vertex of each
     node, None for nodes that the face does not have: they lie evenly between the others.

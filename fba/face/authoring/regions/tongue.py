@@ -16,8 +16,9 @@ from fba.face.points import TONGUE_ROLL
 FAPS = (43, 44, 45, 46, 47)
 POINTS = {43: ("6.1",), 44: ("6.1",), 45: ("6.1",), 46: ("6.2",), 47: ("6.2", "6.3", "6.4")}
 TIP_BEND = 2.0
-"""Power of the length with which the tip's motion falls off to the root: the tongue bends, not shears."""
+"""Power of the length with which the tip's motion falls off to the root, so that the tongue bends."""
 ROLL_STEPS = 8
+"""Number of values at which the roll is computed."""
 
 
 def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:

@@ -23,13 +23,13 @@ from fba.face.tables import FaceDefTables
 from fba.parameters import faps
 
 OWN, ELSEWHERE, ACROSS = 3.0, 1.0, 0.5
-"""Weights of the points that are to move, of the other points, and of directions across the way."""
+"""Weights of the points that are to move, of the other points, and of directions across the motion."""
 RIDGE = 0.05
-"""Regularisation of the weights: a shape at weight 1 costs as much as 5 % of the way at another point."""
+"""Regularisation: a shape at weight 1 costs as much as 5 % of the motion at another point."""
 MOST_WEIGHT = 1.25
 """A shape is used up to this weight for a typical value of the FAP."""
 LEAST_SHARE, LEAST_OF_ONE = 0.5, 0.25
-"""Shapes must move a group's points by the first share of the way on average, each by the second at least."""
+"""Least shares of their target by which shapes must move a group's points: on average, and each of them."""
 FULL_WEIGHT = 0.15
 """Weight of the mesh's own tables from which shapes are used in full; they fade out below."""
 GROUPS = (
@@ -66,12 +66,12 @@ class Mixer:
 
     @cached_property
     def vertices(self) -> Intp:
-        """(P,) vertices that the points stand on."""
+        """(P,) vertices of the points."""
         return np.array([self.base.bound[row_of()[name]] for name in self.points], dtype=np.intp)
 
     @cached_property
     def weights(self) -> Float64:
-        """(V, P) share of each point's way that each vertex makes when the point's own table moves it."""
+        """(V, P) share of each point's motion that each vertex makes when the point's own table moves it."""
         columns = [self.weight(fap) for fap in self.points.values()]
         return np.stack(columns, axis=1) if columns else np.zeros((len(self.base.vertices), 0))
 
@@ -86,7 +86,7 @@ class Mixer:
         return np.asarray(np.array(DIRECTIONS[entry.positive]) * self.base.fapu[entry.unit])
 
     def weight(self, fap: int) -> Float64:
-        """(V,) share of its point's way that each vertex makes for small values of a FAP."""
+        """(V,) share of the motion of its point that each vertex makes for small values of a FAP."""
         field = first_steps(self.base, fap, 1.0)
         entry = faps()[fap - 1]
         return np.asarray(field @ np.array(DIRECTIONS[entry.positive]) / self.base.fapu[entry.unit])

@@ -1,4 +1,4 @@
-"""Binds feature points to the vertices that they stand on."""
+"""Binds feature points to vertices."""
 
 from __future__ import annotations
 
@@ -27,15 +27,17 @@ SURFACE_KINDS = ("skin", "mouth")
 TOLERANCE = 0.15
 """A point may lie this far from its part, as a share of the face's size."""
 LIP_SLACK = 0.02
-"""The right one of two touching lips may be this much further away, as a share of the face's size."""
+"""How much further away than the nearest lip a point's own lip may be, as a share of the face's size."""
 JAW_OF_TEETH = {"9.8": 1, "9.10": 1, "9.9": -1, "9.11": -1}
 UPPER_LIP, LOWER_LIP = ("2.2", "2.6", "2.7"), ("2.3", "2.8", "2.9")
 
 
 @dataclass(frozen=True)
 class Binding:
-    """points: float64 (84, 3), on their vertices where bound. bound: int32 (84,), -1 where free.
-    far: points that are too far from what they should stand on, with the distance in metres.
+    """Feature points and their vertices.
+
+    points: float64 (84, 3), on their vertices where bound. bound: int32 (84,), -1 where free. far: distance,
+    metres, of points that are too far from the part they belong to.
     """
 
     points: Float64
@@ -56,8 +58,8 @@ def face_size(points: Float64) -> float:
 def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | None) -> Binding:
     """Feature points (84, 3) bound to the nearest vertices of the parts that they belong to.
 
-    bound: vertices chosen by the caller, -1 where the nearest is to be taken. Raises ModelError where
-    most points are nowhere near the mesh, or a chosen vertex does not exist.
+    bound: (84,) vertices set by the caller, -1 for the nearest. Raises ModelError where most points are far
+    from the mesh, or a vertex does not exist.
     """
     size = face_size(points)
     given = np.full(len(points), -1) if bound is None else np.array(bound)
@@ -160,8 +162,7 @@ def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, sla
 def lip_sides(surface: Surface, parts: Sequence[Part], bound: Int32) -> Intp | None:
     """(V,) for the skin's vertices: 1 on the upper edge of the mouth, 2 on the lower, 0 elsewhere, or None.
 
-    None unless the mouth is a slit whose two edges coincide, so that they were taken for a seam and
-    joined.
+    None unless the mouth is a slit whose two edges coincide and were joined like a seam.
     """
     left, middle, right = surface.find(bound[[row_of()[name] for name in ("2.4", "2.2", "2.5")]]).tolist()
     if min(left, middle, right) < 0:

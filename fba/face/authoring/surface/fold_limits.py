@@ -11,19 +11,19 @@ import numpy as np
 from fba.arrays import Bool, Float64, Intp
 
 LEAST_AREA = 0.12
-"""A triangle seen along its neutral normal keeps this share of its area."""
+"""Least share of its area that a triangle keeps, seen along its neutral normal."""
 MOST_STRETCH = 5.0
-"""No edge gets longer than this many times its neutral length..."""
+"""Largest length of an edge, in multiples of its neutral length..."""
 TINY_EDGE = 0.25
-"""... or, for short edges, of this share of the typical edge length of what moves."""
+"""... or, for short edges, of this share of the typical edge length among the moving triangles."""
 FOLDED = -0.3
-"""A triangle whose normal has this cosine with that of its neighbours lies folded on them."""
+"""A triangle is folded if its normal has a smaller cosine than this with that of its neighbours."""
 SPECK = 0.0015
-"""Share of the moving surface that may lie folded where skin closes on itself."""
+"""Share of the moving area that may be folded where skin closes on itself."""
 FEW_VERTICES = 0.1
-"""Up to this share of all vertices, their triangles are looked up one vertex at a time."""
+"""Up to this share of all vertices, triangles are looked up vertex by vertex, which is faster."""
 DEGENERATE = 1e-5
-"""Triangles of less than this share of the typical area have no front to turn."""
+"""Triangles of less than this share of the typical area count as lines, which cannot fold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Limiter:
 
     @classmethod
     def from_mesh(cls, vertices: Float64, triangles: Intp) -> Limiter:
-        """The limiter of a mesh; triangles without area are left out, as they have no front to turn."""
+        """The limiter of a mesh; triangles without area are left out: they cannot fold."""
         areas = np.linalg.norm(np.cross(*_two_edges(vertices, triangles)), axis=1)
         typical = float(np.median(areas)) if len(areas) else 0.0
         return cls(vertices, triangles[areas > DEGENERATE * typical])
@@ -104,10 +104,10 @@ class Limiter:
         return float(areas[~fine].sum()) <= SPECK * float(areas.sum())
 
     def soundness(self, shifts: Float64, triangles: Intp, *, turning: bool = False) -> Bool:
-        """(M,) which triangles neither fold nor tear under shifts (N, 3).
+        """(M,) mask of the triangles that neither fold nor tear under shifts (N, 3).
 
-        turning: the skin may rotate, as a lid does about the eyeball; then a triangle has folded where it
-        faces away from its neighbours, not where it faces away from its neutral direction.
+        turning: the skin may rotate, as a lid does about the eyeball; then a triangle counts as folded if it
+        faces away from its neighbours, not if it faces away from its neutral direction.
         """
         e1, e2 = _two_edges(self.vertices, triangles)
         f1, f2 = _two_edges(self.vertices + shifts, triangles)

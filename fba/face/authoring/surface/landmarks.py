@@ -29,10 +29,10 @@ CONTOURS = {
     "right lower lid": ("3.8", "3.4", "3.12"),
     "jaw line": ("2.13", "2.11", "2.1", "2.12", "2.14"),
 }
-"""Lines on the face by the feature points that they run through."""
+"""The feature points that each contour runs through."""
 LIP_CONTOURS = tuple(name for name in CONTOURS if name.endswith("lip"))
 OPENINGS = {name for name in CONTOURS if name.endswith(" lid") or "inner" in name}
-"""Contours about an opening, which in many meshes is a hole."""
+"""Contours around an opening of the face, which in many meshes is a hole."""
 
 
 @dataclass(eq=False)
@@ -69,7 +69,7 @@ class Landmarks:
         return step
 
     def missing_point(self, fap: int) -> str:
-        """Why the surface cannot follow a FAP: its feature point is not on it; empty where it is."""
+        """Why the surface cannot follow a FAP, if the FAP's feature point is not on it; otherwise empty."""
         point = faps()[fap - 1].feature_points[0]
         return "" if self.has(point) else f"feature point {point} is not on the skin"
 
@@ -94,7 +94,7 @@ class Landmarks:
 
     @cached_property
     def inside_mouth(self) -> Bool:
-        """(N,) mask of the vertices behind the inner lips, which these separate from the outer face."""
+        """(N,) mask of the vertices that the inner lips separate from the outer face."""
         return self._cut_off(("upper inner lip", "lower inner lip"))
 
     @cached_property
@@ -147,7 +147,7 @@ class Landmarks:
 
 
 def find_landmarks(surface: Surface, points: Float64, bound: Int32) -> Landmarks:
-    """Landmarks of a surface.
+    """The feature points and contours of a face on its surface.
 
     points: (84, 3), metres. bound: (84,), vertices counted through all parts, -1 where free.
     """

@@ -1,4 +1,4 @@
-"""Limits motions to what the mesh can follow without folding; beyond that, vertices stop."""
+"""Limits motions to what the mesh can follow without folding; beyond that, its vertices stop."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from fba.face.authoring.surface.surface import Surface
 from fba.face.authoring.surface.unfold import ease_field
 
 EASE = (0.75, 1.25)
-"""A motion slows to half speed at the first share of the largest sound value and stops at the second."""
+"""Shares of the largest value without folds at which a motion slows to half speed, and at which it stops."""
 MODERATE = 320.0
-"""A FAP moves linearly at least up to this value (or its limit), where easing the skin around allows."""
+"""Value (or limit of the FAP, if lower) up to which motions are kept linear by easing the skin around."""
 HALVINGS = 7
 """Steps of bisection for the point at which a motion must stop."""
 LEAST_REACH = 0.98
-"""Motions are not slowed where the mesh can follow to this share of the limit."""
+"""Motions that can reach this share of the limit without folds are not slowed."""
 
 
 def soft_limit(value: float, most: float) -> float:
-    """The value, slowed to half speed near `most` and stopped soon beyond it (`EASE`)."""
+    """The value, growing at half speed near `most` and no more soon beyond it (`EASE`)."""
     size = abs(value)
     slow, stop = EASE[0] * most, EASE[1] * most
     result = min(size, slow) + 0.5 * max(min(size, stop) - slow, 0.0)
@@ -38,7 +38,7 @@ def knots(most: float, limit: float) -> list[float]:
 
 
 def values_between(low: float, high: float, *bends: float) -> Float64:
-    """Rising whole values from low to high with 0 and the given bends that lie between."""
+    """Rising whole values: low, high, 0 and the given bends between them."""
     inner = {0, *(round(bend) for bend in bends if low < round(bend) < high)}
     return np.array(sorted({round(low), round(high)} | inner), dtype=np.float64)
 
@@ -54,7 +54,7 @@ def _human_ranges() -> dict[int, tuple[float, float]]:
 
 
 def human_range(fap: int) -> tuple[float, float]:
-    """Sizes of the smallest and largest value of a FAP on a human face, with a margin; inf where unlisted."""
+    """Sizes of the smallest and largest value of a FAP on human faces, with a margin; inf if not listed."""
     return _human_ranges().get(fap, (np.inf, np.inf))
 
 
@@ -63,8 +63,8 @@ def eased_linear_motion(
 ) -> Motion:
     """The motion of a FAP by value x field (N, 3) metres, limited where triangles would fold.
 
-    vertices: (N,), of the surface. pinned: mask of the surface's vertices that move exactly so; around
-    others the field is eased where it folds too early.
+    vertices: (N,), of the surface. pinned: mask of the surface's vertices whose motion must not change; that
+    of others is eased where triangles would fold early.
     """
     eased = ease_field(surface, limiter, limiter.spread(vertices, field), values_to_reach(fap), pinned)
     vertices = np.flatnonzero(eased.any(axis=1))
@@ -133,7 +133,7 @@ def _stop_one_side(
         share = _last_sound_share(limiter, motion, shifts, motion.shifts[k], triangles, turning)
         end = float(np.round(value + (motion.values[k] - value) * share))
         if end != value:
-            # rounded to a whole value, so that the slope up to here stays what it was
+            # values are whole; the slope up to here stays the same
             share = (end - value) / (motion.values[k] - value)
             shifts = shifts * (1 - share) + motion.shifts[k] * share
             steps.append((end, shifts))

@@ -14,11 +14,11 @@ from fba.face.authoring.surface.surface import Surface
 RINGS = 3
 """Vertices up to this many edges away from folded triangles may be eased."""
 STAGES = (0.4, 0.7, 1.0)
-"""Shares of a goal, in the order in which they are tried: early folds are the worst."""
+"""Shares of a goal in the order in which they are tried: early folds are the worst."""
 LEAST_RETAINED = 0.88
-"""Easing towards one goal must leave at least this share of what another reached."""
+"""Least share of what one goal reached that easing towards another must leave."""
 ROUNDS = 2
-"""Easing one spot may fold its neighbours: number of passes."""
+"""Number of passes: easing some triangles may fold their neighbours."""
 
 
 def unfold(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:

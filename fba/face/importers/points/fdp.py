@@ -53,7 +53,7 @@ def _load_text(path: str) -> Fdp:
                 )
             header = True
         elif tokens[0] in ("NUL", "NLL"):
-            continue  # how many points the inner lips have in another player
+            continue  # the number of points of the inner lips, for another player
         elif len(tokens) not in (4, 5):
             raise ModelError(
                 f"{where}: a feature point is 'GROUP.INDEX x y z MESH.VERTEX', not {' '.join(tokens)[:60]!r}"

@@ -47,7 +47,7 @@ class Fdp:
     """The content of an FDP file.
 
     path: the file. format: "text" or "xface". points: float64 (84, 3), in the file's own unit, NaN where
-    it says nothing. vertices: the mesh (as the file names it) and the vertex of a point, by its name.
+    it gives none. vertices: the mesh (as the file names it) and the vertex of a point, by its name.
     distances: the face's distances ENS0, ES0, IRISD0, MNS0, MW0 as Xface files give them. meshes,
     influences: of Xface files.
     """
@@ -68,7 +68,7 @@ def repair_sides_with_warning(points: Float64, path: str, *, stacklevel: int = 2
     changed += [f"{name} is on the other side" for name in mirrored]
     if changed:
         warnings.warn(
-            f"{path}: put right (+x is the subject's left): {'; '.join(changed[:6])}"
+            f"{path}: corrected (+x is the subject's left): {'; '.join(changed[:6])}"
             + (f"; and {len(changed) - 6} more" if len(changed) > 6 else ""),
             FbaWarning,
             stacklevel=stacklevel + 1,
@@ -77,9 +77,9 @@ def repair_sides_with_warning(points: Float64, path: str, *, stacklevel: int = 2
 
 
 def repair_sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[str]]:
-    """Points (84, 3) on the right sides of the face; pairs that were swapped, and points that were mirrored.
+    """(points (84, 3) on their own sides of the face, pairs that were swapped, points that were mirrored).
 
-    As they are where most pairs have no left and right in x: then the axes are others than the standard's.
+    Unchanged where most pairs do not lie left and right in x: then the axes are not the standard's.
     """
     points = points.copy()
     row = row_of()
@@ -106,7 +106,7 @@ def repair_sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[
                 points[row[name], 0] = 2 * middle - points[row[name], 0]
                 mirrored.append(name)
     for inner, outer in (("3.8", "3.12"), ("3.7", "3.11")):
-        # of two corners of an eye the first named is the one more to the left
+        # of both corners of an eye, the first one is further to the left
         if points[row[inner], 0] < points[row[outer], 0]:
             swap(inner, outer)
     return points, swaps, mirrored

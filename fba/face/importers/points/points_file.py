@@ -25,7 +25,7 @@ class GivenPoints:
     """Feature points given by the user.
 
     points: float64 (84, 3), in the unit of the mesh, NaN where unknown. vertices: the vertex of the mesh
-    file a point stands on, from 0, by its name; where both are given the vertex decides.
+    file for each point, from 0, by its name; where both are given the vertex decides.
     """
 
     points: Float64
