@@ -120,8 +120,8 @@ class Gif:
         if inputs == 2:
             sources.append(graph.add_buffer(width=16, height=16, format="bgra", time_base=tick))
         step, end = graph.add(name, options), graph.add("buffersink")
-        for place, source in enumerate(sources):
-            source.link_to(step, 0, place)
+        for number, source in enumerate(sources):
+            source.link_to(step, 0, number)
         step.link_to(end)
         graph.configure()
         return graph, sources, end

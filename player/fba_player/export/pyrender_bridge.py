@@ -24,7 +24,7 @@ from fba_player.gl.context import missing_libraries, missing_text
 from fba_player.mesh.primitives import sphere_mesh
 from fba_player.scene.scene import Scene
 from fba_player.view.camera import Camera
-from fba_player.view.geometry import turn_partly
+from fba_player.view.geometry import turn_partly, unit_rows
 from fba_player.view.view import Eye, FaceMesh, Mesh
 
 if TYPE_CHECKING:
@@ -163,12 +163,10 @@ def _world_attributes(
     colours: Float32,
 ) -> dict[str, Any]:
     """Attributes of a pyrender primitive in world coordinates."""
-    turned = normals @ matrix[:3, :3].T
-    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
     opaque = np.ones((len(colours), 1))
     return {
         "positions": (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32),
-        "normals": turned.astype(np.float32),
+        "normals": unit_rows(normals @ matrix[:3, :3].T).astype(np.float32),
         "indices": np.ascontiguousarray(triangles, dtype=np.uint32),
         "color_0": np.hstack([colours[:, :3], opaque]).astype(np.float32),
     }

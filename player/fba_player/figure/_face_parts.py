@@ -15,6 +15,7 @@ from fba.errors import FbaWarning
 from fba.face.model import FaceModel, Part, point_row
 from fba_player.mesh.simplify import DetailLevels
 from fba_player.mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
+from fba_player.view.geometry import unit_rows
 from fba_player.view.view import FaceShape
 
 if TYPE_CHECKING:
@@ -142,9 +143,9 @@ def find_hairs(part: Part) -> Float32 | None:
     complete = paired & (tip[hair] >= 0)
     across = np.zeros((count, 8), dtype=np.float32)
     across[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
-    across[complete, :3] = _units(vertices[complete] - vertices[opposite[complete]])
+    across[complete, :3] = unit_rows(vertices[complete] - vertices[opposite[complete]])
     across[complete, 3] = half[complete]
-    across[complete, 4:7] = _units(vertices[tip[hair[complete]]] - vertices[complete])
+    across[complete, 4:7] = unit_rows(vertices[tip[hair[complete]]] - vertices[complete])
     return across
 
 
@@ -159,11 +160,6 @@ def _pieces(edges: Intp, count: int) -> Intp:
         if np.array_equal(lower, lowest):
             return lowest
         lowest = lower
-
-
-def _units(vectors: Float64) -> Float64:
-    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
-    return unit
 
 
 def _relief(part: Part) -> tuple[float, float]:

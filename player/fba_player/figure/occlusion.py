@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
 from fba.arrays import Bool, Float32, Float64, Int32, Intp
 from fba.compiled import compiled, is_compiled
@@ -43,13 +42,6 @@ class Visibility:
     def arrays(self) -> tuple[Float32, Float32, Float32]:
         """(light, through, open)."""
         return self.light, self.through, self.open
-
-    def towards(self, direction: npt.ArrayLike) -> tuple[Float32, Float32]:
-        """Light from a direction (3,) at each vertex, and light through the skin: float32 (V,), 0..1."""
-        tables = (self.light, self.through)
-        basis = weights(np.asarray(direction, dtype=np.float64)[None])[0].astype(np.float32)
-        light, through = (np.clip(np.einsum("ij,j->i", table, basis), 0, 1) for table in tables)
-        return light, through
 
 
 def bake(

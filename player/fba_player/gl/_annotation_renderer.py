@@ -67,8 +67,9 @@ def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> floa
 
 def _lift(points: Float64, eye: Float64, lift: float) -> Float64:
     """Points (N, 3) moved by `lift` metres towards the eye."""
-    way = eye - points
-    lifted: Float64 = points + way * (lift / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6))
+    towards = eye - points
+    length = np.linalg.norm(towards, axis=1, keepdims=True)
+    lifted: Float64 = points + towards * (lift / np.maximum(length, 1e-6))
     return lifted
 
 

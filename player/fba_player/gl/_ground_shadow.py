@@ -71,8 +71,8 @@ class ShadowCaster:
             return None
         ahead = 0.9 / KEY_DIRECTION[1]  # shadows fall away from the key light
         low = [
-            (np.floor((place - ahead * way) / CELL) - CELLS / 2) * CELL
-            for place, way in zip(middle, KEY_DIRECTION[::2], strict=True)
+            (np.floor((position - ahead * direction) / CELL) - CELLS / 2) * CELL
+            for position, direction in zip(middle, KEY_DIRECTION[::2], strict=True)
         ]
         count = 0
         for mesh in meshes:

@@ -70,29 +70,29 @@ class FaceRenderer:
         self._reliefs.clear()
         self._programs.clear()
 
-    def _program(self, words: tuple[str, ...]) -> Any:
-        if words not in self._programs:
-            self._programs[words] = load_program(self._gl, "face", *words)
-            self._set_camera(self._programs[words])
-        return self._programs[words]
+    def _program(self, options: tuple[str, ...]) -> Any:
+        if options not in self._programs:
+            self._programs[options] = load_program(self._gl, "face", *options)
+            self._set_camera(self._programs[options])
+        return self._programs[options]
 
-    def _array(self, parts: dict[str, Any], words: tuple[str, ...]) -> Any:
+    def _array(self, parts: dict[str, Any], options: tuple[str, ...]) -> Any:
         """The vertex array of a part for a program."""
-        if words not in parts["arrays"]:
+        if options not in parts["arrays"]:
             attributes: list[tuple[Any, ...]] = [
                 (parts["positions"], "3f", "in_position"),
                 (parts["normals"], "3f", "in_normal"),
                 (parts["light"], "4f", "in_light"),
             ]
-            if "TEXTURED" in words:
+            if "TEXTURED" in options:
                 attributes.append((parts["still"], "4f 2f 1f", "in_colour", "in_texture", "in_sway"))
             else:
                 attributes.append((parts["still"], "4f 8x 1f", "in_colour", "in_sway"))
             if parts["across"] is not None:
                 attributes.append((parts["across"], "4f 4f", "in_across", "in_along"))
-            program, triangles = self._program(words), parts["triangles"]
-            parts["arrays"][words] = self._gl.vertex_array(program, attributes, index_buffer=triangles)
-        return parts["arrays"][words]
+            program, triangles = self._program(options), parts["triangles"]
+            parts["arrays"][options] = self._gl.vertex_array(program, attributes, index_buffer=triangles)
+        return parts["arrays"][options]
 
     def _set_camera(self, program: Any) -> None:
         eye, matrix, pixel = self._camera
@@ -109,9 +109,9 @@ class FaceRenderer:
         wide = self._camera[2] * away
         picture = parts["pictures"].choose(wide)
         repeats = self._relief_texture(wide) if shape.fine[0] > 0 else None
-        words = tuple(
-            word
-            for word, used in (
+        options = tuple(
+            option
+            for option, used in (
                 ("SMOOTH", shape.smooth),
                 ("HAIRS", shape.across is not None),
                 ("TEXTURED", picture is not None),
@@ -119,9 +119,9 @@ class FaceRenderer:
             )
             if used
         )
-        program, array = self._program(words), self._array(parts, words)
+        program, array = self._program(options), self._array(parts, options)
         _set_shape(program, shape)
-        _set_placing(program, mesh)
+        _set_pose(program, mesh)
         if picture is not None:
             picture.use(0)
         if repeats is not None:
@@ -187,13 +187,13 @@ def _set_shape(program: Any, shape: FaceShape) -> None:
     set_uniform(program, "relief", 1)
 
 
-def _set_placing(program: Any, mesh: FaceMesh) -> None:
-    """Set the uniforms for a mesh's place and turn, unless the program has them already."""
-    placing = (mesh.matrix, mesh.turn, mesh.centre)
-    had = program.extra.get("placing")
-    if had is not None and all(one is other for one, other in zip(placing, had, strict=True)):
+def _set_pose(program: Any, mesh: FaceMesh) -> None:
+    """Set the uniforms for a mesh's position and turn, unless the program has them already."""
+    pose = (mesh.matrix, mesh.turn, mesh.centre)
+    before = program.extra.get("pose")
+    if before is not None and all(one is other for one, other in zip(pose, before, strict=True)):
         return
-    program.extra["placing"] = placing
+    program.extra["pose"] = pose
     set_uniform(program, "world", matrix_bytes(mesh.matrix))
     set_uniform(program, "turn", tuple(mesh.turn.tolist()))
     set_uniform(program, "centre", tuple(mesh.centre.tolist()))

@@ -39,18 +39,24 @@ def around(triangles: Int32, count: int, start: Int64, owners: Int32) -> None:
             free[v] += 1
 
 
+@inlined
+def _count_triangles(triangles: Int32, start: Int64, owners: Int32, a: int, b: int) -> int:
+    """Number of triangles with an edge from a to b."""
+    count = 0
+    for o in range(start[a], start[a + 1]):
+        other = triangles[owners[o]]
+        if other[0] == b or other[1] == b or other[2] == b:
+            count += 1
+    return count
+
+
 @compiled
 def borders(triangles: Int32, start: Int64, owners: Int32, border: Bool) -> None:
     """Mark vertices with an edge that belongs to one triangle only."""
     for t in range(len(triangles)):
         for k in range(3):
             a, b = triangles[t, k], triangles[t, (k + 1) % 3]
-            both = 0
-            for o in range(start[a], start[a + 1]):
-                other = triangles[owners[o]]
-                if other[0] == b or other[1] == b or other[2] == b:
-                    both += 1
-            if both == 1:
+            if _count_triangles(triangles, start, owners, a, b) == 1:
                 border[a] = border[b] = True
 
 
@@ -121,12 +127,7 @@ def quadrics(
         f[:] = 0.0
         for k in range(3):
             one, two = triangles[t, k], triangles[t, (k + 1) % 3]
-            both = 0
-            for o in range(start[one], start[one + 1]):
-                other = triangles[owners[o]]
-                if other[0] == two or other[1] == two or other[2] == two:
-                    both += 1
-            if both != 1:
+            if _count_triangles(triangles, start, owners, one, two) != 1:
                 continue
             for i in range(n):
                 e[i] = points[two, i] - points[one, i]

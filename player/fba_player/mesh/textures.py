@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from fba.arrays import Float32, Int32, UInt8
+from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.cache import load_or_make, make_key
 
 LARGEST = 4096
@@ -108,9 +108,12 @@ def _reduced(pixels: UInt8, factor: int) -> UInt8:
 @cache
 def _roots() -> tuple[int, ...]:
     """Table from sRGB codes to square roots of linear light, 0..255."""
-    code = np.arange(256) / 255
-    linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    return tuple(int(v) for v in np.round(255 * np.sqrt(linear)))
+    return tuple(int(v) for v in np.round(255 * np.sqrt(linear_light(np.arange(256) / 255))))
+
+
+def linear_light(srgb: Float64) -> Float64:
+    """Linear light of values in sRGB, both 0..1."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def texture_breadth(positions: Float32, texcoords: Float32, triangles: Int32) -> float:

@@ -14,6 +14,7 @@ from fba.arrays import Float32, Float64, Floating
 from fba.parameters import FAP_COUNT, faps
 from fba_player.figure.face import FaceFigure
 from fba_player.mesh.primitives import sphere_mesh
+from fba_player.mesh.textures import linear_light
 from fba_player.view.geometry import rotation_vector, turn_partly
 from fba_player.view.view import Eye, FaceMesh, FaceShape, Legend, Mesh, MeshShape
 
@@ -106,7 +107,7 @@ class FapHeatmap:
     def _colours(self, distances: Float32) -> Float64:
         share = distances / max(self.most, LEAST)
         share[distances <= LEAST] = 0.0
-        return _linear(heat_colours(share))
+        return linear_light(heat_colours(share))
 
 
 def heat_colours(shares: Floating) -> Float64:
@@ -121,8 +122,3 @@ def _table() -> Float64:
     text = (files(__package__) / "influence.csv").read_text(encoding="utf-8")
     rows = list(csv.reader(text.splitlines()))[1:]
     return np.array(rows, dtype=np.float64)
-
-
-def _linear(colours: Float64) -> Float64:
-    """Linear light of sRGB colours."""
-    return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)

@@ -15,6 +15,7 @@ from fba.face.feature_points import row_of
 from fba_player.figure.face import FaceFigure
 from fba_player.mesh.primitives import tube_mesh
 from fba_player.scene._skin_lines import SkinLine, skin_lines
+from fba_player.view.geometry import unit_rows
 from fba_player.view.view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
 
 POINT = (*srgb("#f0a04b"), 0.3)
@@ -135,8 +136,8 @@ class _Tubes:
             np.gradient(line, axis=0) for line in np.split(points, np.cumsum(self.lengths)[:-1])
         ])  # fmt: skip
         # Lines lie on the head, so the direction out of it is never along one.
-        aside = _unit(np.cross(along, points - inside))
-        out = _unit(np.cross(aside, along))
+        aside = unit_rows(np.cross(along, points - inside))
+        out = unit_rows(np.cross(aside, along))
         turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
         normals = aside[:, None] * np.cos(turn)[:, None] + out[:, None] * np.sin(turn)[:, None]
         positions = points[:, None] + normals * self.radii[:, None, None]
@@ -158,8 +159,3 @@ def _make_tubes(lines: list[tuple[str, int]], raised: float = 0.0) -> _Tubes:
         raised=raised,
     )
     return _Tubes(lengths, radii, shape)
-
-
-def _unit(vectors: Float64) -> Float64:
-    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
-    return unit

@@ -58,8 +58,11 @@ class Scene(Timed[Timeline]):
     ) -> None:
         if not len(animation):
             raise ValueError("nothing to show: the animation has no frames")
+        from fba.face.model import FaceModel
+        from fba_player.figure.model_units import prepare_model
+
         self.animation = animation
-        self.model = _default_model() if model is None else _prepare_model(model)
+        self.model = FaceModel.default() if model is None else prepare_model(model)
         self.timeline = timeline or Timeline(animation, self.model)
         self.switches = Switches()
         self.view = view
@@ -245,18 +248,6 @@ class Scene(Timed[Timeline]):
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in sampled])
             self._extent = body_extent(self._solver.pose(baps)[:, :, :3, 3], self._skeleton.names)
         return self._extent
-
-
-def _prepare_model(model: FaceModel) -> FaceModel:
-    from fba_player.figure.model_units import prepare_model
-
-    return prepare_model(model)
-
-
-def _default_model() -> FaceModel:
-    from fba.face.model import FaceModel
-
-    return FaceModel.default()
 
 
 def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:

@@ -39,7 +39,7 @@ class Bar:
         self._from = 0.0
         self._trace: tuple[object, ...] = ()
         self._ticks: tuple[Ruler | None, list[float], list[tuple[float, float, str]]] = (None, [], [])
-        self.place = (0.0, 0.0, 0.0, 0.0)
+        self.area = (0.0, 0.0, 0.0, 0.0)
         """Left, top, right, bottom of the timeline in points; for tests and pictures."""
         self.buttons = Buttons()
 
@@ -74,7 +74,7 @@ class Bar:
         transport = session.transport
         to = imgui.get_window_draw_list()
         top, bottom = y + TOP, y + TOP + TRACK
-        self.place = (ruler.left, top, ruler.right, bottom)
+        self.area = (ruler.left, top, ruler.right, bottom)
         if ruler.right - ruler.left < 8:
             return
         imgui.set_cursor_screen_pos((ruler.left - GRIP, y + 4))

@@ -19,8 +19,12 @@ def world_positions(mesh: FaceMesh) -> Float32:
 def world_normals(mesh: FaceMesh) -> Float32:
     """float32 (V, 3): the mesh's unit normals in the world."""
     turned = turn_partly(mesh.normals, mesh.shape.sway, mesh.turn, np.zeros(3)) @ mesh.matrix[:3, :3].T
-    length = np.linalg.norm(turned, axis=1, keepdims=True)
-    unit: Float32 = (turned / np.maximum(length, 1e-20)).astype(np.float32)
+    return unit_rows(turned).astype(np.float32)
+
+
+def unit_rows(vectors: Float64) -> Float64:
+    """float64 (N, 3): vectors scaled to length 1; those of length 0 stay."""
+    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)
     return unit
 
 

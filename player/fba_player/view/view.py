@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32
+from fba_player.mesh.textures import linear_light
 
 if TYPE_CHECKING:
     from fba_player.mesh.simplify import DetailLevels
@@ -233,6 +234,5 @@ def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, .
 
 def srgb(text: str) -> tuple[float, float, float]:
     """Linear light (3 values, 0..1) of a colour "#rrggbb" in sRGB."""
-    values = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values)
+    red, green, blue = linear_light(np.array([int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)])).tolist()
     return red, green, blue

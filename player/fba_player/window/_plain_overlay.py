@@ -95,8 +95,8 @@ def bar_picture(controls: Controls) -> Image:
     line = 28 * scale
     state = "playing" if transport.playing else "paused"
     draw.text((low, line), f"{state}   {transport.text()}", font=font, fill=TEXT)
-    words = [notice.text for notice in session.notices()[-1:]] or [session.scene.title[:60]]
-    hint = "   ".join([*filter(None, words), "F1 help"])
+    texts = [notice.text for notice in session.notices()[-1:]] or [session.scene.title[:60]]
+    hint = "   ".join([*filter(None, texts), "F1 help"])
     wide = draw.textlength(hint, font=font)
     if wide < (high - low) * 0.45:
         draw.text((high - wide, line), hint, font=font, fill=FAINT)

@@ -47,7 +47,7 @@ def studio(opengl: None, talking: Animation, tmp_path: Path, clock: Clock) -> It
 
 def place(studio: Studio, share: float) -> tuple[float, float]:
     """A point of the timeline: 0 the first frame, 1 the last."""
-    left, top, right, bottom = studio.gui.bar.place
+    left, top, right, bottom = studio.gui.bar.area
     return left + share * (right - left), (top + bottom) / 2
 
 
@@ -106,7 +106,7 @@ def test_marks_are_drawn_and_dragged(studio: Studio) -> None:
     before = studio.draw(2).astype(int)
     transport.mark_in, transport.mark_out = 0.08, 0.28
     after = studio.draw(2).astype(int)
-    left, top, right, bottom = (round(v) for v in studio.gui.bar.place)
+    left, top, right, bottom = (round(v) for v in studio.gui.bar.area)
     changed = np.abs(after - before)[top:bottom, left:right, :3].sum(axis=2) > 20
     outside = np.r_[0 : round(0.2 * (right - left)), round(0.8 * (right - left)) : right - left]
     assert changed[:, outside].mean() > 0.5  # darker outside the loop
@@ -153,7 +153,7 @@ def test_buttons_open_and_close_panels(studio: Studio) -> None:
 
 
 def test_play_button(studio: Studio) -> None:
-    _, _, _, bottom = studio.gui.bar.place
+    _, _, _, bottom = studio.gui.bar.area
     click(studio, SIZE[0] / 2, bottom + 28)
     assert studio.session.transport.playing
     click(studio, SIZE[0] / 2, bottom + 28)
@@ -219,7 +219,7 @@ def test_the_trace_marks_the_intra_planes(studio: Studio) -> None:
     assert info.plane_intra is not None
     assert info.plane_intra.tolist() == [True] + [False] * 9
     picture = studio.draw(1).astype(int)
-    left, top, right, bottom = (round(v) for v in studio.gui.bar.place)
+    left, top, right, bottom = (round(v) for v in studio.gui.bar.area)
     wide = right - left
     warm = picture[top:bottom, left:right, 0] - picture[top:bottom, left:right, 2]
     assert (warm[:, 5 : wide // 12] > 60).mean() > 0.5  # the only I plane, the first
@@ -245,7 +245,7 @@ def test_on_dense_displays_all_is_larger(opengl: None, talking: Animation, scale
     size = (round(450 * scale), round(300 * scale))
     with Studio(Session(Scene(talking), size=size, scale=scale)) as studio:
         picture = studio.draw(4)
-        left, top, right, bottom = studio.gui.bar.place
+        left, top, right, bottom = studio.gui.bar.area
         assert (bottom - top, right) == (40, 450 - 18)  # points
         row = picture[round((top + bottom) / 2 * scale), :, :3].astype(int).sum(axis=1)
         edge = round(left * scale)

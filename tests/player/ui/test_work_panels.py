@@ -74,7 +74,7 @@ def test_curves_that_move_most_are_there_at_once(opened: Opened, talking: Animat
     panel = panel_of(studio, "curves")
     from fba_player.ui.panels._curve_plot import COLOURS
 
-    line = coloured(studio.draw(1), panel.lanes.place, COLOURS[0])
+    line = coloured(studio.draw(1), panel.lanes.area, COLOURS[0])
     rows = [np.flatnonzero(line[:, x]).mean() for x in (20, line.shape[1] // 2, line.shape[1] - 20)]
     assert rows[0] + 8 < rows[1] < rows[2] - 8  # it falls
 
@@ -82,7 +82,7 @@ def test_curves_that_move_most_are_there_at_once(opened: Opened, talking: Animat
 def test_a_click_on_a_curve_seeks_and_the_wheel_zooms(opened: Opened, talking: Animation) -> None:
     studio = opened(talking, "curves")
     hand, panel = StudioHand(studio), panel_of(studio, "curves")
-    left, top, right, bottom = panel.lanes.place
+    left, top, right, bottom = panel.lanes.area
     transport = studio.session.transport
     hand.drag(((left + right) / 2, (top + bottom) / 2), (left + 0.75 * (right - left), (top + bottom) / 2))
     assert transport.time == pytest.approx(0.27, abs=0.003)
@@ -103,15 +103,15 @@ def test_choosing_from_the_list(opened: Opened, walking: Animation) -> None:
     studio = opened(walking, "curves")
     session, hand, panel = studio.session, StudioHand(studio), panel_of(studio, "curves")
     session.selection.faps, session.selection.baps = [], []
-    left, top, _, _ = panel.lanes.place
+    left, top, _, _ = panel.lanes.area
     hand.click(left + 30, top - 45)  # the button
     hand.write("left knee")
     assert panel.chooser.query == "left knee"
     panel.chooser.query = "l_knee flexion"
     studio.draw(3)
-    hand.click(*panel.chooser.place)
+    hand.click(*panel.chooser.first_row)
     assert session.selection.baps == [10]
-    hand.click(*panel.chooser.place)
+    hand.click(*panel.chooser.first_row)
     assert session.selection.baps == []
 
 
@@ -124,7 +124,7 @@ def test_stretches_that_were_not_sent_are_thin(opened: Opened, talking: Animatio
     half = Animation(25, talking.index, fba.FaceTrack(np.where(mask, talking.face.values, 0), mask))  # type: ignore[arg-type]
     studio = opened(half, "curves")
     studio.session.selection.faps = [3]
-    line = coloured(studio.draw(3), panel_of(studio, "curves").lanes.place, COLOURS[0])
+    line = coloured(studio.draw(3), panel_of(studio, "curves").lanes.area, COLOURS[0])
     wide = line.shape[1]
     assert line[:, : wide // 5].any(axis=0).mean() > 0.9
     assert line[:, wide // 4 :].any(axis=0).mean() < 0.1  # faint
@@ -161,7 +161,7 @@ def test_the_bit_rate_of_a_stream_that_arrives(opengl: None, talking: Animation)
         picture = studio.draw(4)
         left, top, right, bottom = (round(v) for v in panel_of(studio, "rate").bars)
         bars = picture[top:bottom, left:right, :3].astype(int)
-        x0, y0, x1, y1 = (round(v) for v in studio.gui.bar.place)
+        x0, y0, x1, y1 = (round(v) for v in studio.gui.bar.area)
         line = picture[y0:y1, x0:x1, :3].astype(int)
     for part in (bars, line):
         warm = part[..., 0] - part[..., 2]
@@ -207,7 +207,7 @@ def test_pictures_go_on_until_all_curves_are_known(
 
 
 def slider(studio: Studio, group: str, row: int, share: float) -> tuple[float, float]:
-    left, right, y = panel_of(studio, "puppet").places[group, row]
+    left, right, y = panel_of(studio, "puppet").sliders[group, row]
     return left + share * (right - left), y
 
 
@@ -231,7 +231,7 @@ def test_a_slider_moves_the_face_until_it_is_released(opened: Opened, talking: A
     studio.draw(1)
     assert performer.puppet.fap_moved[2]
     assert session.values[0][2] == 0
-    _, right, y = panel_of(studio, "puppet").places["Jaw", 0]
+    _, right, y = panel_of(studio, "puppet").sliders["Jaw", 0]
     hand.click(right + 68 + 9, y)  # the cross behind the value
     assert performer.puppet.idle
 

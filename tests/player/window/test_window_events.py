@@ -92,7 +92,7 @@ def long(talking: Animation) -> Animation:
 
 
 def on_timeline(window: Window, share: float) -> tuple[float, float]:
-    left, top, right, bottom = window._gui.bar.place
+    left, top, right, bottom = window._gui.bar.area
     return left + share * (right - left), (top + bottom) / 2
 
 
@@ -136,7 +136,7 @@ def test_scrubbing_while_playing(window: Window, hand: Hand) -> None:
     assert transport.time == pytest.approx(0.5 * 249 / 25, abs=0.1)
     picture = shown(window)
     x, _ = on_timeline(window, 0.5)
-    _, top, _, bottom = window._gui.bar.place
+    _, top, _, bottom = window._gui.bar.area
     assert picture[round(top) : round(bottom), round(x) - 1 : round(x) + 1].mean() > 180  # the play head
     hand.let_go()
     assert transport.playing
@@ -153,7 +153,7 @@ def test_dragging_a_mark(window: Window, hand: Hand) -> None:
 
 
 def test_the_slider_of_speed(window: Window, hand: Hand) -> None:
-    *_, bottom = window._gui.bar.place
+    *_, bottom = window._gui.bar.area
     x0, x1 = window._gui.bar.buttons.slider
     hand.drag(((x0 + x1) / 2, bottom + 28), (x1 + 30, bottom + 28))
     assert window.transport.speed == 4.0
@@ -221,7 +221,7 @@ def test_resizing_while_playing(window: Window, hand: Hand) -> None:
     until(window, lambda: window.session.size == (700, 420))
     settle(window)
     assert shown(window).shape == (420, 700, 3)
-    assert window._gui.bar.place[2] == 700 - 18
+    assert window._gui.bar.area[2] == 700 - 18
     assert window.transport.playing
 
 
@@ -229,7 +229,7 @@ def test_full_screen_and_back(window: Window, hand: Hand) -> None:
     hand.key("f", lambda: window.session.size == (1000, 800))
     settle(window)
     assert shown(window).shape == (800, 1000, 3)
-    assert window._gui.bar.place[2] == 1000 - 18
+    assert window._gui.bar.area[2] == 1000 - 18
     hand.key("F11", lambda: window.session.size == (900, 600))
 
 
@@ -246,7 +246,7 @@ def test_dragging_a_slider_of_the_puppeteer(window: Window, hand: Hand) -> None:
     hand.key("F7", lambda: "puppet" in session.open)
     settle(window)
     panel = next(panel for panel in window._gui.panels if panel.name == "puppet")
-    left, right, y = panel.places["Jaw", 0]
+    left, right, y = panel.sliders["Jaw", 0]
     camera = session.viewpoint.camera
     hand.drag((left + 8, y), (left + 0.5 * (right - left), y))
     assert session.values[0][2] == pytest.approx(600, abs=60)  # half of what the slider has

@@ -67,7 +67,7 @@ class Lanes:
     def __init__(self) -> None:
         self._lines: dict[tuple[str, int], _Lines] = {}
         self._ticks: tuple[tuple[float, ...], float, list[tuple[float, str]]] = ((), 1.0, [])
-        self.place = (0.0, 0.0, 0.0, 0.0)
+        self.area = (0.0, 0.0, 0.0, 0.0)
         """Left, top, right, bottom of the first curve in points; for tests."""
 
     def draw(
@@ -89,7 +89,7 @@ class Lanes:
             if y + LABEL_HEIGHT + CURVE >= visible[0] and y <= visible[1]:
                 self._lane(session, lane, ruler, time_zoom, y, now.get(lane.key))
             if number == 0:
-                self.place = (left, y + LABEL_HEIGHT, left + wide, y + LABEL_HEIGHT + CURVE)
+                self.area = (left, y + LABEL_HEIGHT, left + wide, y + LABEL_HEIGHT + CURVE)
             y += LABEL_HEIGHT + CURVE + GAP
         imgui.set_cursor_screen_pos((left, top))
         imgui.dummy((1, max(y - top - GAP, 1)))
@@ -98,8 +98,7 @@ class Lanes:
         bottom = imgui.get_cursor_screen_pos().y
         self._axis(ruler, bottom)
         imgui.dummy((1, AXIS - 4))
-        gone = set(self._lines) - {lane.key for lane in lanes}
-        for key in gone:
+        for key in set(self._lines) - {lane.key for lane in lanes}:
             del self._lines[key]
 
     def _lane(

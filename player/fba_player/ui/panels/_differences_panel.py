@@ -139,10 +139,10 @@ def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Flo
     if len(times) <= most:
         return times, values
     borders = np.linspace(0, len(times), most + 1).astype(int)
-    chosen = np.array(
+    rows = np.array(
         [low + int(np.abs(values[low:high]).argmax()) for low, high in pairwise(borders.tolist())]
     )
-    return times[chosen], values[chosen]
+    return times[rows], values[rows]
 
 
 def _unit(unit: str, amount: float) -> str:

@@ -19,11 +19,11 @@ def all_parameters() -> tuple[tuple[str, int, str, str], ...]:
     """(kind, number, text shown, text searched) of all parameters, FAPs first."""
     rows = []
     for fap in faps()[FIRST_LOW_LEVEL_FAP - 1 :]:
-        words = f"fap {fap.number} {fap.name} {fap.name.replace('_', ' ')} {fap.group_name}".lower()
-        rows.append(("fap", fap.number, f"{fap.number} {fap.name}", words))
+        searched = f"fap {fap.number} {fap.name} {fap.name.replace('_', ' ')} {fap.group_name}".lower()
+        rows.append(("fap", fap.number, f"{fap.number} {fap.name}", searched))
     for bap in baps()[:BAP_STANDARD_COUNT]:
-        words = f"bap {bap.number} {bap.name} {bap.name.replace('_', ' ')} {bap.group_name}".lower()
-        rows.append(("bap", bap.number, f"{bap.number} {bap.name}", words))
+        searched = f"bap {bap.number} {bap.name} {bap.name.replace('_', ' ')} {bap.group_name}".lower()
+        rows.append(("bap", bap.number, f"{bap.number} {bap.name}", searched))
     return tuple(rows)
 
 
@@ -52,7 +52,7 @@ class Chooser:
 
     def __init__(self) -> None:
         self.query = ""
-        self.place = (0.0, 0.0)
+        self.first_row = (0.0, 0.0)
         """The middle of the first row, in points; for tests."""
 
     def draw(self, session: Session, *, face: bool, body: bool) -> None:
@@ -82,7 +82,7 @@ class Chooser:
                 changed, _ = imgui.checkbox(f"{text}##{kind}{number}", on)
                 if (kind, number, text) == rows[0]:
                     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-                    self.place = (low.x + 10, (low.y + high.y) / 2)
+                    self.first_row = (low.x + 10, (low.y + high.y) / 2)
                 _group(kind, number)
                 if changed and (on or not full):
                     selection.toggle(kind, number)

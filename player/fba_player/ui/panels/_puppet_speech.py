@@ -8,7 +8,7 @@ from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
 from fba_player.session.performer import Performer
 from fba_player.session.puppet import Expression, Viseme
 from fba_player.ui import theme
-from fba_player.ui.panels.panel import heading
+from fba_player.ui.panels.panel import choose_name, heading
 
 
 def draw_visemes(performer: Performer) -> None:
@@ -30,7 +30,7 @@ def draw_expressions(performer: Performer) -> None:
     """Draw the choice of two expressions and their intensities."""
     heading("Expressions")
     puppet, now = performer.puppet, performer.puppet.expression
-    chosen = []
+    values = []
     for word, which, strong in (
         ("first", now.select1, now.intensity1),
         ("second", now.select2, now.intensity2),
@@ -39,9 +39,9 @@ def draw_expressions(performer: Performer) -> None:
         imgui.set_next_item_width(-100)
         _, intensity = imgui.slider_int(f"intensity##{word}", strong, 0, INTENSITY_MAX, "%d",
                                         imgui.SliderFlags_.always_clamp)  # fmt: skip
-        chosen += [select, intensity]
-    if chosen != [now.select1, now.intensity1, now.select2, now.intensity2]:
-        puppet.expression = Expression(*chosen)
+        values += [select, intensity]
+    if values != [now.select1, now.intensity1, now.select2, now.intensity2]:
+        puppet.expression = Expression(*values)
     if _release("expression", enabled=puppet.feels):
         puppet.expression = Expression()
     imgui.dummy((1, 4))
@@ -63,10 +63,5 @@ def _release(what: str, *, enabled: bool) -> bool:
 
 
 def _choice(label: str, names: tuple[str, ...], now: int) -> int:
-    imgui.set_next_item_width(-100)
-    if imgui.begin_combo(label, f"{now} {names[now]}" if now else "none"):
-        for number, name in enumerate(names):
-            if imgui.selectable(f"{number} {name}" if number else "none", number == now)[0]:
-                now = number
-        imgui.end_combo()
-    return now
+    numbered = [f"{number} {name}" if number else "none" for number, name in enumerate(names)]
+    return choose_name(label, numbered, now, -100)

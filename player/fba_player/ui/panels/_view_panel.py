@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 from fba_player.scene.scene import Scene
 from fba_player.session.session import Session
-from fba_player.ui.panels.panel import Panel, heading, tooltip
+from fba_player.ui.panels.panel import Panel, choose_name, heading, tooltip
 from fba_player.view.switches import SWITCHES, Switch, Switches
 
 
@@ -34,22 +34,15 @@ class ViewPanel(Panel):
                 if changed:
                     scene.show(switch.name, on)
             elif switch.kind == "choice":
-                _choice(switch, switches)
+                now = switch.choices.index(str(switches[switch.name]))
+                chosen = choose_name(switch.label, switch.choices, now, 132)
+                scene.show(switch.name, switch.choices[chosen])
             else:
                 _fap(switch, switches)
             tooltip(switch.description, session.switch_key(switch))
         if switches.changed and imgui.button("Reset switches", (-1, 0)):
             for name in switches.changed:
                 scene.show(name, SWITCHES[name].default)
-
-
-def _choice(switch: Switch, switches: Switches) -> None:
-    imgui.set_next_item_width(132)
-    if imgui.begin_combo(switch.label, str(switches[switch.name])):
-        for word in switch.choices:
-            if imgui.selectable(word, switches[switch.name] == word)[0]:
-                switches.show(switch.name, word)
-        imgui.end_combo()
 
 
 def _fap(switch: Switch, switches: Switches) -> None:

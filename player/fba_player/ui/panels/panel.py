@@ -89,9 +89,9 @@ def shorten(text: str, wide: float) -> str:
     return text.rstrip(" ;,") + "..."
 
 
-def choose_name(label: str, names: Sequence[str], now: int) -> int:
-    """Draw a list of names, of which number `now` is chosen; returns the new choice."""
-    imgui.set_next_item_width(-1)
+def choose_name(label: str, names: Sequence[str], now: int, width: float = -1) -> int:
+    """Draw a list of names, of which number `now` is chosen; returns the new choice. width: points."""
+    imgui.set_next_item_width(width)
     if imgui.begin_combo(label, names[now]):
         for number, name in enumerate(names):
             if imgui.selectable(f"{name}##{number}", number == now)[0]:

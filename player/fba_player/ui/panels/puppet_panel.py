@@ -36,7 +36,7 @@ class PuppetPanel(Panel):
         self._zeroed = ""
         self.together = True
         """Whether left and right move together."""
-        self.places: dict[tuple[str, int], tuple[float, float, float]] = {}
+        self.sliders: dict[tuple[str, int], tuple[float, float, float]] = {}
         """Sliders in view by (group, row): left, right and vertical middle in points; for tests."""
         self.buttons: dict[str, tuple[float, float]] = {}
         """Centres of the buttons by name, in points; for tests."""
@@ -65,7 +65,7 @@ class PuppetPanel(Panel):
             performer.puppet.release_all()
         tooltip("all parameters follow the animation again")
         imgui.end_disabled()
-        self.places = {}
+        self.sliders = {}
         if imgui.begin_tab_bar("parts"):
             for title, kind in (("Face", "fap"), ("Speech, mood", ""), ("Body", "bap")):
                 if kind == "bap" and not session.scene.has_body:
@@ -145,13 +145,13 @@ class PuppetPanel(Panel):
             opened = imgui.collapsing_header(f"{group.name}{'  *' if touched else ''}###{group.name}", flags)
             if not opened:
                 continue
-            for place, row in enumerate(group.rows):
+            for index, row in enumerate(group.rows):
                 if self.together and row.side == "r" and row.mirror is not None:
                     continue
-                self._row(performer, group, place, row)
+                self._row(performer, group, index, row)
             _group_buttons(performer, group, touched=touched)
 
-    def _row(self, performer: Performer, group: Group, place: int, row: Row) -> None:
+    def _row(self, performer: Performer, group: Group, index: int, row: Row) -> None:
         """Draw a title, a slider, and a release button if it was moved."""
         x, y = imgui.get_cursor_screen_pos()
         high = imgui.get_frame_height()
@@ -180,13 +180,13 @@ class PuppetPanel(Panel):
         imgui.set_next_item_width(wide)
         if touched:
             imgui.push_style_color(imgui.Col_.slider_grab, theme.ACCENT)
-        name = f"##{group.name}{place}"
+        name = f"##{group.name}{index}"
         changed, value = imgui.slider_float(
             name, value, row.low, row.high, "", imgui.SliderFlags_.always_clamp
         )
         if touched:
             imgui.pop_style_color()
-        self.places[group.name, place] = (x + name_wide, x + name_wide + wide, y + high / 2)
+        self.sliders[group.name, index] = (x + name_wide, x + name_wide + wide, y + high / 2)
         if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
             self._zeroed = name
             changed, value = True, 0.0
@@ -221,12 +221,7 @@ class PuppetPanel(Panel):
 
     def _move(self, performer: Performer, group: Group, row: Row, value: float) -> None:
         for one, sign in self._both(group, row):
-            for number in one.numbers:
-                amount = sign * value / one.scale / len(one.numbers)
-                if one.kind == "fap":
-                    performer.puppet.move_fap(number, amount)
-                else:
-                    performer.puppet.move_bap(number, amount)
+            _set(performer, one.kind, one.numbers, sign * value / one.scale / len(one.numbers))
 
     def _release(self, performer: Performer, group: Group, row: Row) -> None:
         for one, _ in self._both(group, row):
@@ -236,11 +231,7 @@ class PuppetPanel(Panel):
 def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None:
     """Draw the buttons of a group."""
     if imgui.small_button(f"All to zero##{group.name}"):
-        for number in group.numbers:
-            if group.kind == "fap":
-                performer.puppet.move_fap(number, 0.0)
-            else:
-                performer.puppet.move_bap(number, 0.0)
+        _set(performer, group.kind, group.numbers, 0.0)
     if touched:
         imgui.same_line()
         if imgui.small_button(f"Release##{group.name}"):
@@ -253,6 +244,12 @@ def _parameter_names(row: Row) -> str:
     names = [parameter(row.kind, number).name for number in row.numbers]
     pairs = zip(row.numbers, names, strict=True)
     return f"{row.kind.upper()} " + ", ".join(f"{number} {name}" for number, name in pairs)
+
+
+def _set(performer: Performer, kind: str, numbers: tuple[int, ...], value: float) -> None:
+    move = performer.puppet.move_fap if kind == "fap" else performer.puppet.move_bap
+    for number in numbers:
+        move(number, value)
 
 
 def _release_parameters(performer: Performer, kind: str, numbers: tuple[int, ...]) -> None:
