@@ -7,7 +7,7 @@ of the iris above and below, and lips that touch along a level line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from figure import Surface
@@ -79,32 +79,32 @@ def _signed_rings(head: Surface, border: Bool, inside: Bool) -> Int64:
     return np.where(rings < 0, FAR, np.where(inside, -rings, rings))
 
 
-def sculpt_head(head: Surface, where: Marks) -> Surface:
+def sculpt_head(head: Surface, marks: Marks) -> Surface:
     """The base head with its eyes, mouth and nose in proportion; symmetric as the base is."""
-    vertices = head.vertices.copy()
-    vertices = _wider_eyes(vertices, where)
+    vertices = _wider_eyes(head.vertices, marks)
     for _ in range(4):  # laying the lids on the eyeballs moves them a little each time
-        vertices = _open_lids(vertices, where)
-    vertices = _mouth(vertices, where)
-    vertices = _fuller_lips(vertices, where)
-    vertices = _nose(vertices)
-    return Surface(vertices, head.quads, head.corners, head.uvs)
+        vertices = _open_lids(vertices, marks)
+    vertices = _mouth(vertices, marks)
+    vertices = _fuller_lips(vertices, marks)
+    return replace(head, vertices=_nose(vertices))
 
 
 def _both_sides(vertices: Float64) -> tuple[Float64, Float64]:
     """(vertices mirrored onto the left side, sign of x of each vertex)."""
     sign = np.where(vertices[:, 0] < 0, -1.0, 1.0)
-    return vertices * np.stack([sign, np.ones_like(sign), np.ones_like(sign)], axis=1), sign
+    left = vertices.copy()
+    left[:, 0] *= sign
+    return left, sign
 
 
-def _wider_eyes(vertices: Float64, where: Marks) -> Float64:
+def _wider_eyes(vertices: Float64, marks: Marks) -> Float64:
     left, sign = _both_sides(vertices)
-    near = (where.eye != FAR) & (left[:, 2] > 0.045)
+    near = (marks.eye != FAR) & (left[:, 2] > 0.045)
     offset = left - EYE_CENTRE
     away = np.hypot(offset[:, 0] / 1.3, offset[:, 1])
     weight = np.where(near, 1 - smoothstep((away - 0.010) / 0.014), 0.0)
     stretch = np.where(offset[:, 0] < 0, 0.25, 0.10)
-    ball = where.eye < 0  # the socket stays about the eyeball
+    ball = marks.eye < 0  # the socket stays about the eyeball
     # The nose bridge between the eyes must not be crossed.
     left[:, 0] += offset[:, 0] * stretch * weight * np.where(ball, 0.5, 1.0)
     left[:, 0] = np.where(np.abs(vertices[:, 0]) < 1e-6, 0.0, left[:, 0])
@@ -135,9 +135,9 @@ def upper_side(x: Float64, y: Float64) -> Bool:
     return y > np.interp(x, [inner[0], outer[0]], [inner[1], outer[1]])
 
 
-def _open_lids(vertices: Float64, where: Marks) -> Float64:
+def _open_lids(vertices: Float64, marks: Marks) -> Float64:
     left, sign = _both_sides(vertices)
-    ring = where.eye
+    ring = marks.eye
     region = (ring != FAR) & (left[:, 2] > 0.045)
     upper = upper_side(left[:, 0], left[:, 1])
     margin = region & (ring == MARGIN_RING)
@@ -198,9 +198,9 @@ def lay_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
     return moved
 
 
-def _mouth(vertices: Float64, where: Marks) -> Float64:
+def _mouth(vertices: Float64, marks: Marks) -> Float64:
     """Vertices with a wider mouth, whose lips touch along a level line."""
-    ring, lip = where.mouth, where.lip
+    ring, lip = marks.mouth, marks.lip
     away = np.hypot(vertices[:, 0] / 1.25, vertices[:, 1] - MOUTH[1])
     weight = np.where(vertices[:, 2] > 0.02, 1 - smoothstep((away - 0.016) / 0.022), 0.0)
     vertices = vertices.copy()
@@ -227,14 +227,14 @@ def _mouth(vertices: Float64, where: Marks) -> Float64:
     return vertices
 
 
-def _fuller_lips(vertices: Float64, where: Marks) -> Float64:
+def _fuller_lips(vertices: Float64, marks: Marks) -> Float64:
     """Vertices with the red of the lips a little higher and rounder; the line of contact stays."""
-    out = np.where(where.mouth == FAR, 0, np.maximum(where.mouth - CONTACT_RING, 0)).astype(np.float64)
+    out = np.where(marks.mouth == FAR, 0, np.maximum(marks.mouth - CONTACT_RING, 0)).astype(np.float64)
     fade = np.where(out > 0, np.exp(-(((out - 3.0) / 2.2) ** 2)), 0.0)
     middle = 1 - smoothstep((np.abs(vertices[:, 0]) - 0.006) / 0.018)
     vertices = vertices.copy()
-    lift = np.where(where.lip > 0, 0.0011, -0.0013)
-    vertices[:, 1] += np.where(where.lip != 0, lift, 0.0) * fade * (0.25 + 0.75 * middle)
+    lift = np.where(marks.lip > 0, 0.0011, -0.0013)
+    vertices[:, 1] += np.where(marks.lip != 0, lift, 0.0) * fade * (0.25 + 0.75 * middle)
     vertices[:, 2] += 0.0008 * fade * middle
     return vertices
 

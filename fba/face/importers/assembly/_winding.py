@@ -17,26 +17,19 @@ def turn_outward(pieces: Sequence[Piece], centre: Float64) -> tuple[list[Piece],
     Within the skin, triangles that run against their neighbours are turned first. When the skin was
     inside out the other pieces are taken to be so too.
     """
-    result: list[Piece] = []
-    count, all_inside_out = 0, False
-    for piece in pieces:
-        if piece.part.kind == "skin":
-            wrong = _opposing(piece.part.triangles)
-            triangles = _flip(piece.part.triangles, wrong)
-            vertices = piece.part.vertices.astype(np.float64)
-            inside_out = float(_facing(vertices, triangles, centre).sum()) < 0
+    masks = [np.zeros(len(piece.part.triangles), dtype=np.bool_) for piece in pieces]
+    all_inside_out = False
+    for number, part in enumerate(piece.part for piece in pieces):
+        if part.kind == "skin":
+            wrong = _opposing(part.triangles)
+            triangles = _flip(part.triangles, wrong)
+            inside_out = float(_facing(part.vertices.astype(np.float64), triangles, centre).sum()) < 0
             all_inside_out |= inside_out
-            wrong = ~wrong if inside_out else wrong
-            count += int(wrong.sum())
-            result.append(_turn_triangles(piece, wrong) if wrong.any() else piece)
-        else:
-            result.append(piece)
+            masks[number] = wrong ^ inside_out
     if all_inside_out:
-        for number, piece in enumerate(result):
-            if piece.part.kind != "skin":
-                result[number] = _turn_triangles(piece, np.ones(len(piece.part.triangles), dtype=np.bool_))
-                count += len(piece.part.triangles)
-    return result, count
+        masks = [m if p.part.kind == "skin" else ~m for p, m in zip(pieces, masks, strict=True)]
+    turned = [_turn_triangles(p, m) if m.any() else p for p, m in zip(pieces, masks, strict=True)]
+    return turned, int(sum(mask.sum() for mask in masks))
 
 
 def _turn_triangles(piece: Piece, wrong: Bool) -> Piece:
@@ -46,6 +39,7 @@ def _turn_triangles(piece: Piece, wrong: Bool) -> Piece:
 
 
 def _flip(triangles: Int32, wrong: Bool) -> Int32:
+    """Triangles (F, 3), those of a mask (F,) turned over."""
     return np.where(wrong[:, None], triangles[:, ::-1], triangles)
 
 

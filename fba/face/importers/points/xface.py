@@ -24,23 +24,17 @@ def load_xface(path: str) -> Fdp:
     """An Xface file; positions are NaN until `xface_points` looks them up. ModelError where damaged."""
     data = read_bytes(path)
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise ModelError(f"{path}: declares a DOCTYPE or entities, which Xface files have no need of")
+        raise ModelError(f"{path}: declares a DOCTYPE or entities, which Xface files do not need")
     try:
         root = ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise ModelError(f"{path}: is not well-formed XML: {error}") from error
     if root.tag != "xfdp":
         raise ModelError(f"{path}: the outermost element of an Xface file is <xfdp>, not <{root.tag[:40]}>")
-    units = root.find("head/fapu")
-    distances = (
-        {}
-        if units is None
-        else {
-            name: parse_number(units.get(name, ""), path, f"{name} of <fapu>")
-            for name in DISTANCES
-            if name in units.attrib
-        }
-    )
+    units = {} if (fapu := root.find("head/fapu")) is None else fapu.attrib
+    distances = {
+        name: parse_number(units[name], path, f"{name} of <fapu>") for name in DISTANCES if name in units
+    }
     meshes = []
     for entity in root.findall("source/entity"):
         mesh = entity.find("mesh")
@@ -64,7 +58,7 @@ def load_xface(path: str) -> Fdp:
         ]
         if min([index, *inside]) < 0:
             raise ModelError(f"{where}: vertex {min([index, *inside])} is negative")
-        # the first one stands for the point; more tie other meshes to it (teeth to the chin)
+        # the first one is the point itself; others attach other meshes to it (teeth to the chin)
         vertices.setdefault(name, (mesh_name, index))
         for influence in element.findall("influence"):
             # these files count FAPs from 0
