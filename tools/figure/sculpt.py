@@ -52,7 +52,7 @@ ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
 """Origin of the finished head, between the pupils, in the frame of `figure.head`."""
 
 
-def interpolate_rings(refined: Refined, ring: Int64) -> Float64:
+def _interpolate_rings(refined: Refined, ring: Int64) -> Float64:
     """Ring numbers of the coarse vertices interpolated to the fine ones."""
     value = refined.blend @ ring.astype(np.float64)
     far = refined.blend @ (ring == FAR).astype(np.float64)
@@ -61,7 +61,7 @@ def interpolate_rings(refined: Refined, ring: Int64) -> Float64:
 
 def refine_marks(refined: Refined, coarse: Marks) -> Marks:
     """The marks of the coarse vertices interpolated to the fine ones."""
-    eye, mouth = (interpolate_rings(refined, rings) for rings in (coarse.eye, coarse.mouth))
+    eye, mouth = (_interpolate_rings(refined, rings) for rings in (coarse.eye, coarse.mouth))
     return Marks(eye, mouth, refined.blend @ coarse.lip.astype(np.float64))
 
 
