@@ -128,7 +128,7 @@ def read_body(document: Document) -> BodyModel:
 
     content = optional_member(document.root.get("extensions"), NAME)
     if content is None:
-        raise document.root.error(f"brings no extension {NAME}, so it is no body model of this project")
+        raise document.root.error(f"has no extension {NAME}, so it is not a body model of fba")
     version = content.member("version").integer(0, 1 << 30)
     if version != VERSION:
         raise content.error(f"is version {version}; version {VERSION} is read here")

@@ -57,7 +57,7 @@ class Part:
     def __post_init__(self) -> None:
         where = f"part {self.name!r}"
         if not self.name or self.name == HEAD:
-            raise ModelError(f"{where}: a part needs a name, and {HEAD!r} stands for all of them")
+            raise ModelError(f"{where}: a part needs a name other than {HEAD!r}, which stands for all parts")
         if self.kind not in PART_KINDS:
             raise ModelError(f"{where}: its kind {self.kind!r} is none of {', '.join(PART_KINDS)}")
         arrays = mesh_arrays(where, self.vertices, self.triangles, self.normals, self.texcoords, self.colours)
@@ -183,7 +183,7 @@ class FaceModel(Meshes[Part]):
         if len(away) and float(away.max()) > SHARED_POINT * max(height, 1e-9):
             row = int(rows[away.argmax()])
             raise ModelError(
-                f"feature point {names()[row]} stands {away.max():g} m away from its vertex {bound[row]}"
+                f"feature point {names()[row]} is {away.max():g} m away from its vertex {bound[row]}"
             )
         points.flags.writeable = False
         object.__setattr__(self, "points", points)

@@ -262,7 +262,7 @@ BODY = "extensions/FBA_body"
 @pytest.mark.parametrize(
     ("place", "value", "message"),
     [
-        ("extensions", REMOVED, "brings no extension FBA_body"),
+        ("extensions", REMOVED, "has no extension FBA_body"),
         (f"{BODY}/version", 9, "is version 9; version 1 is read"),
         (f"{BODY}/skin", 3, r"FBA_body.skin: 3 is not within"),
         (f"{BODY}/skin", REMOVED, "'skin' is missing"),

@@ -89,10 +89,10 @@ def _check(given: Float64, known: Bool) -> None:
         )
     spread = _spread(given[known])
     if not spread[0] > 0 or not np.isfinite(spread).all() or spread[1] < 1e-4 * spread[0]:
-        what = "one spot" if not spread[0] > 0 else "one line"
+        fault = "lie on one line" if spread[0] > 0 else "coincide"
         raise ModelError(
             f"the {int(known.sum())} feature points {', '.join(np.array(names())[known][:6])} ... "
-            f"stand on {what}: that is no face"
+            f"{fault}: these are not the points of a face"
         )
 
 

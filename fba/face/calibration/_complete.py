@@ -65,7 +65,7 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
             worse = a if error[a] > error[b] else b
             result[worse] = np.nan
             messages.append(
-                f"{names()[a]} and {names()[b]} stand on one spot, but the face has them "
+                f"{names()[a]} and {names()[b]} coincide, but on the face they are "
                 f"{apart * 1000:.0f} mm apart: {names()[worse]} is left out"
             )
     usual = float(np.median(away[rows])) if len(rows) else 0.0
@@ -79,7 +79,7 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
         if not np.linalg.norm(mate - shift[row]) < 0.5 * away[row]:
             result[row] = np.nan
             messages.append(
-                f"{names()[row]} is {away[row] * 1000:.0f} mm from where the others put it: left out"
+                f"{names()[row]} is {away[row] * 1000:.0f} mm from its position by the other points: left out"
             )
     if messages:
         _warn("; ".join(messages))
@@ -145,7 +145,7 @@ def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
     if moved:
         _warn(
             "; ".join(
-                f"pupil {name} is {off * 1000:+.1f} mm off the middle between the lids: put there"
+                f"pupil {name} is {off * 1000:+.1f} mm off the middle between the lids: moved there"
                 for name, off in moved
             )
         )

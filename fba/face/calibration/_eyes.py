@@ -133,7 +133,7 @@ def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> floa
     if back > DEEP:
         warnings.warn(
             f"the lids of the {side} eye lie {back * 1000:.1f} mm inside its eyeball: "
-            "the eyeball and its pupil were put back",
+            "the eyeball and its pupil were set back",
             FbaWarning,
             stacklevel=6,
         )

@@ -57,7 +57,7 @@ def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     point = EYE_POINT.get(fap) or entry.feature_points[0]
     if not poser.has(point):
-        yield Finding(entry.label, "its feature point stands on a vertex", f"{point} is free", "a vertex")
+        yield Finding(entry.label, "its feature point is bound to a vertex", f"{point} is not", "a vertex")
         return
     direction = np.array(DIRECTIONS[entry.positive])
     for value in (SMALL, -SMALL) if entry.direction == "B" else (SMALL,):
@@ -170,7 +170,7 @@ def _check_pupil(poser: Poser, fap: int) -> Iterator[Finding]:
 def _check_roll(poser: Poser, fap: int) -> Iterator[Finding]:
     entry = faps()[fap - 1]
     if not poser.has("6.2", "6.3", "6.4"):
-        yield Finding(entry.label, "6.2, 6.3 and 6.4 stand on vertices", "one is free", "vertices")
+        yield Finding(entry.label, "6.2, 6.3 and 6.4 are bound to vertices", "one is not", "vertices")
         return
     moved = poser.pose({fap: SMALL_ANGLE})
     for name, sign in (("6.3", 1.0), ("6.4", -1.0)):

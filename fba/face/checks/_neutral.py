@@ -245,7 +245,7 @@ def _check_symmetry(points: Float64) -> Iterator[Finding]:
     if known.sum() < 3:
         return
     apart = left[known] - right[known]
-    apart[:, 0] -= np.median(apart[:, 0])  # the face need not stand on x = 0
+    apart[:, 0] -= np.median(apart[:, 0])  # the face need not be centred on x = 0
     distance = np.linalg.norm(apart, axis=1)
     if distance.mean() > SYMMETRY * unit:
         worst = list(MIRRORED.items())[int(np.flatnonzero(known)[int(distance.argmax())])]

@@ -69,11 +69,11 @@ class Poser:
         return self.pose(values) - self.neutral
 
     def vertex(self, point: str) -> int:
-        """The vertex of a feature point, counted through all parts; -1 where it is free."""
+        """The vertex of a feature point, counted through all parts; -1 if it is bound to none."""
         return int(self.model.bound[row_of()[point]])
 
     def has(self, *points: str) -> bool:
-        """Whether all these feature points stand on vertices."""
+        """Whether all these feature points are bound to vertices."""
         return all(self.vertex(point) >= 0 for point in points)
 
     def point(self, point: str) -> Float64:

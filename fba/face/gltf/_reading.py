@@ -36,7 +36,7 @@ def read_model(document: Document) -> FaceModel:
     content = optional_member(document.root.get("extensions"), NAME)
     if content is None:
         raise document.root.error(
-            f"brings no extension {NAME}, so it is no face model of this project; a plain glTF head with "
+            f"has no extension {NAME}, so it is not a face model of fba; a plain glTF head with "
             "morph targets can be imported: fba model import"
         )
     version = content.member("version").integer(0, 1 << 30)
@@ -84,7 +84,7 @@ def _part(entry: Value, where: Value, gltf: Gltf, number: int, budget: Budget) -
     if node.mesh is None or len(gltf.meshes[node.mesh].primitives) != 1:
         raise where.error(f"node {number} must have a mesh of one primitive")
     if node.skin is not None or not np.array_equal(node.world, np.eye(4)):
-        raise where.error(f"node {number} must stand where it is modelled: no transform, no skin")
+        raise where.error(f"node {number} must have no transform and no skin")
     primitive = gltf.meshes[node.mesh].primitives[0]
     # for the copies in the part and in the joined arrays of the face
     budget.charge(len(primitive.positions) * 120 + len(primitive.triangles) * 36, entry)
@@ -200,5 +200,5 @@ def _fap_number(name: str, value: Value) -> int:
     """The number of a low-level FAP by its name. value: named in the error."""
     number = fap_numbers().get(name, 0)
     if number < FIRST_LOW_LEVEL_FAP:
-        raise value.error(f"{name[:60]!a} is the name of no low-level FAP")
+        raise value.error(f"{name[:60]!a} is not the name of a low-level FAP")
     return number
