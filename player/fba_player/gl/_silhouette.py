@@ -128,7 +128,7 @@ def _add(
     facing: Int8,
     marked: UInt8,
 ) -> None:
-    """Project and mark in one call: calls from Python cost most."""
+    """Project and mark in one call, as each call from Python costs more than the loops."""
     _project(positions, sway, turn, centre, clip, size, seen)
     _outline(seen, triangles, ends, sides, size, facing, marked)
 

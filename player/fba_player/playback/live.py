@@ -79,8 +79,6 @@ class LiveAnimation:
         self._thread = threading.Thread(target=self._read, args=(head,), name="fba live", daemon=True)
         self._thread.start()
 
-    # ---- an animation
-
     @property
     def rate(self) -> Fraction:
         """Frames a second."""
@@ -113,8 +111,6 @@ class LiveAnimation:
     def snapshot(self) -> Animation:
         """A copy of what has arrived so far. Raises ValueError before the first frame."""
         return self._now.animation(self.name)
-
-    # ---- a stream
 
     def info(self) -> StreamInfo:
         """Planes that have arrived, their bits and the bit rate; without the list of parameters."""

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Motion:
-    """How time goes on since the last change of the transport: playing at a speed, or standing still.
+    """How the time follows the clock since the last change of the transport, playing or standing still.
 
     Immutable, so that the sound's thread may read it at any time. since: reading of the clock, in seconds, at
-    which the time is `here`; before, it stands still there. speed: seconds of the animation per second of the
-    clock. playing: False stays at `here`. stop: the time at which it jumps back or ends; low, high: the range
-    that it then repeats, if loop is set; rest: where it stands at the end without. All times are in seconds
-    of the animation.
+    which the time is `here`, as before it. speed: seconds of the animation per second of the clock. playing:
+    False stays at `here`. stop: the time at which it jumps back or ends; low, high: the range that it repeats
+    after that, if loop is set; rest: where it ends without a loop. Times are seconds of the animation.
     """
 
     since: float
@@ -44,7 +43,7 @@ class Motion:
         return self.playing and clock >= self.since and (repeats or not self.over(clock))
 
     def until_turn(self, clock: float) -> float:
-        """Least seconds of the clock until it starts, jumps or stops; infinite where it stands still."""
+        """Seconds of the clock until it starts, jumps or stops; infinite if it stands still."""
         if not self.playing:
             return math.inf
         if clock < self.since:

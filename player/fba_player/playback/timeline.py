@@ -109,10 +109,9 @@ class Timeline:
     def baps(self, time: float) -> Float64:
         """BAPs shown at a time in seconds, float64 (296,); zeros where the animation has no body.
 
-        Between two frames each angle goes the shorter way round: one that jumps by a full turn, as it may
-        where somebody turns around, does not spin. Angles are interpolated linearly, which is nearly what
-        slerp would do: half way between two frames of twenty captured performances, at their own rates, 99.9
-        % of joints differ from that by less than half a degree.
+        Between two frames each angle takes the shorter way round, so an angle that wraps by a full turn does
+        not spin. Angles are interpolated linearly, nearly as by slerp: half way between two frames of twenty
+        captured performances, at their own rates, 99.9 % of joints differ from it by less than half a degree.
         """
         if self.animation.body is None:
             return np.zeros(BAP_COUNT)

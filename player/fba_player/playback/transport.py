@@ -52,8 +52,6 @@ class Transport:
         self._arrived = timeline.arrived
         self._motion = self._motion_from(clock(), self.start)
 
-    # ---- where it is
-
     @property
     def start(self) -> float:
         """Time of the first frame."""
@@ -99,8 +97,6 @@ class Transport:
         """How the time follows the clock since the last change; any thread may read it."""
         return self._motion
 
-    # ---- playing
-
     @property
     def playing(self) -> bool:
         """Whether it plays; also while it waits for a stream to arrive."""
@@ -144,8 +140,6 @@ class Transport:
         else:
             self.play()
 
-    # ---- going elsewhere
-
     def seek(self, time: float) -> None:
         """Go to a time, limited to start..end, and go on from there. ValueError if it is not finite."""
         if not math.isfinite(time):
@@ -173,8 +167,6 @@ class Transport:
     def last(self) -> None:
         """Go to the last frame; while a live stream is playing, `BUFFER` seconds before it."""
         self.seek(self._last_time() - (BUFFER if self._timeline.growing and self._playing else 0.0))
-
-    # ---- speed, loop, marks, interpolation
 
     @property
     def speed(self) -> float:
@@ -229,7 +221,7 @@ class Transport:
     def mark_out(self) -> float | None:
         """Where a loop ends, seconds; None for the end. Setting it at or before `mark_in` clears that.
 
-        Set to the current time while playing, it jumps back or stops at once.
+        If it is set to the current time while playing, playback jumps back or stops at once.
         """
         return self._mark_out
 
@@ -269,8 +261,6 @@ class Transport:
         self._latency = latency
         self._motion = self._motion_from(clock(), here)
 
-    # ---- text
-
     def text(self) -> str:
         """Time, frame and speed as text: "0:01.240 / 0:04.000   frame 31 / 100   1x"."""
         time = self.time
@@ -291,8 +281,6 @@ class Transport:
         have begun in that second, from 00.
         """
         return timecode(self.time if time is None else time, self._timeline.rate)
-
-    # ---- private
 
     def _last_time(self) -> float:
         return float(self._timeline.time_of(self._timeline.frames - 1))

@@ -119,24 +119,6 @@ class CompareScene(Timed[CompareTimeline]):
         """Whether a scene has a body."""
         return any(scene.has_body for scene in self.scenes)
 
-    @property
-    def subject(self) -> Subject:
-        """What a camera should have in view: all figures."""
-        return self._all([scene.subject for scene in self.scenes])
-
-    @property
-    def face_subject(self) -> Subject:
-        """What a camera should have in view: all heads."""
-        return self._all([scene.face_subject for scene in self.scenes])
-
-    @property
-    def gesture_subject(self) -> Subject | None:
-        """All figures from the hips up if that shows all that moves, else None."""
-        subjects = [scene.gesture_subject if scene.has_body else scene.subject for scene in self.scenes]
-        if not self.has_body or not all(subjects):
-            return None
-        return self._all([subject for subject in subjects if subject is not None])
-
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """A camera that has all figures in view; from now on they stand side by side as it sees them.
 

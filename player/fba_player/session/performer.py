@@ -1,4 +1,4 @@
-"""Puppeteering: the puppet of a session, and recording, showing and saving its takes."""
+"""Puppeteering: changes the values that a session shows, and records, shows and saves takes."""
 
 from __future__ import annotations
 

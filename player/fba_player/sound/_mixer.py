@@ -13,9 +13,9 @@ from fba_player.playback.playhead import Motion
 FADE = 0.004
 """Seconds over which sound fades in, out, and across a jump: without them it would click."""
 ROUNDING = 1e-7
-"""Seconds: a jump this little ahead is due now, and late by rounding only."""
+"""Seconds: a jump that is at most this far ahead is due now; the rest is rounding."""
 SLIP = 0.002
-"""Seconds by which the sample that is due may differ from the one that follows the last, without a jump."""
+"""Seconds by which the sample due now may differ from the next one in the file without counting as a jump."""
 
 
 class SoundMixer:

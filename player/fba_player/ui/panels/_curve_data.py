@@ -43,8 +43,8 @@ class Course:
 class Courses:
     """Courses of the parameters of a timeline, computed when they are needed.
 
-    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds added to
-    its times.
+    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds that are
+    added to its times.
     """
 
     def __init__(self, timeline: Any, model: FaceSettings | None = None, later: float = 0.0) -> None:
