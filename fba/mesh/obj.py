@@ -88,9 +88,9 @@ class _Reader:
 
     def _numbers(self, tokens: list[str], what: str) -> list[float]:
         try:
-            found = [float(token) for token in tokens]
-            if sum(map(abs, found)) < 1e30:
-                return found
+            numbers = [float(token) for token in tokens]
+            if sum(map(abs, numbers)) < 1e30:
+                return numbers
         except ValueError:
             pass
         return [parse_number(token, self.where, what) for token in tokens]

@@ -32,7 +32,7 @@ class _Reader:
         self.vertices = 0
 
     def read(self) -> list[Polygons]:
-        found: list[Polygons] = []
+        meshes: list[Polygons] = []
         depth, start, node = 0, -1, ""
         fields: dict[str, list[float]] = {}
         inner = ""  # "Coordinate" or "TextureCoordinate", whichever was named last
@@ -57,7 +57,7 @@ class _Reader:
                         inner = node
                 elif token == "}":
                     if depth == start:
-                        found.append(self._shape(fields))
+                        meshes.append(self._shape(fields))
                         start = -1
                     depth -= 1
                     if depth < 0:
@@ -68,9 +68,9 @@ class _Reader:
                 last = token
         if depth or key is not None:
             raise ModelError(f"{self.path}: ends with open brackets; was it fully copied?")
-        if not found:
+        if not meshes:
             raise ModelError(f"{self.path}: there is no IndexedFaceSet in it")
-        return found
+        return meshes
 
     @staticmethod
     def _bare(text: str) -> str:

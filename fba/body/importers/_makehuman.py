@@ -86,11 +86,11 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
     low = mesh.vertices[body].reshape(-1, 3)[:, 1].min()
     vertices = (mesh.vertices - (0.0, low, 0.0)) * METRES
     rig = _json(folder / RIG_FILE)
-    bones, at = _rig(rig, vertices)
-    positions = _joint_positions(at, rig)
+    bones, position_of = _rig(rig, vertices)
+    positions = _joint_positions(position_of, rig)
     bind = bind_matrices(positions)
     weights = _weights(_json(folder / WEIGHTS_FILE), bones, vertices, positions)
-    pupils = np.array([at(rig, f"eye.{side}____head") for side in "LR"])
+    pupils = np.array([position_of(rig, f"eye.{side}____head") for side in "LR"])
     pupils[:, 2] += _eye_radius(mesh, vertices)
     return BodyModel(
         parts=_parts(mesh, vertices, weights),
@@ -106,16 +106,16 @@ def import_makehuman(path: str | os.PathLike[str], *, name: str = "MakeHuman") -
 
 
 class _RigPositions:
-    """Positions of a rig's joints, each the mean of several vertices: call it with the rig and a name."""
+    """Returns positions of joints, each the mean of several vertices; called with the rig and a name."""
 
-    def __init__(self, listed: Mapping[str, Value], vertices: Float64) -> None:
-        self._listed = listed
+    def __init__(self, joints: Mapping[str, Value], vertices: Float64) -> None:
+        self._joints = joints
         self._vertices = vertices
 
     def __call__(self, rig: Value, name: str) -> Float64:
-        if name not in self._listed:
+        if name not in self._joints:
             raise rig.error(f"there is no joint {name!r}; is it MakeHuman's default rig?")
-        entry = self._listed[name]
+        entry = self._joints[name]
         rows = [value.index(len(self._vertices), "vertex") for value in entry.elements(1000)]
         if not rows:
             raise entry.error("a joint needs at least one vertex")
@@ -163,21 +163,21 @@ def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
     return tuple(rows)
 
 
-def _joint_positions(at: _RigPositions, rig: Value) -> Float64:
+def _joint_positions(position_of: _RigPositions, rig: Value) -> Float64:
     """Return (J, 3) positions of the standard's joints, metres."""
     default = Skeleton.default()
     positions = np.full((len(default), 3), np.nan)
     for joint, start, end, share, _ in _rows():
-        first = at(rig, start)
-        positions[default.number(joint)] = first + ((at(rig, end) - first) * share if end else 0.0)
+        first = position_of(rig, start)
+        positions[default.number(joint)] = first + ((position_of(rig, end) - first) * share if end else 0.0)
     for side in "lr":  # the foot's joints lie lower than the line between ankle and toes
         ankle = positions[default.number(f"{side}_ankle")]
         positions[default.number(f"{side}_subtalar"), 1] = ankle[1] * 0.55
-    knots = np.array([at(rig, f"{bone}____head") for bone in SPINE])
+    knots = np.array([position_of(rig, f"{bone}____head") for bone in SPINE])
     knots = np.concatenate([positions[default.number("HumanoidRoot")][None], knots])
     knots = knots[np.concatenate([[True], np.diff(np.maximum.accumulate(knots[:, 1])) > 0])]
     positions[default.number("skullbase")] = knots[-1]
-    neck = int(np.abs(knots[:, 1] - at(rig, "neck01____head")[1]).argmin())
+    neck = int(np.abs(knots[:, 1] - position_of(rig, "neck01____head")[1]).argmin())
     place_vertebrae(positions, knots, neck)
     return positions
 
