@@ -64,4 +64,4 @@ def _resize_table(table: FaceDefTables, factor: float) -> FaceDefTables:
 
 
 def _warn(text: str) -> None:
-    warnings.warn(text, FbaWarning, stacklevel=4)  # whoever made the scene
+    warnings.warn(text, FbaWarning, stacklevel=4)  # the caller of Scene

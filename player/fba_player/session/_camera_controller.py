@@ -82,7 +82,7 @@ class Viewpoint:
         return camera
 
     def refit(self) -> None:
-        """Fit the view to a picture of another shape, if it is a preset that nobody has moved since."""
+        """Fit the view to a picture of another shape, if it is a preset that was not moved since."""
         aspect, camera = self._fitted_to
         if self.aspect == aspect:
             return
