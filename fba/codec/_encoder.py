@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
+from collections import Counter
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
@@ -17,7 +19,7 @@ from fba.codec._plane.writer import DoesNotFitError, PlaneWriter
 from fba.codec._ranges import CLAMP, Ranges, fitting_ranges
 from fba.codec._runs import Run, find_runs
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
-from fba.errors import RangeError
+from fba.errors import FbaWarning, RangeError
 from fba.parameters import INTENSITY_MAX
 
 _CHUNK = 4096
@@ -26,11 +28,16 @@ _CHUNK = 4096
 
 @dataclass
 class EncoderStatistics:
-    """Counts of an encoder: planes and I planes written, and values clamped to their range."""
+    """Counts of an encoder: planes and I planes written, and values clamped to their range by parameter."""
 
     planes: int = 0
     intra_planes: int = 0
-    clamped: int = 0
+    clamped_parameters: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def clamped(self) -> int:
+        """Number of values clamped."""
+        return self.clamped_parameters.total()
 
 
 class Encoder:
@@ -136,7 +143,7 @@ class Encoder:
                 frame=self._writer.planes + frame,
             ).with_remedies(CLAMP)
         rows[:, slots.AMOUNTS] = np.clip(amounts, 0, INTENSITY_MAX)
-        self.statistics.clamped += len(wrong)
+        self._count_clamped([slots.AMOUNTS[column] for _, column in wrong])
 
     def _encode_run(self, run: Run, rate: Fraction) -> None:
         """Encode frames that send the same parameters."""
@@ -189,7 +196,7 @@ class Encoder:
             and not all(self._ranges[one].can_carry(run.masks[one], row) for one in run.parts)
         ):
             row[error.slot] = self._writer.nearest(error.slot, error.level)
-            self.statistics.clamped += 1
+            self._count_clamped([error.slot])
             return True
         ranges.widen(np.array([error.slot]), np.array([[0], [0], [error.level], [-error.level]]))
         return False
@@ -210,10 +217,14 @@ class Encoder:
             skip=int(run.skips[position]),
             start_code=self.options.start_codes and not first,
         )
-        self.statistics.clamped += self._writer.intra(plane, row, clamp=True)
+        self._count_clamped(self._writer.intra(plane, row, clamp=True))
         self.statistics.intra_planes += 1
         self._resumable = set(parts) | (set() if self.options.start_codes else self._resumable)
         self._last_intra = int(run.index[position])
+
+    def _count_clamped(self, clamped: list[int]) -> None:
+        """Count values of these slots as clamped."""
+        self.statistics.clamped_parameters.update(map(slots.label, clamped))
 
     def _part_settings(self, run: Run, part: int, row: Int32) -> PartSettings:
         """Return settings for an I plane, with ranges that hold its values; RangeError if none can."""
@@ -240,9 +251,19 @@ def encode(animation: Animation, options: EncoderOptions | None = None) -> bytes
     """Encode an animation as one FBA object, with ranges fitted to all of it.
 
     Raises RangeError for what the syntax cannot carry (see `EncoderOptions.clamp`), ValueError for an
-    animation without frames. `encode_with_statistics` counts what was clamped.
+    animation without frames. Gives an FbaWarning that names what was clamped.
     """
-    return encode_with_statistics(animation, options)[0]
+    data, statistics = encode_with_statistics(animation, options)
+    if statistics.clamped:
+        names = [f"{name} ({count})" for name, count in statistics.clamped_parameters.most_common(3)]
+        more = len(statistics.clamped_parameters) - len(names)
+        warnings.warn(
+            f"values limited to what their ranges carry: {statistics.clamped}, of {', '.join(names)}"
+            f"{f' and {more} parameters more' if more else ''}; a larger quantiser may carry them",
+            FbaWarning,
+            stacklevel=2,
+        )
+    return data
 
 
 def encode_with_statistics(

@@ -8,7 +8,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Int32, Int64, UInt8
 from fba.codec._options import EncoderOptions
 from fba.codec._plane import quantiser, slots
-from fba.codec._plane.loops import quantise
+from fba.codec._plane.loops import quantise, quantise_change
 from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT, RangeLists
 from fba.compiled import compiled
 from fba.errors import RangeError, Remedy
@@ -137,7 +137,7 @@ def _extremes(values: Int32, mask: Bool, step: Int64, extremes: Int64) -> None:
             extremes[0, column] = max(int(extremes[0, column]), level)
             extremes[1, column] = max(int(extremes[1, column]), -level)
             if following:
-                change = quantise(value - last, one_step)
+                change = quantise_change(value, last, one_step)
                 extremes[2, column] = max(int(extremes[2, column]), change)
                 extremes[3, column] = max(int(extremes[3, column]), -change)
                 last += change * one_step

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codec_streams import WIDEST, largest_level, steps
-from fba import Animation, BodyTrack, EncoderOptions, FaceTrack, RangeError, decode, encode
+from fba import Animation, BodyTrack, EncoderOptions, FaceTrack, FbaWarning, RangeError, decode, encode
 from fba.codec import encode_with_statistics
 from fba.parameters import baps, faps
 
@@ -181,3 +181,20 @@ def test_amounts_out_of_range(field: str, column: int, value: int) -> None:
 def test_wrong_options(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         EncoderOptions(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_value_at_the_end_of_int32_is_rounded_inwards(sign: int) -> None:
+    """The nearest multiple of the step lies outside, and no decoder takes it."""
+    ramp = np.clip(sign * 900_000 * np.arange(2400, dtype=np.int64), -(2**31), 2**31 - 1)
+    wide = next(bap.number for bap in baps() if bap.step_iso == 512)
+    decoded = decode(encode(one_value("body", wide, ramp.tolist())))
+    assert decoded.body is not None
+    error = np.abs(decoded.body.values[:, wide - 1] - ramp)
+    assert error[:2386].max() <= 256
+    assert error.max() < 512
+
+
+def test_what_is_clamped_is_named_in_a_warning() -> None:
+    with pytest.warns(FbaWarning, match=r"ranges carry: 3, of FAP 3 open_jaw \(3\)"):
+        encode(one_value("face", 3, [90_000] * 3), EncoderOptions(clamp=True))

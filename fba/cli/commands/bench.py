@@ -42,7 +42,7 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool)
 
 def _measure(file: Path, rounds: int, bap_steps: str) -> dict[str, Any]:
     """Return the symbols of a stream, and seconds and symbols per second of decoding and encoding it."""
-    from fba.codec import Decoder, EncoderOptions, decode, encode
+    from fba.codec import Decoder, EncoderOptions, decode, encode_with_statistics
     from fba.compiled import is_compiled
 
     with input_file(file) as path:
@@ -62,7 +62,7 @@ def _measure(file: Path, rounds: int, bap_steps: str) -> dict[str, Any]:
     for name, run in (
         ("decode", lambda: decode(data, bap_steps=bap_steps)),
         ("decode in chunks of 512 bytes", stream),
-        ("encode", lambda: encode(animation, encoder)),
+        ("encode", lambda: encode_with_statistics(animation, encoder)),
     ):
         run()
         times = []

@@ -327,6 +327,18 @@ def quantise_size(size: int, step: int) -> int:
 
 
 @compiled
+def quantise_change(value: int, last: int, step: int) -> int:
+    """Return the level of a difference: nearest to value - last, but such that its sum stays an int32."""
+    level = quantise(value - last, step)
+    rounded = last + level * step
+    if rounded > _INT32_MAX:
+        return level - 1
+    if rounded < -_INT32_MAX - 1:
+        return level + 1
+    return level
+
+
+@compiled
 def encode_values(
     data: UInt8,
     bit: int,
@@ -422,7 +434,8 @@ def encode_run(
             return count, OUT_OF_DATA, bit, -1, before
         for position in range(len(order)):
             slot = int(order[position])
-            symbol = quantise(int(rows[count, slot]) - int(last[slot]), int(step[slot])) - int(minimum[slot])
+            level = quantise_change(int(rows[count, slot]), int(last[slot]), int(step[slot]))
+            symbol = level - int(minimum[slot])
             if symbol < 0 or symbol >= coding.models.size[slot]:
                 return count, OUT_OF_RANGE, bit, slot, before
             symbols[position] = symbol

@@ -69,8 +69,8 @@ class PlaneWriter:
         nearest = min(max(level, low), low + int(models.size[slot]) - 1)
         return int(models.last[slot]) + nearest * int(models.step[slot])
 
-    def intra(self, settings: PlaneSettings, row: Int32, *, clamp: bool = False) -> int:
-        """Write an I plane with the values of row (columns,); return how many were clamped to their range.
+    def intra(self, settings: PlaneSettings, row: Int32, *, clamp: bool = False) -> list[int]:
+        """Write an I plane with the values of row (columns,); return slots that were clamped to their range.
 
         Raises DoesNotFitError before anything is written, unless `clamp`.
         """
@@ -81,7 +81,7 @@ class PlaneWriter:
             if part_settings is not None
         ]
         plan = []
-        clamped = 0
+        clamped: list[int] = []
         for part, part_settings in parts:
             models.begin_intra(part, part_settings)
             order, segments = slots.coding_order(
@@ -94,7 +94,7 @@ class PlaneWriter:
             misfits = np.flatnonzero(fitting != levels)
             if len(misfits) and not clamp:
                 raise DoesNotFitError(int(order[misfits[0]]), int(levels[misfits[0]]))
-            clamped += len(misfits)
+            clamped += order[misfits].tolist()
             plan.append((part, part_settings, order, segments, fitting))
         writer = self._writer
         if settings.start_code:
@@ -157,8 +157,8 @@ class PlaneWriter:
             done += count
             self.planes += count
             if status == loops.OUT_OF_RANGE:
-                difference = int(rows[done, slot]) - int(models.last[slot])
-                raise DoesNotFitError(slot, loops.quantise(difference, int(models.step[slot])), done)
+                last, step = int(models.last[slot]), int(models.step[slot])
+                raise DoesNotFitError(slot, loops.quantise_change(int(rows[done, slot]), last, step), done)
             if status == OUT_OF_DATA:
                 need = loops.room_for(int(skips[done]), layout)
                 writer.reserve(max(need, 8 * len(writer.data)))
