@@ -33,7 +33,7 @@ def random_animation(random: Random) -> Animation:
     index = np.cumsum([random.choice((1, 1, 1, 1, 2, 16, 17, 31, 300)) for _ in range(count)])
     face = _face(random, count) if parts & 1 else None
     body = _body(random, count) if parts & 2 else None
-    return Animation(25, index - index[0], face, body)
+    return Animation(Fraction(25), index - index[0], face, body)
 
 
 def random_options(random: Random) -> EncoderOptions:
