@@ -114,7 +114,7 @@ def test_fit_fails_in_one_line_and_writes_nothing(run: Run, tmp_path: Path) -> N
     code, out, err = run("model", "fit", path, "-o", target)
     assert (code, out) == (1, "")
     assert err.count("\n") == 1
-    assert "one spot" in err
+    assert "coincide" in err
     assert not target.exists()
 
 
