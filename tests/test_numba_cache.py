@@ -76,7 +76,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Mo
     return load
 
 
-def told(module: ModuleType) -> tuple[float, int]:
+def compiled_and_called(module: ModuleType) -> tuple[float, int]:
     """The total of three ones, and how many functions were compiled for it."""
     import numpy as np
 
@@ -91,20 +91,20 @@ def files(tmp_path: Path) -> list[Path]:
 
 
 def test_what_was_compiled_is_found_again(program: Callable[..., ModuleType], tmp_path: Path) -> None:
-    assert told(program()) == (15.0, 2)
+    assert compiled_and_called(program()) == (15.0, 2)
     assert len(files(tmp_path)) == 2
-    assert told(program()) == (15.0, 0)
+    assert compiled_and_called(program()) == (15.0, 0)
 
 
 def test_another_constant_or_helper_is_compiled_anew(program: Callable[..., ModuleType]) -> None:
-    assert told(program())[0] == 15.0
-    assert told(program(factor=3.0))[0] == 21.0
-    assert told(program(sign="-"))[0] == 3.0
+    assert compiled_and_called(program())[0] == 15.0
+    assert compiled_and_called(program(factor=3.0))[0] == 21.0
+    assert compiled_and_called(program(sign="-"))[0] == 3.0
 
 
 @pytest.mark.parametrize("fault", ["cut", "empty", "garbage", "flipped", "folder", "unreadable", "other"])
 def test_a_faulty_file_is_made_anew(program: Callable[..., ModuleType], tmp_path: Path, fault: str) -> None:
-    assert told(program()) == (15.0, 2)
+    assert compiled_and_called(program()) == (15.0, 2)
     for path in files(tmp_path):
         good = path.read_bytes()
         if fault == "folder":
@@ -121,16 +121,16 @@ def test_a_faulty_file_is_made_anew(program: Callable[..., ModuleType], tmp_path
                 "other": files(tmp_path)[0].read_bytes(),
             }[fault]
             path.write_bytes(bad)
-    assert told(program())[0] == 15.0
+    assert compiled_and_called(program())[0] == 15.0
     if fault in ("cut", "empty", "garbage", "flipped"):
-        assert told(program()) == (15.0, 0)
+        assert compiled_and_called(program()) == (15.0, 0)
 
 
 def test_no_flipped_bit_is_loaded(program: Callable[..., ModuleType], tmp_path: Path) -> None:
     from fba._numba_cache import CodeFiles
 
     module = program()
-    told(module)
+    compiled_and_called(module)
     function = module.total.py_func
     store = CodeFiles(str(tmp_path), "one", function)
     store.save("key", {"code": bytes(range(256)) * 20})
@@ -177,5 +177,5 @@ def test_no_listener_hears_after_its_block(program: Callable[..., ModuleType]) -
     heard_of: list[int] = []
     with compilation_listener(lambda: heard_of.append(1)):
         pass
-    told(program())
+    compiled_and_called(program())
     assert heard_of == []

@@ -32,7 +32,7 @@ def moved(model: FaceModel, mm: dict[str, tuple[float, float, float]]) -> FaceMo
     return replace(model, points=points, bound=np.full(84, -1))
 
 
-def found(findings: list[Finding], subject: str, rule: str) -> Finding:
+def finding_for(findings: list[Finding], subject: str, rule: str) -> Finding:
     hits = [one for one in findings if one.subject == subject and one.rule == rule]
     assert len(hits) == 1, [str(one) for one in findings]
     return hits[0]
@@ -49,7 +49,7 @@ def test_the_units_of_length_do_not_matter_but_for_human_sizes(head: FaceModel) 
     ]
     findings = check_neutral(replace(head, parts=tuple(scaled), points=head.points * 100))
     assert {one.rule for one in findings} == {"size of a human face"}
-    assert found(findings, "ES0", "size of a human face").found.startswith("6200.0 mm")
+    assert finding_for(findings, "ES0", "size of a human face").found.startswith("6200.0 mm")
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_broken_rule_is_found(
     severity: str,
     text: str,
 ) -> None:
-    finding = found(check_neutral(moved(head, shift)), subject, rule)
+    finding = finding_for(check_neutral(moved(head, shift)), subject, rule)
     assert finding.severity == severity
     assert text in finding.found, finding
 
@@ -121,7 +121,7 @@ def test_a_misplaced_point_is_found(
     head: FaceModel, shift: dict[str, tuple[float, float, float]], subject: str, rule: str, severity: str
 ) -> None:
     findings = list(check_locations(moved(head, shift).points))
-    assert found(findings, subject, rule).severity == severity
+    assert finding_for(findings, subject, rule).severity == severity
 
 
 def test_both_sides_have_the_same_rules(head: FaceModel) -> None:
@@ -149,12 +149,12 @@ def test_sides_swapped_is_one_finding_a_pair(head: FaceModel) -> None:
     points = np.array(head.points)
     points[[ROW["9.1"], ROW["9.2"]]] = points[[ROW["9.2"], ROW["9.1"]]]
     findings = check_neutral(replace(head, points=points, bound=np.full(84, -1)))
-    assert found(findings, "9.1 and 9.2", "left and right").severity == "error"
+    assert finding_for(findings, "9.1 and 9.2", "left and right").severity == "error"
 
 
 def test_asymmetry_is_told_with_its_size(head: FaceModel) -> None:
     shift = dict.fromkeys(MIRRORED, (0.0, 4.0, 3.0))
-    finding = found(check_neutral(moved(head, shift)), "left and right", "symmetry")
+    finding = finding_for(check_neutral(moved(head, shift)), "left and right", "symmetry")
     assert finding.severity == "warning"
     assert "5.0 mm on average" in finding.found
     assert [one for one in check_neutral(head) if one.rule == "symmetry"] == []
@@ -194,7 +194,7 @@ def test_teeth_apart_as_meshes(head: FaceModel) -> None:
         for part in head.parts
     )
     findings = check_neutral(replace(head, parts=parts))
-    assert "2.0 mm apart" in found(findings, "parts upper teeth and lower teeth", "teeth touch").found
+    assert "2.0 mm apart" in finding_for(findings, "parts upper teeth and lower teeth", "teeth touch").found
 
 
 def test_an_egg_is_no_eyeball(head: FaceModel) -> None:
@@ -203,7 +203,7 @@ def test_an_egg_is_no_eyeball(head: FaceModel) -> None:
     egg = replace(eye, vertices=(centre + (eye.vertices - centre) * (1.0, 1.3, 1.0)).astype(np.float32))
     parts = tuple(egg if part is eye else part for part in head.parts)
     findings = check_neutral(replace(head, parts=parts))
-    assert found(findings, "left eye", "eyeball is a sphere").severity == "warning"
+    assert finding_for(findings, "left eye", "eyeball is a sphere").severity == "warning"
 
 
 @pytest.mark.parametrize(("pupil_mm", "severity"), [(3.9, None), (5.0, "warning"), (7.0, "error")])

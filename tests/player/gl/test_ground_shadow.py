@@ -34,7 +34,7 @@ def ball(radius: float, centre: tuple[float, float, float]) -> FaceMesh:
     return FaceMesh(shape, places, vertices.astype(np.float32), light, matrix, np.zeros(3), np.zeros(3))
 
 
-def at(shadow: CastShadow, x: float, z: float) -> float:
+def brightness_at(shadow: CastShadow, x: float, z: float) -> float:
     column, row = int((x - shadow.low[0]) / CELL), int((z - shadow.low[1]) / CELL)
     inside = 0 <= row < shadow.darkness.shape[0] and 0 <= column < shadow.darkness.shape[1]
     return float(shadow.darkness[row, column]) / 255 if inside else 0.0
@@ -45,8 +45,8 @@ def test_a_shadow_lies_where_the_light_throws_it() -> None:
     shadow = ShadowCaster().cast([ball(0.4, (0.0, height, 0.0))], (0.0, 0.0))
     assert shadow is not None
     x, z = (-LIGHT[axis] / LIGHT[1] * height for axis in (0, 2))
-    assert at(shadow, x, z) == pytest.approx(KEY_SHARE, abs=0.12)  # all of the key light is hidden
-    assert at(shadow, -x, -z) < 0.03
+    assert brightness_at(shadow, x, z) == pytest.approx(KEY_SHARE, abs=0.12)  # all of the key light is hidden
+    assert brightness_at(shadow, -x, -z) < 0.03
     # The ball's section, thrown on the ground, is the longer the lower the light stands.
     covered = (shadow.darkness > shadow.darkness.max() / 2).sum() * CELL**2
     assert covered == pytest.approx(np.pi * 0.4**2 / LIGHT[1], rel=0.2)
@@ -56,7 +56,7 @@ def test_what_touches_the_ground_darkens_it_most() -> None:
     low, high = (ShadowCaster().cast([ball(0.3, (0.0, height, 0.0))], (0.0, 0.0)) for height in (0.28, 0.9))
     assert low is not None
     assert high is not None
-    assert at(low, 0.0, 0.0) > at(high, 0.0, 0.0) + 0.3
+    assert brightness_at(low, 0.0, 0.0) > brightness_at(high, 0.0, 0.0) + 0.3
     assert low.darkness.max() / 255 <= 1 - (1 - KEY_SHARE) * (1 - SKY_SHARE) + 0.01
 
 
