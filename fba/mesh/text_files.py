@@ -96,8 +96,8 @@ def parse_number(token: str, where: str, what: str) -> float:
 def parse_integer(token: str, where: str, what: str) -> int:
     """Return a whole number, else ModelError naming the place."""
     try:
-        # int() takes underscores, other scripts' digits and numbers of any length
-        if len(token) <= 20 and token.isascii() and "_" not in token:
+        # int() takes underscores, other scripts' digits and numbers of any length; 18 digits fit an int64
+        if len(token) <= 18 and token.isascii() and "_" not in token:
             return int(token)
     except ValueError:
         pass

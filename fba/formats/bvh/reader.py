@@ -10,6 +10,7 @@ import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
@@ -310,8 +311,7 @@ def _number(word: str, path: str | Path | None, line: int, any_size: bool = Fals
 def _rate(frame_time: str) -> Fraction:
     """Return frames per second: the nearest nominal rate that the rounded frame time of a file can mean."""
     value = float(frame_time)
-    mantissa, _, exponent = frame_time.lower().partition("e")
-    digits = len(mantissa.partition(".")[2]) - (int(exponent) if exponent else 0)
+    digits = -int(Decimal(frame_time).as_tuple().exponent)
     tolerance = max(0.5 * 10.0**-digits * 1.01, value * 2e-5)
     near = [r for r in NOMINAL_RATES if abs(1 / float(r) - value) <= tolerance]
     if near:

@@ -76,7 +76,9 @@ def read(
             motion, joints=joints, scale=scale, origin=origin, ground=ground, plant=plant, spine=spine
         )
     except ModelError as error:
-        raise FormatError(error.finding, path=path).with_remedies(*error.remedies) from error
+        raise FormatError(error.finding.removeprefix(f"{path}: "), path=path).with_remedies(
+            *error.remedies
+        ) from error
 
 
 def read_motion(

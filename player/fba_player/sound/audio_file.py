@@ -169,7 +169,10 @@ class SoundFile:
                 at += len(part)
                 yield part
         if at is not None:
-            yield from convert(None)
+            try:
+                yield from convert(None)
+            except self._av.error.FFmpegError as error:
+                self._warn(error)
 
     def _frames(self) -> Iterator[Any]:
         """Decoded frames; damaged ones are left out, with a warning the first time."""

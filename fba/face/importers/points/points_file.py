@@ -133,7 +133,7 @@ def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
             continue
         try:
             position = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             position = np.array([np.nan])
         if position.shape != (3,) or not np.isfinite(position).all():
             raise ModelError(

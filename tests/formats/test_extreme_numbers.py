@@ -1,0 +1,113 @@
+"""Numbers that no honest file has: refused with their place, never another exception."""
+
+from __future__ import annotations
+
+import json
+import struct
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba.errors import FbaError, FormatError, ModelError
+from fba.face.importers.points.points_file import read_points
+from fba.formats.bvh.reader import read_motion
+from fba.mesh.ply import read_ply
+from fba.mesh.vrml import read_vrml
+from fba.mesh.wfm import read_wfm
+
+BVH = """HIERARCHY
+ROOT Hips
+{
+OFFSET 0 0 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+End Site
+{
+OFFSET 0 1 0
+}
+}
+MOTION
+Frames: 1
+Frame Time: %s
+0 0 0
+"""
+
+
+@pytest.mark.parametrize("digits", [20, 400])
+def test_indices_beyond_int64(tmp_path: Path, digits: int) -> None:
+    number = "1" * digits
+    wfm = tmp_path / "a.wfm"
+    wfm.write_text(f"3\n0 0 0\n1 0 0\n0 1 0\n1\n0 1 {number}\n")
+    with pytest.raises(ModelError, match=r"a\.wfm:6: a vertex must be a whole number"):
+        read_wfm(wfm)
+    vrml = tmp_path / "a.wrl"
+    vrml.write_text(
+        "#VRML V2.0 utf8\nShape { geometry IndexedFaceSet {\ncoord Coordinate { point [0 0 0, 1 0 0, 0 1 0] } "
+        f"coordIndex [0, 1, {number}, -1] }} }}\n"
+    )
+    with pytest.raises(ModelError, match=r"a\.wrl:3: an index must be a whole number"):
+        read_vrml(vrml)
+
+
+@pytest.mark.parametrize("count", ["inf", "-inf", "nan", "1e30", "3.5"])
+def test_a_count_of_corners_that_is_none(tmp_path: Path, count: str) -> None:
+    ply = tmp_path / "a.ply"
+    ply.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list float int vertex_indices\nend_header\n"
+        f"0 0 0\n1 0 0\n0 1 0\n{count} 0 1 2\n"
+    )
+    with pytest.raises(ModelError, match=r"a\.ply"):
+        read_ply(ply)
+
+
+def test_a_point_of_four_hundred_digits(tmp_path: Path) -> None:
+    path = tmp_path / "points.json"
+    path.write_text(f'{{"2.1": [0, 1{"0" * 400}, 0]}}')
+    with pytest.raises(ModelError, match=r"feature point 2\.1 must be \[x, y, z\]"):
+        read_points(path)
+
+
+@pytest.mark.parametrize("time", ["1e-" + "0" * 5000, "1e-" + "0" * 5000 + "1", "0.04" + "0" * 5000])
+def test_frame_times_of_many_digits_are_numbers(tmp_path: Path, time: str) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(BVH % time)
+    assert read_motion(path).rate > 0
+
+
+@pytest.mark.parametrize("time", ["1e-99999", "1e99999", "1e-" + "9" * 5000, "nan", "0." + "0" * 5000 + "1"])
+def test_frame_times_that_are_none(tmp_path: Path, time: str) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(BVH % time)
+    with pytest.raises(FormatError, match=r"a\.bvh:13"):
+        read_motion(path)
+
+
+@pytest.mark.parametrize("value", [-1e308, 1e308, 3e38])
+def test_translations_that_overflow(tmp_path: Path, value: float) -> None:
+    node = {"name": "Hips", "translation": [value, value, 0], "scale": [1e10, 1, 1], "children": [1]}
+    path = tmp_path / "a.gltf"
+    path.write_text(json.dumps({
+        "asset": {"version": "2.0"},
+        "nodes": [node, {"name": "Spine", "translation": [value, 0, 0]}],
+        "scenes": [{"nodes": [0]}],
+    }))  # fmt: skip
+    with pytest.raises(FbaError, match=r"a\.gltf"):
+        fba.read(path)
+
+
+@pytest.mark.parametrize("channels", [64, 4095])
+def test_more_channels_than_can_be_mixed(tmp_path: Path, channels: int) -> None:
+    pytest.importorskip("av")
+    from fba_player.sound.audio_file import SoundFile
+
+    path = tmp_path / "a.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(channels)
+        file.setsampwidth(2)
+        file.setframerate(8000)
+        file.writeframes(struct.pack("<h", 1000) * channels * 100)
+    with pytest.warns(UserWarning, match="left out"), pytest.raises(FormatError, match="no sound"):
+        SoundFile(path).read(0, np.iinfo(np.int16).max)
