@@ -44,7 +44,8 @@ def test_indices_beyond_int64(tmp_path: Path, digits: int) -> None:
         read_wfm(wfm)
     vrml = tmp_path / "a.wrl"
     vrml.write_text(
-        "#VRML V2.0 utf8\nShape { geometry IndexedFaceSet {\ncoord Coordinate { point [0 0 0, 1 0 0, 0 1 0] } "
+        "#VRML V2.0 utf8\n"
+        "Shape { geometry IndexedFaceSet { coord Coordinate { point [0 0 0, 1 0 0, 0 1 0] }\n"
         f"coordIndex [0, 1, {number}, -1] }} }}\n"
     )
     with pytest.raises(ModelError, match=r"a\.wrl:3: an index must be a whole number"):
