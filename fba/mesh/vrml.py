@@ -11,7 +11,8 @@ from fba.errors import ModelError
 from fba.mesh.polygons import Polygons
 from fba.mesh.text_files import MAX_CORNERS, MAX_FACES, MAX_VERTICES, parse_integer, parse_number, read_lines
 
-TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]|[^\s,\[\]{}"]+')
+TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}]|[^\s,\[\]{}"]+')
+STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 LISTS = ("point", "coordIndex", "texCoordIndex")
 
 
@@ -30,6 +31,7 @@ class _Reader:
         self.path = path
         self.line = 0
         self.vertices = 0
+        self._within_string = False
 
     def read(self) -> list[Polygons]:
         meshes: list[Polygons] = []
@@ -42,7 +44,7 @@ class _Reader:
             self.line = number_
             if number_ == 1 and not text.startswith("#VRML"):
                 raise ModelError(f"{self.path}:1: a VRML file begins with '#VRML', not {text[:20]!r}")
-            for token in TOKEN.findall(self._bare(text)):
+            for token in self._tokens(text):
                 if key is not None:
                     if token == "]":
                         key = None
@@ -72,9 +74,15 @@ class _Reader:
             raise ModelError(f"{self.path}: there is no IndexedFaceSet in it")
         return meshes
 
-    @staticmethod
-    def _bare(text: str) -> str:
-        return text.split("#", 1)[0] if "#" in text and '"' not in text else text
+    def _tokens(self, text: str) -> list[str]:
+        """Return the tokens of a line, without comments; a string may go on over several lines."""
+        if self._within_string:
+            text = '"' + text
+        elif "#" in text and '"' not in text:
+            text = text.split("#", 1)[0]
+        tokens: list[str] = TOKEN.findall(text)
+        self._within_string = bool(tokens) and tokens[-1][0] == '"' and not STRING.fullmatch(tokens[-1])
+        return tokens
 
     def _number(self, values: list[float], token: str, key: str) -> None:
         where = f"{self.path}:{self.line}"

@@ -205,10 +205,11 @@ def _motion_header(lines: list[str], start: int, path: str | Path | None) -> tup
     """Return the stated number of frames, the frame time as text, and the line (0-based) after it."""
     stated: int | None = None
     for number in range(start, min(start + 50, len(lines))):
-        frames = re.search(r"\bFrames\s*:?\s*([0-9]{1,18})\b", lines[number], re.IGNORECASE)
+        line = " ".join(lines[number].split())  # the patterns take time with the square of a row of spaces
+        frames = re.search(r"\bFrames ?:? ?([0-9]{1,18})\b", line, re.IGNORECASE)
         if frames:
             stated = int(frames[1])
-        time = re.search(r"\bFrame\s+Time\s*:?\s*(\S+)\s*$", lines[number], re.IGNORECASE)
+        time = re.search(r"\bFrame Time ?:? ?(\S+)$", line, re.IGNORECASE)
         if time:
             value = _number(time[1], path, number)
             if not 1 / MAX_RATE <= value <= 3600:
