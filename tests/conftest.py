@@ -13,12 +13,6 @@ import graphics
 from ready_programs import ready_programs
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Return one worker more than there are processors: tests that wait for a program leave theirs idle."""
-    return (os.cpu_count() or 1) + 1
-
-
 @pytest.fixture(scope="session")
 def programs() -> Iterator[Path]:
     """A folder with `fba` and `python` that start at once."""

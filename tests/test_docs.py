@@ -180,11 +180,7 @@ def test_every_reason_for_not_running_belongs_to_a_block() -> None:
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=id_of)
-def test_page_runs_from_its_first_block_to_its_last(
-    page: Path, tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
-    """The README's blocks with the installed programs; those of the others with the same, started sooner."""
-    programs = BIN if page.name == "README.md" else request.getfixturevalue("programs")
+def test_page_runs_from_its_first_block_to_its_last(page: Path, tmp_path: Path, programs: Path) -> None:
     folder, place = tmp_path / "reader", tmp_path / "place"
     folder.mkdir()
     for sample in SAMPLES.iterdir():

@@ -83,9 +83,9 @@ def living(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
 class TestMemory:
     @pytest.mark.slow
     @pytest.mark.parametrize(
-        ("view", "body", "frames"), [("figure", False, 4000), ("points", False, 500), ("figure", True, 500)]
+        ("view", "body", "frames"), [("figure", False, 2500), ("points", False, 250), ("figure", True, 250)]
     )
-    def test_5000_pictures_hold_it(
+    def test_3000_pictures_hold_it(
         self, view: str, body: bool, frames: int, living: Callable[[], int]
     ) -> None:
         growths, more_blocks = [], []

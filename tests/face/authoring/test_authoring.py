@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -29,12 +31,18 @@ def head() -> FaceModel:
     return author(parts, points, bound=bound, name="grid", notes={"origin": "a test"})
 
 
+@cache
+def deformer(model: FaceModel) -> Deformer:
+    """The deformer of a model, made once."""
+    return Deformer(model)
+
+
 def moved(model: FaceModel, values: dict[int, float]) -> np.ndarray:
     """(V, 3) shifts, by the deformer that players use."""
     row = np.zeros(68)
     for fap, value in values.items():
         row[fap - 1] = value
-    return np.asarray(Deformer(model).local(row), dtype=np.float64) - model.vertices
+    return np.asarray(deformer(model).local(row), dtype=np.float64) - model.vertices
 
 
 def vertex(model: FaceModel, point: str) -> int:
