@@ -1,4 +1,4 @@
-"""Delay Ctrl-C at moments when Python cannot handle it.
+"""End on Ctrl-C, `kill` and a closed terminal with everything cleaned up, at a moment when Python can do so.
 
 Compiled loops are loaded by LLVM, which calls Python back while it does so. An error raised in there is
 printed ("Exception ignored in") and lost, or leaves LLVM with half a function: the program then crashes.
@@ -16,7 +16,7 @@ import time
 from types import FrameType, TracebackType
 from typing import Any, Protocol
 
-from fba.cli.startup import leave
+from fba.cli.startup import INTERRUPTED, leave
 
 RETRY_AFTER = 0.05
 """Seconds until a delayed interruption comes again."""
@@ -39,25 +39,37 @@ class _Unraisable(Protocol):
     object: object
 
 
+_ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""Signals besides Ctrl-C that ask a program to end; Windows has no SIGHUP."""
+
+
 class Interruptions:
-    """Makes Ctrl-C safe while the `with` statement lasts; for the main thread, which alone gets signals."""
+    """Makes Ctrl-C safe while the `with` statement lasts; for the main thread, which alone gets signals.
+
+    SIGTERM and SIGHUP, unless they are ignored, interrupt as Ctrl-C does, so that no temporary file stays.
+    exit_code: that of an interrupted process: 128 and the number of the signal.
+    """
 
     def __init__(self) -> None:
+        self.exit_code = INTERRUPTED
         self._lost = False
-        self._handler: Any = None
+        self._handlers: dict[int, Any] = {}
 
     def __enter__(self) -> Interruptions:
         self._hook = sys.unraisablehook
         sys.unraisablehook = self._unraisable
-        if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave):
-            with contextlib.suppress(ValueError):  # not the main thread
-                self._handler = signal.signal(signal.SIGINT, self._interrupt)
+        with contextlib.suppress(ValueError):  # not the main thread
+            if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave):
+                self._handlers[signal.SIGINT] = signal.signal(signal.SIGINT, self._interrupt)
+            for number in _ENDING:
+                if signal.getsignal(number) is signal.SIG_DFL:
+                    self._handlers[number] = signal.signal(number, self._interrupt)
         return self
 
     def __exit__(self, *_: object) -> None:
         sys.unraisablehook = self._hook
-        if self._handler is not None:
-            signal.signal(signal.SIGINT, self._handler)
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
 
     def caused(self, error: BaseException) -> bool:
         """Whether Ctrl-C caused an error: by the error's own causes, or because an interruption was lost."""
@@ -68,10 +80,11 @@ class Interruptions:
             cause = cause.__cause__ or cause.__context__
         return self._lost
 
-    def _interrupt(self, _number: int, frame: FrameType | None) -> None:
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        self.exit_code = 128 + number
         while frame is not None:
             if str(frame.f_globals.get("__name__", "")).startswith(FRAGILE):
-                _thread.start_new_thread(_interrupt_later, ())
+                _thread.start_new_thread(_interrupt_later, (number,))
                 return
             frame = frame.f_back
         raise KeyboardInterrupt
@@ -81,9 +94,9 @@ class Interruptions:
             self._hook(unraisable)
             return
         self._lost = True
-        _thread.start_new_thread(_interrupt_later, ())
+        _thread.start_new_thread(_interrupt_later, (self.exit_code - 128,))
 
 
-def _interrupt_later() -> None:
+def _interrupt_later(number: int) -> None:
     time.sleep(RETRY_AFTER)
-    _thread.interrupt_main()
+    _thread.interrupt_main(number)

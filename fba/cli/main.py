@@ -124,7 +124,7 @@ def group() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 bad data, 2 bad usage, 130 interrupted.
+    """Run the command line and exit: 0 done, 1 bad data, 2 bad usage, 130 interrupted, 143 terminated.
 
     A reader of its output that goes away early, as `head` does, is not an error: 0, without a word.
 
@@ -149,7 +149,7 @@ def main(arguments: list[str] | None = None) -> None:
         error.show()
         sys.exit(BAD_USAGE)
     except (KeyboardInterrupt, click.Abort):
-        _exit_interrupted()
+        _exit_interrupted(interruptions.exit_code)
     except _OutputClosedError:
         # Python would complain once more while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -163,7 +163,7 @@ def main(arguments: list[str] | None = None) -> None:
         if debug:
             raise
         if interruptions.caused(error):
-            _exit_interrupted()
+            _exit_interrupted(interruptions.exit_code)
         click.echo(
             f"fba: internal error: {type(error).__name__}: {_one_line(error)}; this is a defect of fba: "
             "please report it with what --debug prints",
@@ -173,9 +173,9 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(result if isinstance(result, int) else 0)
 
 
-def _exit_interrupted() -> NoReturn:
-    click.echo(TEXT, err=True)
-    sys.exit(INTERRUPTED)
+def _exit_interrupted(code: int) -> NoReturn:
+    click.echo(TEXT if code == INTERRUPTED else "fba: terminated", err=True)
+    sys.exit(code)
 
 
 def _one_line(error: BaseException) -> str:

@@ -154,6 +154,8 @@ class Encoder:
             position = 1
         while position < len(run.rows):
             due = position + self._frames_before_intra(run.index[position:], rate)
+            while due < len(run.rows) and not self._can_be_intra(run, run.rows[due]):
+                due += 1  # put off: P planes reach values that I planes do not
             try:
                 self._writer.predicted(sum(run.parts), run.rows[position:due], run.skips[position:due])
                 position = due
@@ -182,6 +184,10 @@ class Encoder:
         due = self._last_intra + float(self.options.intra_period * rate)
         return int(np.searchsorted(index, due - 1e-9))
 
+    def _can_be_intra(self, run: Run, row: Int32) -> bool:
+        """Whether an I plane can carry the values of row (columns,), with the widest ranges."""
+        return all(self._ranges[part].can_carry(run.masks[part], row) for part in run.parts)
+
     def _clamp_difference(self, run: Run, row: Int32, error: DoesNotFitError) -> bool:
         """Bring the value that does not fit as near as a P plane can if no I plane can carry it either.
 
@@ -193,7 +199,7 @@ class Encoder:
             self.options.clamp
             and ranges.is_widest(error.slot)
             and not ranges.changed
-            and not all(self._ranges[one].can_carry(run.masks[one], row) for one in run.parts)
+            and not self._can_be_intra(run, row)
         ):
             row[error.slot] = self._writer.nearest(error.slot, error.level)
             self._count_clamped([error.slot])

@@ -21,7 +21,8 @@ class EncoderOptions:
 
     fap_quant, bap_quant: 0..31. A FAP's quantiser step is the standard's table step times fap_quant, a
         BAP's the table step times bap_pred_scale[bap_quant]; 0 sends values unquantised. Default 1.
-    intra_period: most seconds from one I plane to the next; None for I planes only where one is needed.
+    intra_period: most seconds from one I plane to the next; None for I planes only where one is needed. An I
+        plane that cannot carry the values of its frame is put off.
     start_codes: write a plane start code before every I plane after the first, and all ranges with each, so
         that a decoder can start there or resume after damage.
     bap_steps: "iso" or "visage", the table of BAP steps; the decoder must be given the same.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -45,13 +45,22 @@ def bvh(tmp_path: Path) -> Path:
     return path
 
 
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fba", "encode", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+Encode = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def test_report_and_limits_as_text(tmp_path: Path) -> None:
-    result = run(
+@pytest.fixture
+def encode(programs: Path) -> Encode:
+    """A function that runs `fba encode` as a process of its own."""
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = [str(programs / "fba"), "encode", *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    return run
+
+
+def test_report_and_limits_as_text(encode: Encode, tmp_path: Path) -> None:
+    result = encode(
         bvh(tmp_path), "-o", tmp_path / "out.fba", "--bap-steps", "visage", "--report", "--limits", "report"
     )
     assert result.returncode == 0, result.stderr
@@ -61,8 +70,8 @@ def test_report_and_limits_as_text(tmp_path: Path) -> None:
     assert "left thigh flexion: beyond -20..120 degrees in 1 frames" in result.stdout
 
 
-def test_report_as_json(tmp_path: Path) -> None:
-    result = run(bvh(tmp_path), "-o", tmp_path / "out.fba", "--json", "--report", "--limits", "report")
+def test_report_as_json(encode: Encode, tmp_path: Path) -> None:
+    result = encode(bvh(tmp_path), "-o", tmp_path / "out.fba", "--json", "--report", "--limits", "report")
     said = json.loads(result.stdout)
     (capture,) = said["captures"]
     assert capture["family"] == "collar"
@@ -75,11 +84,11 @@ def test_report_as_json(tmp_path: Path) -> None:
     assert not said["limits_clamped"]
 
 
-def test_limits_clamp(tmp_path: Path) -> None:
+def test_limits_clamp(encode: Encode, tmp_path: Path) -> None:
     out = tmp_path / "out.fba"
     path = bvh(tmp_path)
     for limits, beyond in (("off", True), ("clamp", False)):
-        result = run(path, "-o", out, "--bap-steps", "visage", "--bap-quant", "1", "--limits", limits)
+        result = encode(path, "-o", out, "--bap-steps", "visage", "--bap-quant", "1", "--limits", limits)
         assert result.returncode == 0, result.stderr
         body = fba.decode(out.read_bytes(), bap_steps="visage").body
         assert body is not None
@@ -87,13 +96,14 @@ def test_limits_clamp(tmp_path: Path) -> None:
         assert (excess.get("left thigh flexion", 0) > 1) == beyond  # one step of the quantiser is 0.1 degrees
 
 
-def test_spine_of_the_stream(tmp_path: Path) -> None:
+def test_spine_of_the_stream(encode: Encode, tmp_path: Path) -> None:
     path = bvh(tmp_path)
     counts = {}
     for spine in ("spread", "full", "simple", "joints"):
         out = tmp_path / f"{spine}.fba"
         assert (
-            run(path, "-o", out, "--spine", spine, "--ground", "source", "--origin", "start").returncode == 0
+            encode(path, "-o", out, "--spine", spine, "--ground", "source", "--origin", "start").returncode
+            == 0
         )
         body = fba.decode(out.read_bytes()).body
         assert body is not None
@@ -102,10 +112,10 @@ def test_spine_of_the_stream(tmp_path: Path) -> None:
     assert counts == {"spread": 10, "full": 25, "simple": 4, "joints": 3}
 
 
-def test_fps_resamples_by_rotation(tmp_path: Path) -> None:
+def test_fps_resamples_by_rotation(encode: Encode, tmp_path: Path) -> None:
     """Half way between -60 and -150 degrees is -105, whatever the BAPs in between are."""
     out = tmp_path / "out.fba"
-    assert run(bvh(tmp_path), "-o", out, "--bap-steps", "visage", "--fps", "60").returncode == 0
+    assert encode(bvh(tmp_path), "-o", out, "--bap-steps", "visage", "--fps", "60").returncode == 0
     body = fba.decode(out.read_bytes(), bap_steps="visage").body
     assert body is not None
     flexion = next(b.number - 1 for b in baps() if b.name == "l_hip_flexion")
@@ -113,12 +123,12 @@ def test_fps_resamples_by_rotation(tmp_path: Path) -> None:
     assert np.degrees(body.values[3, flexion] * 1e-5) == pytest.approx(105, abs=4)
 
 
-def test_legs_that_stay_as_they_are_retargeted(tmp_path: Path, shared: Path) -> None:
+def test_legs_that_stay_as_they_are_retargeted(encode: Encode, tmp_path: Path, shared: Path) -> None:
     """This walker's legs have other proportions: planted feet cost directions of bones, and gain ground."""
     out, path = tmp_path / "out.fba", shared / "data" / "vreng" / "cmu_walk.bvh"
     found = {}
     for plant in ("--plant", "--no-plant"):
-        result = run(path, "-o", out, "--bap-steps", "visage", plant, "--report", "--json")
+        result = encode(path, "-o", out, "--bap-steps", "visage", plant, "--report", "--json")
         assert result.returncode == 0, result.stderr
         (capture,) = json.loads(result.stdout)["captures"]
         thigh = next(bone for bone in capture["bones"] if bone["joint"] == "r_hip")

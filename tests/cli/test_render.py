@@ -372,12 +372,23 @@ def test_pictures_and_films_are_the_same_from_run_to_run(run: Run, clip: Path, t
 @pytest.mark.slow
 @pytest.mark.usefixtures("opengl")
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are those of Unix")
-@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-def test_ctrl_c_leaves_nothing_half_written(clip: Path, tmp_path: Path, suffix: str) -> None:
+@pytest.mark.parametrize(
+    ("suffix", "name", "end"),
+    [
+        (".mp4", "SIGINT", (130, "fba: interrupted")),
+        (".gif", "SIGINT", (130, "fba: interrupted")),
+        (".mp4", "SIGTERM", (143, "fba: terminated")),
+        (".gif", "SIGHUP", (129, "fba: terminated")),
+    ],
+)
+def test_ctrl_c_and_kill_leave_nothing_half_written(
+    clip: Path, tmp_path: Path, suffix: str, name: str, end: tuple[int, str]
+) -> None:
     output = tmp_path / f"film{suffix}"
     output.write_bytes(b"old")
     # Where the tests run in the background, a shell may have made them, and what they start, deaf to SIGINT.
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"
     code += "from fba.cli.main import main; main()"
     command = [sys.executable, "-c", code, "render", str(clip), "-o", str(output), "--fps", "90"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
@@ -385,8 +396,8 @@ def test_ctrl_c_leaves_nothing_half_written(clip: Path, tmp_path: Path, suffix: 
             if len(list(tmp_path.iterdir())) == 3 or process.poll() is not None:
                 break  # the temporary file is there: it has begun
             time.sleep(0.01)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(getattr(signal, name))
         _, err = process.communicate(timeout=60)
-    assert (process.returncode, err.strip()) == (130, "fba: interrupted")
+    assert (process.returncode, err.strip()) == end
     assert output.read_bytes() == b"old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["clip.fba", output.name]

@@ -187,3 +187,14 @@ def test_a_plane_skips_as_many_frames_as_its_syntax_carries() -> None:
     assert fba.decode(fba.encode(far)).index.tolist() == [0, SKIP_MAX + 1]
     with pytest.raises(RangeError, match="can skip"):
         fba.encode(Animation(two.rate, np.array([0, SKIP_MAX + 2]), two.face, None))
+
+
+@pytest.mark.parametrize("clamp", [False, True])
+def test_an_i_plane_that_cannot_carry_its_frame_is_put_off(clamp: bool) -> None:
+    """P planes reach values that I planes do not."""
+    beyond = face(3000, 9000, 12000, 3000, 3000)
+    options = EncoderOptions(fap_quant=1, intra_period=0.04, start_codes=True, clamp=clamp)
+    coded = fba.encode(beyond, options)
+    frames = fba.Decoder().push(coded)
+    assert [frame.plane.settings.intra for frame in frames if frame.plane] == [True, False, False, True, True]
+    assert fba.decode(coded).face == beyond.face

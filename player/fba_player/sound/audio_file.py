@@ -188,7 +188,7 @@ class SoundFile:
                 return
             try:
                 frames = packet.decode()
-            except error_type as error:
+            except (error_type, ValueError) as error:  # ValueError: a codec that is unknown or cannot be opened
                 if not isinstance(error, EOFError):
                     self._warn(error)
                 continue
