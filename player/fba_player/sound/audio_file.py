@@ -188,7 +188,7 @@ class SoundFile:
                 return
             try:
                 frames = packet.decode()
-            except (error_type, ValueError) as error:  # ValueError: a codec that is unknown or cannot be opened
+            except (error_type, ValueError) as error:  # ValueError: an unknown codec
                 if not isinstance(error, EOFError):
                     self._warn(error)
                 continue
