@@ -99,6 +99,34 @@ def test_translations_that_overflow(tmp_path: Path, value: float) -> None:
         fba.read(path)
 
 
+def test_joints_without_channels_in_many_frames(tmp_path: Path) -> None:
+    """Each would take 32 bytes a frame, of which the file has none."""
+    joints = "".join(f"JOINT j{number}\n{{\nOFFSET 0 0 0\nCHANNELS 0\n" for number in range(900))
+    path = tmp_path / "a.bvh"
+    head, rest = (BVH % 0.01).split("End Site")
+    end, rest = rest.split("MOTION")
+    closing = "}\n" * 900
+    frames = rest.replace("Frames: 1", "Frames: 20000").replace("\n0 0 0\n", "\n" + "0 0 0\n" * 20_000)
+    path.write_text(f"{head}{joints}End Site{end[:-3]}{closing}}}\nMOTION{frames}")
+    with pytest.raises(FormatError, match=r"a\.bvh: 901 joints in 20000 frames, but only 3 channels"):
+        read_motion(path)
+
+
+@pytest.mark.parametrize("rate", [1_000_001, 537_000_000])
+def test_a_sound_of_a_rate_that_no_device_has(tmp_path: Path, rate: int) -> None:
+    pytest.importorskip("av")
+    from fba_player.sound.audio_file import SoundFile
+
+    path = tmp_path / "a.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(1)
+        file.setframerate(rate)
+        file.writeframes(bytes(1000))
+    with pytest.raises(FormatError, match=f"says {rate} samples a second; 1 to 1000000 are read"):
+        SoundFile(path)
+
+
 @pytest.mark.parametrize("channels", [64, 4095])
 def test_more_channels_than_can_be_mixed(tmp_path: Path, channels: int) -> None:
     pytest.importorskip("av")

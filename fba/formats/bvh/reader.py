@@ -36,6 +36,8 @@ NOMINAL_RATES = tuple(
            | {Fraction(n) for n in (250, 300, 480, 500, 1000)})
 )  # fmt: skip
 """Frame rates, one of which a rounded frame time probably means."""
+SPARE_MEMORY, MEMORY_PER_CHARACTER = 200_000_000, 50
+"""Bytes that rotations may take, whatever the file, and for each of its characters: six are three angles."""
 STRETCH = 1e-3
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 
@@ -101,6 +103,12 @@ def parse(text: str, *, name: str = "", path: str | Path | None = None) -> Skele
     count, frame_time, first = _motion_header(lines, after, path)
     channels = sum(len(c) for c in tree.channels)
     numbers = _numbers(lines, first, channels, count, path)
+    if 32 * len(numbers) * len(tree.names) > SPARE_MEMORY + MEMORY_PER_CHARACTER * len(text):
+        raise FormatError(
+            f"{len(tree.names)} joints in {len(numbers)} frames, but only {channels} channels: this takes "
+            "far more memory than the file; remove joints without channels, or cut the motion into pieces",
+            path=path,
+        )
     return _motion(tree, numbers, _rate(frame_time), name, path)
 
 

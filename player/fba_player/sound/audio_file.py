@@ -18,6 +18,7 @@ CHANNELS = 2
 RATES = (8000, 192_000)
 """Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
+HIGHEST_RATE = 1_000_000
 RUN_UP = 0.5
 """Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
 GAP = 0.02
@@ -124,8 +125,8 @@ class SoundFile:
         self._container, self._stream = open_sound(self._av, self.path)
 
     def _rate(self, rate: int) -> int:
-        if rate < 1:
-            raise FormatError(f"says {rate} samples a second", path=self.path)
+        if not 1 <= rate <= HIGHEST_RATE:  # a resampler takes memory in proportion to the rate
+            raise FormatError(f"says {rate} samples a second; 1 to {HIGHEST_RATE} are read", path=self.path)
         fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
         return rate if fits else USUAL_RATE
 
