@@ -99,4 +99,4 @@ class Interruptions:
 
 def _interrupt_later(number: int) -> None:
     time.sleep(RETRY_AFTER)
-    _thread.interrupt_main(number)
+    _thread.interrupt_main(signal.Signals(number))
