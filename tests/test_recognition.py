@@ -30,7 +30,7 @@ def zipped() -> bytes:
         (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "a PNG picture"),
         (b"\xff\xd8\xff\xe0\0\x10JFIF", "a JPEG picture"),
         (zipped(), "a ZIP archive"),
-        (gzip.compress(b"HIERARCHY"), "gzip-compressed data"),
+        (gzip.compress(b"HIERARCHY", mtime=0), "gzip-compressed data"),
         (b"RIFF\x24\0\0\0WAVEfmt ", "WAV sound"),
         (b"\0\0\0\x20ftypisom\0\0\2\0", "MP4 or MOV video"),
         (b"\0\0\1\xba\x44\0\4\0", "an MPEG program stream (video)"),
@@ -88,7 +88,7 @@ def test_files_that_are_written_here(tmp_path: Path, name: str, kind: str) -> No
 def test_every_reader_says_what_a_foreign_file_seems_to_be(tmp_path: Path, suffix: str, kind: str) -> None:
     content = {
         "a PNG picture": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
-        "gzip-compressed data": gzip.compress(b"HIERARCHY"),
+        "gzip-compressed data": gzip.compress(b"HIERARCHY", mtime=0),
         "a table (CSV)": b"time,x,y\n0,1,2\n1,2,3\n",
     }[kind]
     path = tmp_path / f"a{suffix}"
