@@ -2,10 +2,10 @@
 imported everything already.
 
 A run has its own process, folder, environment, standard streams and exit code, as if it were started anew; of
-a start, only the imports are spared, and for `fba` the loading of machine code and of the built-in figures.
-`python` starts without any module of this project, so that what a script forgets to import is missing. A run
-whose environment could change what was imported (`NUMBA_...`, `PYTHON...`, `FBA_...`), or a Python with other
-options than -c and -m, is started as usual.
+a start, only the imports are spared, and for `fba` the loading of machine code. `python` starts without any
+module of this project, so that what a script forgets to import is missing. A run whose environment could
+change what was imported (`NUMBA_...`, `PYTHON...`, `FBA_...`), or a Python with other options than -c and -m,
+is started as usual.
 """
 
 from __future__ import annotations
@@ -91,8 +91,11 @@ def prepare() -> None:
 
     for name in _COMMANDS:
         import_module(f"fba.cli.commands.{name}")
+    import numpy as np
+
     import fba
     from fba import player
+    from fba.face import Deformer, FaceModel
 
     for name in player.__all__:
         with contextlib.suppress(ImportError):  # pyrender
@@ -102,7 +105,7 @@ def prepare() -> None:
     samples = ROOT / "fba" / "samples"
     for sample in (fba.read(samples / "hello.fap"), fba.read(samples / "hello.bvh")):
         fba.decode(fba.encode(sample))
-        player.Scene(sample).view_at(0.0)  # loads the built-in head and body
+    Deformer(FaceModel.default())(np.zeros(68))
 
 
 def serve(door: socket.socket, program: str) -> None:

@@ -83,9 +83,9 @@ def living(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
 class TestMemory:
     @pytest.mark.slow
     @pytest.mark.parametrize(
-        ("view", "body", "frames"), [("figure", False, 1500), ("points", False, 150), ("figure", True, 150)]
+        ("view", "body", "frames"), [("figure", False, 2500), ("points", False, 250), ("figure", True, 250)]
     )
-    def test_1800_pictures_hold_it(
+    def test_3000_pictures_hold_it(
         self, view: str, body: bool, frames: int, living: Callable[[], int]
     ) -> None:
         growths, more_blocks = [], []
