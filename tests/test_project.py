@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = {"fba": "fba", "fba_player": "player/fba_player", "fba_conformance": "conformance/fba_conformance"}
 """Package as it is installed -> its folder in the repository."""
 LARGEST_FILE = 5_000_000
-HEAVY = {"numpy", "numba", "scipy", "moderngl", "glfw", "PIL", "av", "bitstring", "click", "rich"}
+HEAVY = {"numpy", "numba", "scipy", "moderngl", "glfw", "PIL", "av", "click", "rich"}
 TOOLS = ("cat", "cksum", "cut", "dirname", "grep", "ls", "mkdir", "mv", "readlink", "rm", "sed", "tail", "tr")
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bitstring import ConstBitStream
-
 from fba.errors import BitstreamError
 from fba_conformance._textbook import FrequencyTable, decode_segment
 
@@ -57,15 +55,13 @@ class Reader:
     def __init__(self, data: bytes, *, byte_aligned: bool = False) -> None:
         self.data = data
         self.byte_aligned = byte_aligned
-        self.stream = ConstBitStream(data)
+        self.bit = 0
+        """Position of the next bit."""
         self.size = len(data) * 8
+        self.disputed: int | None = None
+        """First bit at which the two ways to look for start codes see different things."""
         self.plane: int | None = None
         self._elements: list[Element] = []
-
-    @property
-    def bit(self) -> int:
-        """Position of the next bit."""
-        return int(self.stream.pos)
 
     def drain(self) -> list[Element]:
         """Return the elements recorded since the last call."""
@@ -92,15 +88,27 @@ class Reader:
         """Read an unsigned integer, most significant bit first."""
         self._need(name, bits)
         bit = self.bit
-        value = int(self.stream.read(f"uint:{bits}"))
+        value = self._read(bits)
         self.record(bit, name, value, section)
+        return value
+
+    def _ahead(self, bits: int) -> int:
+        """Return the next bits, which must be there, as an unsigned integer."""
+        begin, end = self.bit, self.bit + bits
+        whole = int.from_bytes(self.data[begin >> 3 : (end + 7) >> 3], "big")
+        return whole >> (-end & 7) & ((1 << bits) - 1)
+
+    def _read(self, bits: int) -> int:
+        """Read bits, which must be there, as an unsigned integer."""
+        value = self._ahead(bits)
+        self.bit += bits
         return value
 
     def flags(self, name: str, bits: int, section: str) -> str:
         """Read a row of flags; return a string of 0 and 1."""
         self._need(name, bits)
         bit = self.bit
-        value = str(self.stream.read(f"bin:{bits}"))
+        value = f"{self._read(bits):0{bits}b}"
         self.record(bit, name, value, section)
         return value
 
@@ -123,7 +131,7 @@ class Reader:
         segment = decode_segment(
             self.data, start, tables, learn=learn, name=f"{name} ({section})", plane=self.plane
         )
-        self.stream.pos = start + segment.bits
+        self.bit = start + segment.bits
         return segment.symbols, start, segment.inserted
 
     def stuffing_before_start_code(self, *, behind_start_code: bool = False) -> int | None:
@@ -136,24 +144,31 @@ class Reader:
         (A plane may look like stuffing and a start code, because the guard against emulation counts zeros in
         segments only. A writer must put a plane start code before such a plane.)
         """
-        if self.byte_aligned and behind_start_code:
+        checked, aligned = (self._look(one, behind_start_code) for one in (False, True))
+        if checked != aligned and self.disputed is None:
+            self.disputed = self.bit
+        return aligned if self.byte_aligned else checked
+
+    def _look(self, byte_aligned: bool, behind_start_code: bool) -> int | None:
+        """Return the stuffing before a start code as one kind of reader sees it."""
+        if byte_aligned and behind_start_code:
             return None
         unaligned = -self.bit % 8
         for bits in (unaligned,) if unaligned else (0,) if behind_start_code else (0, 8):
             if self.bit + bits + PREFIX_BITS > self.size:
                 continue
-            ahead = str(self.stream.peek(f"bin:{bits + PREFIX_BITS}"))
-            if self.byte_aligned:
-                if ahead[bits:-1] == "0" * 23 and (bits < 8 or ahead[:bits] == _stuffing(8)):
+            stuffing, prefix = divmod(self._ahead(bits + PREFIX_BITS), 1 << PREFIX_BITS)
+            if byte_aligned:
+                if prefix <= 1 and (bits < 8 or stuffing == _stuffing(8)):
                     return bits
-            elif ahead[:bits] == _stuffing(bits) and ahead[bits:] == "0" * 23 + "1":
+            elif prefix == 1 and stuffing == _stuffing(bits):
                 return bits
         return None
 
     def only_stuffing_left(self) -> bool:
         """Whether only alignment stuffing is left before the end of the data."""
         left = self.size - self.bit
-        return left == 0 or (left <= 8 and str(self.stream.peek(f"bin:{left}")) == _stuffing(left))
+        return left == 0 or (left <= 8 and self._ahead(left) == _stuffing(left))
 
     def start_code(self, stuffing: int) -> int:
         """Read that many bits of stuffing, and a start code; return the code."""
@@ -161,14 +176,14 @@ class Reader:
             self.flags("alignment stuffing", stuffing, "object")
         bit = self.bit
         self._need("start code", START_CODE_BITS)
-        code = int(self.stream.read(f"uint:{START_CODE_BITS}"))
+        code = self._read(START_CODE_BITS)
         self.record(bit, START_CODES.get(code, "start_code"), code, "object")
         return code
 
 
-def _stuffing(bits: int) -> str:
-    """Return stuffing as a string of 0 and 1."""
-    return "0" + "1" * (bits - 1) if bits else ""
+def _stuffing(bits: int) -> int:
+    """Return stuffing of that many bits, a 0 and then 1s, as an unsigned integer; 0 for none."""
+    return (1 << (bits - 1)) - 1 if bits else 0
 
 
 OBJECT_START_CODES = (0x1BA, 0x101)

@@ -138,7 +138,7 @@ class Walker:
                 bit=0,
             )
         if start:
-            reader.stream.pos = 8 * start
+            reader.bit = 8 * start
             shown = reader.data[: min(start, TRAILING_BYTES_SHOWN)].hex()
             reader.record(0, "headers before the object", shown, "object")
         reader.start_code(0)
@@ -149,7 +149,7 @@ class Walker:
         left = reader.size - reader.bit
         if left:
             bit = reader.bit
-            reader.stream.pos = reader.size
+            reader.bit = reader.size
             reader.record(
                 bit, "trailing data", reader.data[bit // 8 :][:TRAILING_BYTES_SHOWN].hex(), "object"
             )
