@@ -24,12 +24,14 @@ if TYPE_CHECKING:
         FbaError,
         FbaWarning,
         FormatError,
+        LimitError,
         ModelError,
         OptionError,
         RangeError,
         UnsupportedError,
     )
     from fba.formats import probe, read, write
+    from fba.limits import Limits
 
 __version__ = "0.1.0"
 
@@ -43,6 +45,7 @@ _MODULE_OF = {
     "FbaError": "fba.errors",
     "FbaWarning": "fba.errors",
     "FormatError": "fba.errors",
+    "LimitError": "fba.errors",
     "ModelError": "fba.errors",
     "OptionError": "fba.errors",
     "RangeError": "fba.errors",
@@ -53,6 +56,7 @@ _MODULE_OF = {
     "StreamInfo": "fba.codec",
     "decode": "fba.codec",
     "encode": "fba.codec",
+    "Limits": "fba.limits",
     "probe": "fba.formats",
     "read": "fba.formats",
     "write": "fba.formats",
@@ -72,6 +76,8 @@ __all__ = [
     "FbaWarning",
     "FormatError",
     "Frame",
+    "LimitError",
+    "Limits",
     "ModelError",
     "OptionError",
     "RangeError",

@@ -16,15 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Array, Bool, Float64, Int64, Intp
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import BodyTrack, FaceTrack, freeze, integers
 
-__all__ = ["MAX_FRAMES", "Animation", "BodyTrack", "FaceTrack", "Frame"]
+__all__ = ["Animation", "BodyTrack", "FaceTrack", "Frame"]
 
 _INDEX_MAX = 1 << 62
 """Bound of frame indices, so that sums of two fit 64 bits."""
 
-MAX_FRAMES = 50_000_000
-"""Most frames that resampling makes: a limit for absurd times in damaged input."""
+_RESAMPLED_BYTES = 5
+"""Memory of a resampled parameter in a frame: an int32 and a bool."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,12 +199,13 @@ class Animation:
             Fraction(int(self.index[-1]) - int(self.index[0]) + 1) / self.rate if len(self) else Fraction(0)
         )
 
-    def resample(self, rate: Fraction | int | str) -> Animation:
+    def resample(self, rate: Fraction | int | str, *, limits: Limits = DEFAULT_LIMITS) -> Animation:
         """Return the same animation at another frame rate, in evenly spaced frames without gaps.
 
         Low-level FAPs, BAPs, blends and intensities are interpolated linearly between the frames that
         sent them; selects and masks hold until the next frame; definition flags are set on the first
-        frame at or after the one that carried them. Raises ValueError beyond `MAX_FRAMES` frames.
+        frame at or after the one that carried them. Raises LimitError if the result would have more frames
+        or need more memory than `limits` allow, ValueError for a rate that is not positive.
         """
         rate = Fraction(rate)
         if rate <= 0:
@@ -215,11 +217,14 @@ class Animation:
         first = -(-int(self.index[0]) * ratio.numerator // ratio.denominator)
         last = int(self.index[-1]) * ratio.numerator // ratio.denominator
         count = max(last - first + 1, 1)
-        if count > MAX_FRAMES or max(abs(first), abs(last)) > _INDEX_MAX:
-            raise ValueError(
-                f"resample: {self.name or 'the animation'} would become {count} frames at {rate} frames/s "
-                f"(at most {MAX_FRAMES}); its times are implausible or the rate is too high"
-            )
+        what = f"{self.name or 'the animation'}, resampled to {rate} frames/s,"
+        limits.check_seconds(float(self.duration), self.name or "the animation")
+        limits.check_frames(count, what)
+        parts = [part for part in (self.face, self.body) if part is not None]
+        row_bytes = sum(part.values.shape[1] * _RESAMPLED_BYTES for part in parts)
+        limits.check_bytes(count * row_bytes, what, source=len(self) * row_bytes)
+        if max(abs(first), abs(last)) > _INDEX_MAX:
+            raise ValueError(f"resample: frame indices at {rate} frames/s do not fit 64 bits")
         index = np.arange(first, first + count, dtype=np.int64)
         integral, fraction = _scale(index, 1 / ratio)  # in frames of this animation
         integral = integral.astype(np.int64)

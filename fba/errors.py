@@ -6,6 +6,7 @@
     ├── BitstreamError(plane, bit)          also ValueError   the bits of an FBA stream are damaged
     ├── FormatError(path, line, token)      also ValueError   a file is not what its format says
     ├── RangeError(parameter, value, limits) also ValueError  a value that the syntax cannot carry
+    ├── LimitError(limit, found, allowed)   also ValueError   input that takes more than `fba.Limits` allow
     ├── UnsupportedError(what)              also NotImplementedError  correct, but not handled here
     ├── OptionError                         also TypeError    an option that does not exist, or contradicts
     ├── ModelError                          also ValueError   a face or body model is unusable
@@ -155,6 +156,22 @@ class RangeError(FbaError, ValueError):
         if parameter is not None:
             where.append(parameter)
         super().__init__(f"{', '.join(where)}: {message}" if where else message)
+
+
+class LimitError(FbaError, ValueError):
+    """Input that takes more memory or time than `fba.Limits` allow.
+
+    limit: the name of the limit. found: what the input needs. allowed: what the limit allows. blocks: as for
+    BitstreamError.
+    """
+
+    blocks: Sequence[Any] = ()
+
+    def __init__(self, message: str, *, limit: str, found: int, allowed: int) -> None:
+        self.limit = limit
+        self.found = found
+        self.allowed = allowed
+        super().__init__(message)
 
 
 class UnsupportedError(FbaError, NotImplementedError):

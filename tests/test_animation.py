@@ -240,10 +240,10 @@ def test_resample_to_no_rate(rate: Fraction | int) -> None:
 
 def test_resample_does_not_fill_the_memory() -> None:
     far = Animation(Fraction(1, 16), np.array([0, 10**12]), face(2))
-    with pytest.raises(ValueError, match=r"would become \d+ frames"):
+    with pytest.raises(ValueError, match="lasts 16000000000016 s, more than the 604800"):
         far.resample(25)
     late = Animation(Fraction(1, 16), np.array([10**18]), face(1))
-    with pytest.raises(ValueError, match="its times are implausible or the rate is too high"):
+    with pytest.raises(ValueError, match="do not fit 64 bits"):
         late.resample(25)
     assert late.times.tolist() == [1.6e19]
 

@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 
 from fba import rotations
-from fba.animation import MAX_FRAMES
 from fba.arrays import Float64, Int64
 from fba.errors import ModelError
+from fba.limits import DEFAULT_LIMITS, Limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +77,11 @@ class SkeletonMotion:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def resample(self, rate: Fraction | int | str) -> SkeletonMotion:
+    def resample(self, rate: Fraction | int | str, *, limits: Limits = DEFAULT_LIMITS) -> SkeletonMotion:
         """Return the same motion at another frame rate, from the first frame on, without extrapolation.
 
-        Rotations are interpolated spherically. ValueError for a rate that is not positive, or too many
-        frames.
+        Rotations are interpolated spherically. ValueError for a rate that is not positive,
+        LimitError for more frames or memory than `limits` allow.
         """
         rate = Fraction(rate)
         if rate <= 0:
@@ -90,10 +90,11 @@ class SkeletonMotion:
             return replace(self, rate=rate)
         ratio = self.rate / rate
         count = (len(self) - 1) * ratio.denominator // ratio.numerator + 1
-        if count > MAX_FRAMES:
-            raise ValueError(
-                f"resample: {count} frames at {rate} frames/s are too many (at most {MAX_FRAMES})"
-            )
+        limits.check_frames(count, f"the motion, resampled to {rate} frames/s,")
+        row_bytes = 8 * (4 * len(self.names) + 3)
+        limits.check_bytes(
+            count * row_bytes, f"the motion, resampled to {rate} frames/s,", source=len(self) * row_bytes
+        )
         times = np.arange(count) * float(ratio)
         before = np.minimum(times.astype(np.intp), len(self) - 1)
         after = np.minimum(before + 1, len(self) - 1)

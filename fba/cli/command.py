@@ -23,6 +23,7 @@ OPTIONS = {
     "points": "points",
     "kind": "kind",
     "replace": "replace",
+    "limits": "limit",
 }
 """Arguments of the library, and the parameters of commands that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))
@@ -98,7 +99,8 @@ def _option_text(command: click.Command, name: str | None, value: str) -> str | 
     """Return an option with a value as it is typed, "--fps 25"; None if the command does not have it."""
     for param in command.params:
         if isinstance(param, click.Option) and param.name == name:
-            return param.opts[0] if param.is_flag else f"{param.opts[0]} {value.strip(chr(39))}"
+            text = value.removeprefix("fba.Limits(").removesuffix(")").strip("'")
+            return param.opts[0] if param.is_flag else f"{param.opts[0]} {text}"
     return None
 
 

@@ -18,6 +18,7 @@ from fba.animation import Animation
 from fba.cli import step_tables
 from fba.cli.command import STANDARD_INPUT
 from fba.errors import FbaError, FbaWarning, FormatError, OptionError
+from fba.limits import DEFAULT_LIMITS, Limits
 
 if TYPE_CHECKING:
     from fba.body.model import BodyModel
@@ -101,6 +102,7 @@ def read_input(
     capture: Mapping[str, object] | None = None,
     doubts: list[str] | None = None,
     format: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the animation of a file of any format, or of the one that `format` names.
 
@@ -113,26 +115,32 @@ def read_input(
     from fba.formats import read
 
     options: dict[str, object] = {"bap_steps": bap_steps, "fps": fps or header_fps, "name": name}
-    options |= {"salvage": salvage or None, "rate": fps, **(capture or {})}
+    options |= {"salvage": salvage or None, "rate": fps, "limits": limits, **(capture or {})}
     with input_file(path) as file:
         reader = _find_format(file, format)
         animation = read(file, format=reader.name, **_taken(reader, options))
     if reader.name == "fba" and (doubt := step_tables.warn_of_doubt(path, animation, bap_steps)):
         (doubts if doubts is not None else []).append(doubt)
     if fps is not None and animation.rate != fps:
-        animation = animation.resample(fps)
+        animation = animation.resample(fps, limits=limits)
     return animation
 
 
 def probe_input(
-    path: Path, *, bap_steps: str, fps: Fraction | None, format: str | None, salvage: bool
+    path: Path,
+    *,
+    bap_steps: str,
+    fps: Fraction | None,
+    format: str | None,
+    salvage: bool,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> StreamInfo:
     """Return what a file of any format holds. fps: the rate of a file that has none."""
     from fba.formats import probe
 
     reader = _find_format(path, format)
     options = {} if reader.name == "fba" else _taken(reader, {"fps": fps, "salvage": salvage or None})
-    return probe(path, bap_steps=bap_steps, format=reader.name, **options)
+    return probe(path, bap_steps=bap_steps, format=reader.name, limits=limits, **options)
 
 
 def _taken(reader: Format, options: Mapping[str, object]) -> dict[str, Any]:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import fields
 from fractions import Fraction
 from typing import Any
 
 import click
 
 from fba.cli.command import Decorated
+from fba.errors import did_you_mean
+from fba.limits import Limits
 
 RATES = (Fraction(1, 3600), Fraction(10_000))
 """Smallest and largest frame rate that can be asked for, as in BVH files."""
+LARGEST_LIMIT = 10**18
 
 
 class RateType(click.ParamType[Fraction]):
@@ -63,6 +67,31 @@ class MomentType(click.ParamType[float]):
         return seconds
 
 
+class LimitType(click.ParamType[tuple[str, int]]):
+    """A limit and its value: frames=10000000."""
+
+    name = "limit"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, int]:
+        name, _, number = str(value).partition("=")
+        known = [limit.name for limit in fields(Limits)]
+        if name not in known:
+            self.fail(
+                f"there is no limit {name!r}{did_you_mean(name, known)}; they are {', '.join(known)}",
+                param,
+                ctx,
+            )
+        try:
+            exact = Fraction(number)
+        except (ValueError, ZeroDivisionError):
+            self.fail(f"{number!r} is not a number; write e.g. {name}={getattr(Limits(), name)}", param, ctx)
+        if exact < 1 or exact.denominator != 1 or exact > LARGEST_LIMIT:
+            self.fail(f"{name}={number}: a limit is a whole number from 1 to {LARGEST_LIMIT}", param, ctx)
+        return name, int(exact)
+
+
 class SizeType(click.ParamType[tuple[int, int]]):
     """Width and height in pixels: 1280x720."""
 
@@ -91,6 +120,18 @@ salvage_option = click.option(
     "--salvage", is_flag=True, help="Read the undamaged parts of damaged input, and list what was lost."
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
+
+limit_option = click.option(
+    "--limit",
+    "limit",
+    type=LimitType(),
+    metavar="NAME=VALUE",
+    multiple=True,
+    callback=lambda _, __, given: Limits(**dict(given)),
+    help="Read more than usual from a file that is to be trusted, e.g. bytes=4e9; "
+    f"names: {', '.join(limit.name for limit in fields(Limits))}.",
+)
+"""`--limit`, several times if need be; its value is `Limits`."""
 
 
 def choice_option(flag: str, text: str, *choices: str) -> Callable[[Decorated], Decorated]:

@@ -45,7 +45,13 @@ def open_file(file: Path, how: SceneOptions, doubts: list[str] | None = None) ->
         raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
         animation = inputs.read_input(
-            file, bap_steps=bap_steps, header_fps=fps, salvage=salvage, doubts=doubts, format=how.format
+            file,
+            bap_steps=bap_steps,
+            header_fps=fps,
+            salvage=salvage,
+            doubts=doubts,
+            format=how.format,
+            limits=how.limit,
         )
         return animation, False
     with contextlib.ExitStack() as stack:
@@ -160,6 +166,6 @@ def _read_other(head: bytes, source: BinaryIO, name: str, how: SceneOptions) -> 
     with inputs.spooled(source, name, head) as path:
         animation = inputs.read_input(
             path, bap_steps=how.bap_steps, header_fps=how.fps, name=name, salvage=how.salvage,
-            format=how.format,
+            format=how.format, limits=how.limit,
         )  # fmt: skip
     return replace(animation, name=name) if animation.name == path.name else animation

@@ -14,6 +14,7 @@ import click
 from fba.cli import options
 from fba.cli.command import Decorated
 from fba.cli.inputs import EXISTING
+from fba.limits import Limits
 
 MOST = 8
 """Files shown at once."""
@@ -34,6 +35,7 @@ class SceneOptions:
     axes: str
     bap_steps: str
     salvage: bool
+    limit: Limits
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,7 @@ def scene_options(*, fps: str, arrange: str) -> Callable[[Decorated], Decorated]
         ),
         options.bap_steps_option,
         options.salvage_option,
+        options.limit_option,
     )
 
 

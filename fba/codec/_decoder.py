@@ -17,6 +17,7 @@ from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec.block import Block
 from fba.codec.frame_buffer import FrameBuffer
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, recognition_hint
 
@@ -57,7 +58,13 @@ class Decoder:
     tables are in no public source); ValueError on wrong arguments. ISO/IEC 14496-2, FBA object.
     """
 
-    def __init__(self, *, bap_steps: str = "iso", on_error: Literal["raise", "salvage"] = "raise") -> None:
+    def __init__(
+        self,
+        *,
+        bap_steps: str = "iso",
+        on_error: Literal["raise", "salvage"] = "raise",
+        limits: Limits = DEFAULT_LIMITS,
+    ) -> None:
         if bap_steps not in BAP_STEP_TABLES:
             raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
         if on_error not in ("raise", "salvage"):
@@ -66,6 +73,7 @@ class Decoder:
         self.planes = 0
         """Planes decoded so far."""
         self._salvage = on_error == "salvage"
+        self._limits = limits
         self._buffer = Buffer()
         self._bit = 0  # next bit to decode, in the buffer
         self._scanned = 0  # byte up to which no start code was found, while looking for one
@@ -373,6 +381,7 @@ def decode(
     *,
     bap_steps: str = "iso",
     on_error: Literal["raise", "salvage"] = "raise",
+    limits: Limits = DEFAULT_LIMITS,
 ) -> Animation:
     """Return the animation of a complete FBA stream.
 
@@ -380,9 +389,9 @@ def decode(
     rate, skips and time codes. A stream that changes its rate is returned at the lowest rate at which all its
     times are exact. Raises BitstreamError, UnsupportedError.
     """
-    decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
-    frames = FrameBuffer(in_place=True)
     view = memoryview(data)
+    decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
+    frames = FrameBuffer(in_place=True, limits=limits, source=len(view))
     for start in range(0, len(view), _CHUNK):
         for block in decoder.push_blocks(view[start : start + _CHUNK]):
             frames.add(block)

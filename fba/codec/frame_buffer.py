@@ -13,8 +13,12 @@ from fba.arrays import Array, Bool, Int64
 from fba.codec._rows import Masks, Rows
 from fba.codec._time_base import TimeBase
 from fba.codec.block import Block
+from fba.limits import Limits
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.tracks import trusted
+
+_PARAMETER_BYTES = 5
+"""Memory of a parameter in a frame: an int32 and a bool."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +47,16 @@ class FrameBuffer:
 
     in_place: arrays grow in place, which needs less memory; `decoded` may then be called only once, at the
     end. Otherwise arrays that it returned do not change when more blocks come. frames: their number.
+    limits: LimitError for more frames or memory. source: bytes of the stream.
     left_out: "a face" or "a body" if one came only after `fix_parts`, else "".
     """
 
-    def __init__(self, *, in_place: bool = False) -> None:
+    def __init__(self, *, in_place: bool = False, limits: Limits | None = None, source: int = 0) -> None:
         self.frames = 0
         self.left_out = ""
         self._in_place = in_place
+        self._limits = limits
+        self._source = source
         self._parts_fixed = False
         self._times = TimeBase(in_place=in_place)
         self._bits = Rows((), np.int64, in_place=in_place)
@@ -66,6 +73,8 @@ class FrameBuffer:
         count = len(block.index)
         if not count:
             return
+        if self._limits is not None:
+            self._check_limits(self._limits, count)
         if block.face is not None and not self._face and self._accepts("a face"):
             self._face = {
                 "values": self._rows(FAP_COUNT, np.int32),
@@ -104,6 +113,13 @@ class FrameBuffer:
             self._bits.view(),
             self._intra.view(),
         )
+
+    def _check_limits(self, limits: Limits, count: int) -> None:
+        """Raise LimitError if there is no room for `count` frames more."""
+        frames = self.frames + count
+        limits.check_frames(frames, "the stream")
+        columns = FAP_COUNT * bool(self._face) + BAP_COUNT * bool(self._body)
+        limits.check_bytes(frames * columns * _PARAMETER_BYTES, "the decoded stream", source=self._source)
 
     def _accepts(self, part: str) -> bool:
         """Whether a new part may be added; otherwise set `left_out`."""

@@ -16,6 +16,7 @@ from fba.codec._plane import syntax
 from fba.codec.block import Block
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError
+from fba.limits import DEFAULT_LIMITS, Limits
 
 _CHUNK = 1 << 16
 _MASK_NAMES = {
@@ -154,13 +155,15 @@ class _PartCount:
         )
 
 
-def probe_stream(data: bytes | bytearray | memoryview, *, bap_steps: str = "iso") -> StreamInfo:
+def probe_stream(
+    data: bytes | bytearray | memoryview, *, bap_steps: str = "iso", limits: Limits = DEFAULT_LIMITS
+) -> StreamInfo:
     """Return the description of an FBA stream: planes, rates, parameters, bits.
 
     Decodes it, because only the arithmetic decoder finds the ends of planes, but stores no values. Skips
     damage and lists it. Raises BitstreamError if no plane can be decoded.
     """
-    decoder = Decoder(bap_steps=bap_steps, on_error="salvage")
+    decoder = Decoder(bap_steps=bap_steps, on_error="salvage", limits=limits)
     face, body = _PartCount(), _PartCount()
     bits: list[Int64] = []
     intra: list[Bool] = []

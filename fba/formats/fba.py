@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.atomic import atomic
-from fba.errors import BitstreamError, OptionError, RangeError
+from fba.errors import BitstreamError, LimitError, OptionError, RangeError
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
 
 if TYPE_CHECKING:
@@ -36,18 +37,23 @@ def sniff_fba(head: bytes, suffix: str) -> bool:
     return head.startswith(_BEFORE) and any(code in head for code in START_CODES)
 
 
-def read_fba(path: Path, *, bap_steps: str = "iso", salvage: bool = False) -> Animation:
+def read_fba(
+    path: Path, *, bap_steps: str = "iso", salvage: bool = False, limits: Limits = DEFAULT_LIMITS
+) -> Animation:
     """Decode an FBA file.
 
     bap_steps: "iso" or "visage", the step table with which it was encoded. salvage: skip damage with an
-    FbaWarning instead of raising. The animation is named after the file. Raises FormatError for the file,
-    BitstreamError and UnsupportedError for the stream.
+    FbaWarning instead of raising. limits: see `fba.Limits`. The animation is named after the file.
+
+    Raises FormatError for the file, BitstreamError, UnsupportedError and LimitError for the stream.
     """
     from fba.codec import decode
 
     data = read_whole(path)
     with naming_file(path):
-        animation = decode(data, bap_steps=bap_steps, on_error="salvage" if salvage else "raise")
+        animation = decode(
+            data, bap_steps=bap_steps, on_error="salvage" if salvage else "raise", limits=limits
+        )
     name = animation.name or os.path.splitext(os.path.basename(os.fspath(path)))[0]
     return Animation(animation.rate, animation.index, animation.face, animation.body, name)
 
@@ -87,6 +93,6 @@ def naming_file(path: Path) -> Iterator[None]:
     """Put the file's name in front of the codec's errors; their type and attributes stay."""
     try:
         yield
-    except (BitstreamError, RangeError) as error:
+    except (BitstreamError, LimitError, RangeError) as error:
         error.args = (f"{os.fspath(path)}: {error.finding}",)
         raise

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError, OptionError, Remedy, UnsupportedError, did_you_mean
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import recognition_hint
 from fba.source import Path, read_head
 
@@ -216,12 +217,14 @@ def probe(
     *,
     bap_steps: str = "iso",
     format: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
     **options: Any,
 ) -> StreamInfo:
     """Return what an FBA stream, in memory or in a file, or a file of another format contains.
 
-    bap_steps: as for `fba.decode`; it only affects what counts as damage. format: as for `read`. options:
-    those of the reader, for formats other than FBA. Damage in a stream is skipped and listed.
+    bap_steps: as for `fba.decode`; it only affects what counts as damage. format: as for `read`. limits: see
+    `fba.Limits`. options: those of the reader, for formats other than FBA. Damage in a stream is skipped and
+    listed.
 
     Raises FormatError, BitstreamError.
     """
@@ -230,12 +233,14 @@ def probe(
     from fba.source import read_whole
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
-        return probe_stream(data_or_path, bap_steps=bap_steps)
+        return probe_stream(data_or_path, bap_steps=bap_steps, limits=limits)
     reader = format_of(data_or_path, format)
     if reader.name == "fba":
         with naming_file(data_or_path):
-            return probe_stream(read_whole(data_or_path), bap_steps=bap_steps)
+            return probe_stream(read_whole(data_or_path), bap_steps=bap_steps, limits=limits)
     _check_options(reader.name, "reading", options, reader.read_options)
+    if "limits" in reader.read_options:
+        options["limits"] = limits
     animation = reader.read(data_or_path, **options)
     return StreamInfo.of_animation(animation, reader.name, os.stat(data_or_path).st_size)
 

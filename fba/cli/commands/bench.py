@@ -13,6 +13,7 @@ from fba.cli import options
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import print_json
+from fba.limits import Limits
 
 
 @click.command(
@@ -23,7 +24,8 @@ from fba.cli.printing import print_json
 @click.option("--rounds", type=click.IntRange(1, 1000), default=9, show_default=True)
 @options.bap_steps_option
 @options.json_option
-def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool) -> None:
+@options.limit_option
+def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool, limit: Limits) -> None:
     """Measure decoding and encoding of streams on one core: medians over several rounds.
 
     A symbol is one coded value of one plane. The source's bench/ folder compares the codec with a textbook's.
@@ -32,7 +34,7 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool)
     results = []
     for path in files:
         with each.file(path):
-            results.append(_measure(path, rounds, bap_steps))
+            results.append(_measure(path, rounds, bap_steps, limit))
             if not as_json:
                 _print(results[-1])
     if as_json:
@@ -40,27 +42,27 @@ def command(files: tuple[Path, ...], rounds: int, bap_steps: str, as_json: bool)
     each.finish()
 
 
-def _measure(file: Path, rounds: int, bap_steps: str) -> dict[str, Any]:
+def _measure(file: Path, rounds: int, bap_steps: str, limits: Limits) -> dict[str, Any]:
     """Return the symbols of a stream, and seconds and symbols per second of decoding and encoding it."""
     from fba.codec import Decoder, EncoderOptions, decode, encode_with_statistics
     from fba.compiled import is_compiled
 
     with input_file(file) as path:
         data = path.read_bytes()
-    animation = decode(data, bap_steps=bap_steps)
+    animation = decode(data, bap_steps=bap_steps, limits=limits)
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     symbols = sum(int(track.mask.sum()) for track in tracks)
     encoder = EncoderOptions(bap_steps=bap_steps, fap_quant=1, bap_quant=1, clamp=True)
 
     def stream() -> None:
-        decoder = Decoder(bap_steps=bap_steps)
+        decoder = Decoder(bap_steps=bap_steps, limits=limits)
         for start in range(0, len(data), 512):
             decoder.push(data[start : start + 512])
         decoder.finish()
 
     timings: dict[str, Any] = {}
     for name, run in (
-        ("decode", lambda: decode(data, bap_steps=bap_steps)),
+        ("decode", lambda: decode(data, bap_steps=bap_steps, limits=limits)),
         ("decode in chunks of 512 bytes", stream),
         ("encode", lambda: encode_with_statistics(animation, encoder)),
     ):

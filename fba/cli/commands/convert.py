@@ -19,6 +19,7 @@ from fba.cli.outputs import (
     display_name,
     find_writer,
 )
+from fba.limits import Limits
 
 
 @click.command(
@@ -41,6 +42,7 @@ from fba.cli.outputs import (
 @writer_options.writer_options
 @options.bap_steps_option
 @options.salvage_option
+@options.limit_option
 def command(
     source: Path,
     target: Path,
@@ -50,6 +52,7 @@ def command(
     no_clobber: bool,
     bap_steps: str,
     salvage: bool,
+    limit: Limits,
     **given: Any,
 ) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
@@ -68,7 +71,7 @@ def command(
     extra = writer_options.settings(target, writing, given)
     if writing.name == "fba":
         extra["bap_steps"] = bap_steps
-    animation = read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage, format=format)
+    animation = read_input(source, fps=fps, bap_steps=bap_steps, salvage=salvage, limits=limit, format=format)
     if writing.name == "fba":
         step_tables.warn_of_coarse_steps(animation, bap_steps)
     with outputs.file(target) as file:

@@ -24,6 +24,7 @@ from fba.cli.outputs import (
 from fba.cli.printing import Progress
 from fba.cli.program import as_typed
 from fba.errors import BitstreamError
+from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.codec import PlaneSettings
@@ -71,6 +72,7 @@ _FOLDER_OR_FILE = OutputType(folders=True)
 @writer_options.writer_options
 @options.bap_steps_option
 @options.salvage_option
+@options.limit_option
 @options.json_option
 def command(
     inputs: tuple[Path, ...],
@@ -82,6 +84,7 @@ def command(
     no_clobber: bool,
     bap_steps: str,
     salvage: bool,
+    limit: Limits,
     as_json: bool,
     **given: Any,
 ) -> None:
@@ -112,7 +115,9 @@ def command(
         for path in inputs:
             with each.file(path):
                 reports.append(
-                    _decode(path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage)
+                    _decode(
+                        path, targets, outputs, settings, bap_steps=bap_steps, salvage=salvage, limits=limit
+                    )
                 )
             step.advance()
     if as_json:
@@ -188,6 +193,7 @@ def _decode(
     *,
     bap_steps: str,
     salvage: bool,
+    limits: Limits,
 ) -> dict[str, Any]:
     """Decode a stream to its files; return a report. settings: for the writer of `--output`."""
     from fba.formats import write
@@ -195,7 +201,9 @@ def _decode(
 
     with input_file(path) as file:
         data = file.read_bytes()
-    animation, planes = _read(data, _name(path), any(t.writing is None for t in targets), bap_steps, salvage)
+    animation, planes = _read(
+        data, _name(path), any(t.writing is None for t in targets), bap_steps, salvage, limits
+    )
     step_tables.warn_of_doubt(path, animation, bap_steps)
     parts = {"face": "FAPs", "body": "BAPs"}
     for target in targets:
@@ -224,15 +232,15 @@ def _only(animation: Animation, parts: tuple[str, ...]) -> Animation:
 
 
 def _read(
-    data: bytes, name: str, with_settings: bool, bap_steps: str, salvage: bool
+    data: bytes, name: str, with_settings: bool, bap_steps: str, salvage: bool, limits: Limits
 ) -> tuple[Animation, list[PlaneSettings]]:
     """Return the animation, and if with_settings, how each plane was coded."""
     from fba.codec import Decoder, decode
 
     on_error: Literal["raise", "salvage"] = "salvage" if salvage else "raise"
     if not with_settings:
-        return replace(decode(data, bap_steps=bap_steps, on_error=on_error), name=name), []
-    decoder = Decoder(bap_steps=bap_steps, on_error=on_error)
+        return replace(decode(data, bap_steps=bap_steps, on_error=on_error, limits=limits), name=name), []
+    decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
     frames = decoder.push(data) + decoder.finish()
     if not frames:
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0)

@@ -16,6 +16,7 @@ from fba.cli.inputs import EXISTING, input_file, read_input
 from fba.cli.outputs import Output, Outputs, OutputType, display_name
 from fba.cli.printing import Progress, rate_text, seconds_text
 from fba.errors import FormatError
+from fba.limits import Limits
 
 CAPTURE = ("spine", "ground", "plant", "origin")
 """Options that say how motion capture becomes BAPs."""
@@ -117,6 +118,7 @@ CAPTURE = ("spine", "ground", "plant", "origin")
 )
 @click.option("--report", is_flag=True, help="Motion capture: print how far each bone is from the source's.")
 @options.salvage_option
+@options.limit_option
 @options.json_option
 def command(
     inputs: tuple[Path, ...],
@@ -130,6 +132,7 @@ def command(
     report: bool,
     salvage: bool,
     as_json: bool,
+    limit: Limits,
     **settings: Any,
 ) -> None:
     """Encode FAP, BAP or motion-capture files as an FBA stream.
@@ -144,7 +147,7 @@ def command(
     with Progress("reading", len(inputs)) as step:
         animation = _read_all(
             inputs, fps=fps, name=name, bap_steps=settings["bap_steps"], salvage=salvage, step=step,
-            capture=capture, format=format,
+            capture=capture, format=format, limits=limit,
         )  # fmt: skip
     captures = [path for path in inputs if _is_capture(path, format)]
     animation, report_values = capture_report.apply_limits(animation, limits)
@@ -254,6 +257,7 @@ def _read_all(
     step: Progress,
     capture: Mapping[str, object],
     format: str | None,
+    limits: Limits,
 ) -> Animation:
     """Return face and body of all inputs as one animation."""
     from fba.formats import merge
@@ -261,8 +265,9 @@ def _read_all(
     result: Animation | None = None
     for path in inputs:
         animation = read_input(
-            path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format
-        )
+            path, fps=fps, name=name, bap_steps=bap_steps, salvage=salvage, capture=capture, format=format,
+            limits=limits,
+        )  # fmt: skip
         step.advance()
         if not len(animation):
             raise FormatError("the file holds no frames; there is nothing to encode", path=path)

@@ -20,6 +20,7 @@ from fba.cli.outputs import (
     find_writer,
 )
 from fba.cli.printing import print_json, seconds_text
+from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -68,6 +69,7 @@ DEFAULT_RATE = Fraction(30)
     help="Print the cycles and poses in a walk.",
 )
 @options.json_option
+@options.limit_option
 def command(
     stride: float | None,
     character: str,
@@ -83,6 +85,7 @@ def command(
     listed: bool,
     find: Path | None,
     as_json: bool,
+    limit: Limits,
 ) -> None:
     """Generate a walk: body animation from four characteristic poses and a character.
 
@@ -96,7 +99,7 @@ def command(
     if listed:
         _print_characters(as_json)
     elif find is not None:
-        _print_steps(find, bap_steps, fps, format, as_json)
+        _print_steps(find, bap_steps, fps, format, as_json, limit)
     elif output is not None:
         if as_json:
             raise click.UsageError("--json goes with --list and --find")
@@ -152,11 +155,13 @@ def _print_characters(as_json: bool) -> None:
         click.echo(f"{c.name:{width}}  {pace}  {c.about}")
 
 
-def _print_steps(file: Path, bap_steps: str, fps: Fraction | None, format: str | None, as_json: bool) -> None:
+def _print_steps(
+    file: Path, bap_steps: str, fps: Fraction | None, format: str | None, as_json: bool, limits: Limits
+) -> None:
     from fba.body import gait
     from fba.errors import FormatError
 
-    animation = read_input(file, bap_steps=bap_steps, header_fps=fps, format=format)
+    animation = read_input(file, bap_steps=bap_steps, header_fps=fps, format=format, limits=limits)
     if animation.body is None:
         raise FormatError("has no body to walk with", path=file)
     detected = gait.detect(animation)

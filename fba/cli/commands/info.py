@@ -12,6 +12,7 @@ from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file, probe_input
 from fba.cli.printing import print_json, rate_text, seconds_text
 from fba.codec.stream_info import PartInfo, StreamInfo
+from fba.limits import Limits
 
 
 @click.command(
@@ -31,6 +32,7 @@ from fba.codec.stream_info import PartInfo, StreamInfo
 @options.fps_option("Frame rate of a file without a header.")
 @options.from_option
 @options.salvage_option
+@options.limit_option
 @click.option("--values", is_flag=True, help="With --trace: the decoded symbols of every segment as well.")
 def command(
     files: tuple[Path, ...],
@@ -41,6 +43,7 @@ def command(
     fps: Fraction | None,
     format: str | None,
     salvage: bool,
+    limit: Limits,
 ) -> None:
     """Show what a file holds: frames, rate, parameters, bits. Any format is recognised by content.
 
@@ -56,7 +59,9 @@ def command(
     reports = []
     for path in files:
         with each.file(path), input_file(path) as file:
-            info = probe_input(file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage)
+            info = probe_input(
+                file, bap_steps=bap_steps, fps=fps, format=format, salvage=salvage, limits=limit
+            )
             if info.format == "fba" and info.body is not None:
                 step_tables.warn_of_doubtful_stream(path, file.read_bytes(), bap_steps)
             reports.append({"file": str(path), **info.to_dict()})

@@ -180,7 +180,12 @@ def command(
     with Progress("preparing", None):
         animations = [
             read_input(
-                file, bap_steps=how.bap_steps, header_fps=how.fps, salvage=how.salvage, format=how.format
+                file,
+                bap_steps=how.bap_steps,
+                header_fps=how.fps,
+                salvage=how.salvage,
+                format=how.format,
+                limits=how.limit,
             )
             for file in files
         ] or [still_animation(faps, visemes, expressions)]

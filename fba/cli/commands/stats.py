@@ -13,6 +13,7 @@ from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file
 from fba.cli.printing import print_json
 from fba.codec.stream_info import StreamInfo
+from fba.limits import Limits
 
 LONGEST = 1 << 16
 """Characters of a row: names of files are shorter."""
@@ -22,7 +23,8 @@ LONGEST = 1 << 16
 @click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
 @options.bap_steps_option
 @options.json_option
-def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
+@options.limit_option
+def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, limit: Limits) -> None:
     """Show where the bits of FBA streams go: I and P planes, mean and peak rates."""
     from fba.codec import probe_stream
 
@@ -31,7 +33,7 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool) -> None:
     for path in files:
         with each.file(path), input_file(path) as file:
             data = file.read_bytes()
-            info = probe_stream(data, bap_steps=bap_steps)
+            info = probe_stream(data, bap_steps=bap_steps, limits=limit)
             if info.body is not None:
                 step_tables.warn_of_doubtful_stream(path, data, bap_steps)
             rows.append({"file": str(path), **statistics(info)})
