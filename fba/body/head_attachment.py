@@ -121,7 +121,7 @@ class HeadOnBody:
         if local.shape != self._placed.shape:
             raise ValueError(f"vertices must have shape {self._placed.shape}, not {local.shape}")
         scale_and_shift(local, self.size, self.shift, self._placed)
-        return self.skinner.carry(self._placed, upright, matrices, out, normals, method)
+        return self.skinner.skin_other(self._placed, upright, matrices, out, normals, method)
 
 
 def skull_of(body: BodyModel) -> int:

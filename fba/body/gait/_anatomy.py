@@ -16,23 +16,23 @@ HEEL_BEHIND, TOES_AHEAD = 0.054, 0.062
 """Metres from the ankle's centre back to where the heel touches, and from the metatarsal joint to the tip of
 the toes, for the default body."""
 HIP_HEIGHT = 0.9364
-"""Height of the default body's hips, metres: the scale of other bodies is relative to it."""
+"""Height of the default body's hips, metres; a body's scale is the height of its hips divided by this."""
 PALMS = ("middle0", "middle1", "index0", "wrist")
-"""Joints by which a palm is placed, the first that a skeleton has."""
+"""Joints that can stand for the palm: the first that a skeleton has."""
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One side of a body; float64 (3,), metres, default posture.
+    """One side of a body: positions and vectors in the default posture, float64 (3,), metres.
 
-    letter: "l" or "r". way: +1 left, -1 right. hip: vector from the root. leg, arm: their bones. ankle: its
-    centre, above the ground. subtalar: vector from the ankle. heel, toe: vectors from the subtalar joint to
+    letter: "l" or "r". sign: +1 left, -1 right. hip: vector from the root. leg, arm: their bones. ankle:
+    position of its centre. subtalar: vector from the ankle. heel, toe: vectors from the subtalar joint to
     the heel's ground point and to the metatarsal joint. tip: vector from there to the tip of the toes, on
     the ground.
     """
 
     letter: str
-    way: float
+    sign: float
     hip: Float64
     leg: Limb
     ankle: Float64
@@ -65,12 +65,12 @@ class Anatomy:
             wanted += [f"{letter}_{j}" for j in ("shoulder", "elbow", "wrist")]
         missing = [joint for joint in wanted if joint not in skeleton]
         if missing:
-            raise ModelError(f"gait: the skeleton has no {', '.join(missing)}; it cannot walk without")
+            raise ModelError(f"gait: the skeleton has no {', '.join(missing)}; it cannot walk without them")
         centre = {name: skeleton.centres[skeleton.number(name)] for name in skeleton.names}
         height = float(centre["l_hip"][1])
         scale = height / HIP_HEIGHT
         sides = {}
-        for letter, way in (("l", 1.0), ("r", -1.0)):
+        for letter, sign in (("l", 1.0), ("r", -1.0)):
             hip, knee, ankle, subtalar, toe = (
                 centre[f"{letter}_{j}"] for j in ("hip", "knee", "ankle", "subtalar", "metatarsal")
             )
@@ -79,12 +79,12 @@ class Anatomy:
             lengths = [np.linalg.norm(b) for b in (knee - hip, ankle - knee, elbow - shoulder, palm - elbow)]
             if height <= 0.0 or ankle[1] < 0.0 or min(lengths) < 1e-3 * scale:
                 raise ModelError(
-                    "gait: the skeleton's legs and arms need bones of some length, and its feet "
+                    "gait: the skeleton's legs and arms need bones longer than 1 mm, and its feet "
                     "must be above the ground (y = 0) in the default posture"
                 )
             sides[letter] = Side(
                 letter,
-                way,
+                sign,
                 hip - centre[ROOT],
                 Limb(knee - hip, ankle - knee, KNEE),
                 ankle,
@@ -98,7 +98,7 @@ class Anatomy:
 
 
 class Writer:
-    """Writes angles and positions as BAPs, in one convention."""
+    """Collects angles and positions as BAPs, in one convention."""
 
     def __init__(self, frames: int, axes: str = "iso") -> None:
         from fba.parameters import BAP_COUNT
@@ -113,19 +113,19 @@ class Writer:
         return int(self._rules.translation[2])
 
     def turn(self, joint: str, axis: int, radians: Float64 | float) -> None:
-        """Set a joint's angle about x, y or z of the body's frame; KeyError where it has no such freedom."""
+        """Set a joint's angle about x, y or z of the body's frame; KeyError where it does not turn so."""
         rules = self._rules
         row = rules.joints.index(joint)
-        for place in range(3):
-            if rules.axis[row, place] == axis and rules.bap[row, place] >= 0:
-                column = rules.bap[row, place]
-                self.values[:, column] = np.asarray(radians) * rules.sign[row, place] * 1e5
+        for slot in range(3):
+            if rules.axis[row, slot] == axis and rules.bap[row, slot] >= 0:
+                column = rules.bap[row, slot]
+                self.values[:, column] = np.asarray(radians) * rules.sign[row, slot] * 1e5
                 self.sent[column] = True
                 return
         raise KeyError(f"{joint} does not turn about {'xyz'[axis]}")
 
     def move(self, metres: Float64) -> None:
-        """Set the root's translation, (T, 3) from the default posture; rounded to whole mm."""
+        """Set the root's translation, (T, 3) metres from the default posture, rounded to mm."""
         for axis in range(3):
             column = self._rules.translation[axis]
             self.values[:, column] = np.rint(metres[:, axis] * self._rules.translation_sign[axis] * 1e3)

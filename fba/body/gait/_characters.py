@@ -1,8 +1,8 @@
 """Characters of walkers: four characteristic poses and a posture each, from poses.csv and characters.json.
 
-Digest faces-and-emotions.md, 2.3 and 2.6. The poses describe half a cycle: `stance` is the leg that carries,
-`swing` the other (in the extended pose the rear one, which swings next); the other half has the sides
-exchanged. Where a character leaves a cell empty, that of `normal` is used.
+Digest faces-and-emotions.md, 2.3 and 2.6. The poses describe half a cycle: `stance` is the leg that carries
+the body, `swing` the other one (in the extended pose the rear one, which swings next). In the other half the
+sides are exchanged. A cell that a character leaves empty is as in `normal`.
 """
 
 from __future__ import annotations
@@ -34,10 +34,9 @@ _MAX_DEGREES = 170.0
 class Pose:
     """One leg in one pose, and the palm on its side. Degrees.
 
-    thigh: forward angle against the vertical; used only where the leg swings freely, elsewhere the stride
-    determines it. knee: bend. foot: pitch of the sole, toes up (+) or down (-), so that the ankle makes up
-    for hip and knee: 0 is the digest's hip + knee = ankle. out, down, forward: position of the palm from the
-    shoulder, in lengths of the arm.
+    thigh: forward angle from the vertical; used only where the leg swings freely, as elsewhere the stride
+    determines it. knee: bend. foot: pitch of the sole, toes up (+) or down (-); 0 is the digest's
+    hip + knee = ankle. out, down, forward: position of the palm from the shoulder, in lengths of the arm.
     """
 
     thigh: float
@@ -52,10 +51,11 @@ class Pose:
 class Pelvis:
     """Motion of the pelvis.
 
-    turn: degrees about y that the side of the front leg is ahead, in the extended pose (the digest's Z).
-    list: degrees about z by which the swinging side hangs, in the passing pose (the digest's Y).
+    turn: degrees about y by which the side of the front leg is ahead in the extended pose (the digest's Z).
+    list: degrees about z by which the swinging side drops in the passing pose (the digest's Y).
     tilt: degrees by which the whole body leans forward from the hips.
-    sway: metres to the carrying side. surge: share by which the speed rises and falls twice a cycle.
+    sway: metres to the side of the leg that carries the body. surge: share by which the speed rises and falls
+    twice a cycle.
     """
 
     turn: float
@@ -69,9 +69,9 @@ class Pelvis:
 class Spine:
     """Posture and motion of the spine.
 
-    lumbar, thorax, neck, head: degrees bent forward. turn: degrees of the shoulders against the pelvis's
-    turn, at most; the head keeps looking ahead. lean: degrees of the chest to the carrying side. nod: degrees
-    of the head, twice a cycle.
+    lumbar, thorax, neck, head: degrees bent forward. turn: largest turn of the shoulders against that of the
+    pelvis, degrees; the head keeps looking ahead. lean: degrees of the chest to the side of the leg that
+    carries the body. nod: degrees of the head, twice a cycle.
     """
 
     lumbar: float
@@ -87,7 +87,8 @@ class Spine:
 class Arms:
     """Posture of the arms.
 
-    up, forward: degrees of the shoulder girdle. twist: degrees of the upper arm, elbows outward.
+    up, forward: degrees of the shoulder girdle. twist: degrees of the upper arm, which turns
+    the elbow outward.
     wrist: degrees. curl: degrees of each finger joint.
     """
 
@@ -102,11 +103,11 @@ class Arms:
 class Character:
     """A way to walk.
 
-    seconds: of a cycle. stride: metres from one contact of a foot to its next. width: metres between the
-    lines of the two feet. Both for the default body, whose hips are 0.936 m high. toes_out: degrees.
+    seconds: of a cycle. stride: metres from one contact of a foot to its next; width: metres between the
+    lines of the two feet; both for the default body, whose hips are 0.936 m high. toes_out: degrees.
     poses: by (pose, leg), all eight.
 
-    Raises ModelError where something is missing, not finite, or no angle a person has.
+    ModelError where a pose is missing, or a number is not finite or too large.
     """
 
     name: str
@@ -133,20 +134,20 @@ class Character:
                 raise ModelError(
                     f"gait character {self.name!r}: {what} must lie within {low:g}..{high:g}, not {value!r}"
                 )
-        for place, part in (
+        for group, part in (
             ("pelvis", self.pelvis), ("spine", self.spine), ("arms", self.arms),
             *((" ".join(key), pose) for key, pose in self.poses.items()),
         ):  # fmt: skip
             for field, value in vars(part).items():
                 if not (np.isfinite(value) and abs(value) <= _MAX_DEGREES):
                     raise ModelError(
-                        f"gait character {self.name!r}: {place}, {field} must be a number of at most "
+                        f"gait character {self.name!r}: {group}, {field} must be a number of at most "
                         f"{_MAX_DEGREES:g}, not {value!r}"
                     )
 
     @staticmethod
     def named(name: str) -> Character:
-        """Return a character of the table; ModelError with the names that there are."""
+        """Return a built-in character by name; ModelError, which lists the names, for an unknown one."""
         known = _characters()
         if not isinstance(name, str) or name not in known:
             close = difflib.get_close_matches(str(name), known, 1)
@@ -173,16 +174,16 @@ class Character:
 
 
 def characters() -> tuple[str, ...]:
-    """Return names of all characters, `normal` first."""
+    """Return the names of all built-in characters, `normal` first."""
     return tuple(_characters())
 
 
 @cache
 def _characters() -> dict[str, Character]:
-    place = files(__package__)
-    table: dict[str, Any] = json.loads((place / "characters.json").read_text(encoding="utf-8"))
+    folder = files(__package__)
+    table: dict[str, Any] = json.loads((folder / "characters.json").read_text(encoding="utf-8"))
     poses: dict[tuple[str, str, str], Pose] = {}
-    for row in csv.DictReader((place / "poses.csv").read_text(encoding="utf-8").splitlines()):
+    for row in csv.DictReader((folder / "poses.csv").read_text(encoding="utf-8").splitlines()):
         base = poses.get(("normal", row["pose"], row["leg"]))
         cells = {f: float(row[f]) if row[f] else getattr(base, f, 0.0) for f in _FIELDS}
         poses[row["character"], row["pose"], row["leg"]] = Pose(**cells)
@@ -190,14 +191,14 @@ def _characters() -> dict[str, Character]:
     normal = table["normal"]
     for name, own in table.items():
         parts = {key: {**normal[key], **own.get(key, {})} for key in ("pelvis", "spine", "arms")}
-        both = {**normal, **own}
+        values = {**normal, **own}
         result[name] = Character(
             name,
-            both["about"],
-            float(both["seconds"]),
-            float(both["stride"]),
-            float(both["width"]),
-            float(both["toes_out"]),
+            values["about"],
+            float(values["seconds"]),
+            float(values["stride"]),
+            float(values["width"]),
+            float(values["toes_out"]),
             Pelvis(**parts["pelvis"]),
             Spine(**parts["spine"]),
             Arms(**parts["arms"]),

@@ -1,4 +1,4 @@
-"""Curves through a few values of a cycle. Phases are fractions of the cycle."""
+"""Curves through a few values of a cycle or of a part of it. Phases are fractions of the cycle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fba.arrays import Float64
 
 Interpolation = Literal["linear", "smooth"]
-""""linear" as in the digest, or cubic."""
+"""Between two values: "linear", as in the digest, or "smooth", by cubic curves."""
 
 
 def check_interpolation(interpolation: Interpolation) -> Interpolation:
@@ -30,9 +30,10 @@ def cosine_wave(knots: npt.ArrayLike, phase: Float64, interpolation: Interpolati
 def periodic_curve(
     knots: npt.ArrayLike, values: npt.ArrayLike, phase: npt.ArrayLike, interpolation: Interpolation = "smooth"
 ) -> Float64:
-    """Return a periodic, monotone curve through values, at phases: flat between equal neighbours.
+    """Return the values at phases of a periodic curve through given ones, monotone between neighbours.
 
-    knots: increasing phases in 0..1, values: one each. Cubic pieces, tangents by Fritsch and Butland (1984).
+    knots: increasing phases in 0..1. values: one at each. The pieces are cubic; their tangents are those of
+    Fritsch and Butland (1984).
     """
     x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
     u = np.asarray(phase, dtype=np.float64)
@@ -42,9 +43,10 @@ def periodic_curve(
     slope = np.diff(np.append(y, y[0])) / step
     before, step_before = np.roll(slope, 1), np.roll(step, 1)
     one, two = step_before + 2.0 * step, 2.0 * step_before + step
-    turns = before * slope <= 0.0
-    safe = [np.where(turns, 1.0, s) for s in (before, slope)]
-    tangent: Float64 = np.where(turns, np.zeros(len(x)), (one + two) / (two / safe[0] + one / safe[1]))
+    extreme = before * slope <= 0.0  # flat at maxima, at minima, and between equal values
+    divisors = [np.where(extreme, 1.0, s) for s in (before, slope)]
+    mean = (one + two) / (two / divisors[0] + one / divisors[1])
+    tangent: Float64 = np.where(extreme, 0.0, mean)
     u = np.mod(u - x[0], 1.0) + x[0]
     k = np.clip(np.searchsorted(x, u, side="right") - 1, 0, len(x) - 1)
     after = (k + 1) % len(x)
@@ -54,7 +56,10 @@ def periodic_curve(
 def spline(
     knots: npt.ArrayLike, values: Float64, first: Float64, last: Float64, phase: npt.ArrayLike
 ) -> Float64:
-    """Return the cubic spline through values (K, ...) at knots (K,) with given slopes at its ends."""
+    """Return the values at phases of the cubic spline through values (K, ...) at knots (K,).
+
+    first, last: (...), its slopes at both ends.
+    """
     x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
     count, h = len(x), np.diff(x)
     slope = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))
@@ -73,6 +78,7 @@ def spline(
 
 
 def _hermite(s: Float64, step: Float64, y0: Float64, y1: Float64, d0: Float64, d1: Float64) -> Float64:
+    """Return the cubic with values y0, y1 and slopes d0, d1 at its ends, at fractions s of the step."""
     t = 1.0 - s
     result: Float64 = t * t * ((1 + 2 * s) * y0 + s * step * d0) + s * s * ((1 + 2 * t) * y1 - t * step * d1)
     return result

@@ -1,9 +1,9 @@
-"""Walking found in captured motion: contacts, cycles, the four characteristic poses.
+"""Detection of walking in captured motion: contacts, cycles, the four characteristic poses.
 
 Digest faces-and-emotions.md, 2.4. A foot touches the ground where its heel is furthest ahead of the pelvis,
-and leaves it where its toes are furthest behind (Zeni, Richards, Higginson 2008): that holds on any ground,
-on a treadmill, and on curves, with "ahead" as where the pelvis faces. Recoil, passing and anticipation are
-extrema of the knees and of the swinging thigh.
+and leaves it where its toes are furthest behind (Zeni, Richards, Higginson 2008). "Ahead" is where the
+pelvis faces, so this holds on any ground, on a treadmill, and on curves. Recoil, passing and anticipation
+are extrema of the knees and of the swinging thigh.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
 
 UNEVEN = 2.2
-"""How much longer one of the two steps of a cycle may take than the other."""
+"""Largest ratio of the times that the two steps of a cycle take."""
 _NAMES = {"l": "left", "r": "right"}
 
 
@@ -32,9 +32,9 @@ _NAMES = {"l": "left", "r": "right"}
 class Step:
     """Half a cycle: from the contact of one foot to that of the other.
 
-    side: "left" or "right", the foot that touches the ground first and carries. poses: frames of the four
-    poses, in order. end: frame of the other foot's contact. off: frame in which the other foot left the
-    ground, or None where that was not seen.
+    side: "left" or "right", the foot that touches the ground first and carries the body. poses: frames of
+    the four poses, in order. end: frame of the other foot's contact. off: frame in which the other foot left
+    the ground, None where the motion does not show that.
     """
 
     side: str
@@ -51,9 +51,9 @@ class Step:
 class Cycle:
     """Two steps, from a contact of a foot to its next.
 
-    seconds: how long. stride: metres between the footprints. stance: share of the cycle for which the foot
-    was on the ground, NaN where its end was not seen. turn: degrees by which the body turned left.
-    running: whether both feet were off the ground at some time.
+    seconds: its length. stride: metres between the footprints. stance: share of the cycle for which the foot
+    was on the ground, NaN where the motion does not show when it left. turn: degrees by which the body
+    turned left. running: whether both feet were off the ground at some time.
     """
 
     steps: tuple[Step, Step]
@@ -84,9 +84,10 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Gait:
-    """The result of `detect`.
+    """The steps and cycles of a motion, as `detect` returns them.
 
-    steps: in order of time. cycles: they overlap by a step. Frames are positions in the animation, from 0.
+    steps: in order of time. cycles: successive ones share a step. Frames are positions in the animation,
+    from 0.
     """
 
     rate: Fraction
@@ -101,7 +102,7 @@ class Gait:
 
     @property
     def walking(self) -> Bool:
-        """(T,), which frames belong to a step."""
+        """(T,) mask of the frames that belong to a step."""
         result = np.zeros(self.frames, dtype=bool)
         for step in self.steps:
             result[step.start : step.end + 1] = True
@@ -125,9 +126,9 @@ class Gait:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Return the gait in lines of text."""
+        """Return the gait as lines of text, for people."""
         if not self.steps:
-            return ["no steps found: nobody walks here, or less than one step"]
+            return ["no steps found: the body does not walk, or less than one step"]
         result = [
             f"{len(self.steps)} steps, {len(self.cycles)} cycles; "
             f"walking in {int(self.walking.sum())} of {self.frames} frames",
@@ -148,18 +149,17 @@ class Gait:
 def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "iso") -> Gait:
     """Return the steps, cycles and characteristic poses in which a body walks forward.
 
-    skeleton: the one whose joints the BAPs turn, the default body where None. axes: a convention's name.
-    A foot that never swings past the other, sideways and backward steps, and the first and last step of a
-    walk, whose beginning or end is not there, are not found. ValueError where there is no body track.
+    skeleton: the one whose joints the BAPs turn, the default body where None. axes: a convention's name. Not
+    detected are feet that never swing past each other, sideways and backward steps, and steps that the motion
+    shows only in part. ValueError where there is no body track.
     """
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     skeleton = Skeleton.default() if skeleton is None else skeleton
     anatomy = Anatomy.measure(skeleton)
     count = len(animation)
-    none = Gait(animation.rate, count, (), ())
     if count < 4:
-        return none
+        return Gait(animation.rate, count, (), ())
     curves = Curves.measure(anatomy, BapSolver(skeleton, axes).pose(animation.body.values), animation.times)
     contacts = {letter: curves.contacts(letter) for letter in "lr"}
     offs = {letter: curves.departures(letter) for letter in "lr"}
@@ -179,8 +179,8 @@ def detect(animation: Animation, skeleton: Skeleton | None = None, axes: str = "
 
 def _step(curves: Curves, side: str, start: int, end: int, offs: list[int]) -> Step | None:
     other = "l" if side == "r" else "r"
-    lasting = float(curves.times[end] - curves.times[start])
-    if not STEP_SECONDS[0] <= lasting <= STEP_SECONDS[1] or end - start < 4:
+    seconds = float(curves.times[end] - curves.times[start])
+    if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or end - start < 4:
         return None
     swing = curves.heel[other]
     if swing[end] - swing[start : end + 1].min() < SHORTEST_SWING * curves.reach:
@@ -188,14 +188,14 @@ def _step(curves: Curves, side: str, start: int, end: int, offs: list[int]) -> S
     length = end - start
     first, last = start + max(1, round(0.2 * length)), end - max(1, round(0.2 * length))
     passing = first + int(np.argmax(curves.knee[other][first : last + 1]))
-    early = curves.knee[side][start + 1 : passing]
-    # where the carrying knee does not bend, the pose is taken half way
-    recoil = start + 1 + int(np.argmax(early)) if len(early) else start + 1
+    early_bend = curves.knee[side][start + 1 : passing]
+    # where the knee of the standing leg does not bend, the pose is half way
+    recoil = start + 1 + int(np.argmax(early_bend)) if len(early_bend) else start + 1
     if not start + 1 < recoil < passing - 1:
         recoil = (start + passing) // 2
-    # a thigh that still rises as the foot comes down has no extremum before: half way again
-    late = curves.thigh[other][passing + 1 : end - round(0.1 * length)]
-    anticipation = passing + 1 + int(np.argmax(late)) if len(late) else passing
+    # a thigh that rises until the foot comes down has no extremum before that: half way again
+    late_raise = curves.thigh[other][passing + 1 : end - round(0.1 * length)]
+    anticipation = passing + 1 + int(np.argmax(late_raise)) if len(late_raise) else passing
     if not passing + 1 < anticipation < end - round(0.1 * length) - 1:
         anticipation = (passing + end) // 2
     if not passing < anticipation < end or not start < recoil < passing:
@@ -211,7 +211,7 @@ def _cycle(curves: Curves, one: Step, two: Step) -> Cycle | None:
     start, end = one.start, two.end
     heel = curves.heel_position[one.side[0]]
     gap = heel[end] - heel[start]
-    # the foot that carries in the first step leaves the ground in the second
+    # the standing foot of the first step leaves the ground in the second
     stance = (two.off - start) / (end - start) if two.off is not None else float("nan")
     running = any(step.off is not None and step.off < step.start for step in (one, two))
     return Cycle(

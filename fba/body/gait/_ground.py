@@ -2,7 +2,7 @@
 
 A foot lands on its heel, lies flat, and rises over the metatarsal joint while the toes stay flat: what
 touches the ground does not move. The digest corrects for ground and slip by moving the root (2.5, steps 3
-and 4); so does `_plan`. While two feet are on the ground, that is not enough; the legs make up for it here.
+and 4); so does `_plan`. That is not enough while both feet are on the ground: the legs make up the rest here.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from fba.rotations import apply, axis_matrices
 TOE_OFF = 0.6
 """Fraction of the cycle at which a foot leaves the ground."""
 _ROUNDS = 4
+"""Rounds in which the roll of the subtalar joint and the turn of the foot settle."""
 _RISEN = np.sin(np.radians(12.0))
 """Sine of the pitch of a foot whose heel is well off the ground."""
 
@@ -54,18 +55,18 @@ class Leg:
 
 
 def foot_turn(pitch: Float64, yaw: Float64 | float) -> Float64:
-    """Return the rotation of a foot with toes raised by pitch and turned by yaw (about +y), radians."""
+    """Return the rotation of a foot whose toes are raised by pitch and turned by yaw (about +y), radians."""
     return axis_matrices(1, np.broadcast_to(yaw, pitch.shape)) @ axis_matrices(0, -pitch)
 
 
-def place_standing_foot(side: Side, place: Float64, pitch: Float64, yaw: float) -> Footing:
+def place_standing_foot(side: Side, footprint: Float64, pitch: Float64, yaw: float) -> Footing:
     """Return the poses of a foot on the ground.
 
-    place: (T, 3), the point on the ground (y = 0) below the ankle's centre when the foot is flat. pitch:
-    (T,), yaw: radians.
+    footprint: (T, 3), the point on the ground (y = 0) below the ankle's centre while the foot is flat.
+    pitch: (T,), yaw: radians.
     """
     turn, flat = foot_turn(pitch, yaw), axis_matrices(1, yaw)
-    level = place + (0.0, side.ankle[1], 0.0) + flat @ side.subtalar
+    level = footprint + (0.0, side.ankle[1], 0.0) + flat @ side.subtalar
     on_heel = level + flat @ side.heel - apply(turn, side.heel)
     on_toes = level + flat @ side.toe - apply(turn, side.toe)
     return Footing(turn, np.where(pitch[..., None] > 0.0, on_heel, on_toes))
@@ -85,16 +86,16 @@ def solve_leg(side: Side, hip: Float64, footing: Footing, knee_yaw: float, level
     little about the metatarsal joint: not at all where the roll is level_roll, and less as the heel rises.
     """
     roll: Float64 | float = 0.0
-    solved = footing
+    adjusted = footing
     down = smoothstep(1.0 + footing.turn[..., 1, 2] / _RISEN)
     joint = footing.subtalar + apply(footing.turn, side.toe)
-    for _ in range(_ROUNDS):  # the subtalar joint's roll moves ankle and heel, by less each time
-        thigh, bend = side.leg.solve(ankle_position(side, solved, roll) - hip, knee_yaw)
-        leg = Leg(thigh, bend, solved.turn)
+    for _ in range(_ROUNDS):  # the roll of the subtalar joint moves ankle and heel, each time by less
+        thigh, bend = side.leg.solve(ankle_position(side, adjusted, roll) - hip, knee_yaw)
+        leg = Leg(thigh, bend, adjusted.turn)
         _, _, roll = leg.ankle()
         aside = side.heel[1] / (side.toe[2] - side.heel[2]) * (np.sin(roll) - np.sin(level_roll))
         turn = axis_matrices(1, down * aside) @ footing.turn
-        solved = Footing(turn, joint - apply(turn, side.toe))
+        adjusted = Footing(turn, joint - apply(turn, side.toe))
     return leg
 
 
@@ -108,7 +109,7 @@ def place_swinging_foot(side: Side, hip: Float64, thigh: Float64, bend: Float64,
 
 
 def lowest_height(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> Float64:
-    """Return (T,) height of the lowest of heel, ball and tip of the toes, metres; toes: bent up, radians."""
+    """Return (T,) height of the lowest of heel, ball and tip of the toes, metres. toes: bend up, radians."""
     heel = footing.subtalar + apply(footing.turn, side.heel)
     joint = footing.subtalar + apply(footing.turn, side.toe)
     bent = footing.turn @ axis_matrices(0, -np.broadcast_to(toes, footing.subtalar.shape[:-1]))
@@ -135,7 +136,7 @@ def hip_position(
 
 
 def hip_height(side: Side, hip: Float64, ankle: Float64, bend: Float64) -> Float64:
-    """Return (T,) height of the hip over the ground at which the leg to the ankle has that bend, metres."""
+    """Return (T,) height of the hip above the ground, metres, at which the leg to the ankle has that bend."""
     gap = hip - ankle
     rest = np.square(side.leg.length(bend)) - np.square(gap[..., 0]) - np.square(gap[..., 2])
     result: Float64 = ankle[..., 1] + np.sqrt(np.maximum(rest, 1e-6))

@@ -11,16 +11,19 @@ from fba.arrays import Float64
 from fba.rotations import apply, axis_matrices
 
 KNEE, ELBOW = 1.0, -1.0
-"""Which way a hinge bends: about +x a knee (backward), about -x an elbow (forward)."""
+"""Sense in which a hinge bends: a knee about +x (backward), an elbow about -x (forward)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Limb:
-    """Upper and lower: float64 (3,), the bones in the default posture, metres. way: `KNEE` or `ELBOW`."""
+    """A limb of two bones.
+
+    upper, lower: float64 (3,), the bones in the default posture, metres. sense: `KNEE` or `ELBOW`.
+    """
 
     upper: Float64
     lower: Float64
-    way: float
+    sense: float
 
     def _hinge(self) -> tuple[float, float, float]:
         """Return constant, m, straight: the squared reach at a bend b is constant + 2 m cos(b - straight)."""
@@ -31,42 +34,45 @@ class Limb:
 
     @property
     def reach(self) -> float:
-        """Metres from end to end where the limb is straight."""
+        """Length of the straight limb from end to end, metres."""
         constant, m, _ = self._hinge()
         return float(np.sqrt(constant + 2.0 * m))
 
     def length(self, bend: npt.ArrayLike) -> Float64:
-        """Return metres from end to end at a bend, radians (the rotation about x, times `way`)."""
+        """Return metres from end to end at a bend, radians (the rotation about x, times `sense`)."""
         constant, m, straight = self._hinge()
         result: Float64 = np.sqrt(
-            constant + 2.0 * m * np.cos(self.way * np.asarray(bend, dtype=np.float64) - straight)
+            constant + 2.0 * m * np.cos(self.sense * np.asarray(bend, dtype=np.float64) - straight)
         )
         return result
 
     def bend(self, length: npt.ArrayLike) -> Float64:
-        """Return the bend in radians at which the ends are length metres apart, or the closest possible."""
+        """Return the bend, radians, at which the ends are `length` metres apart, or as nearly as possible."""
         constant, m, straight = self._hinge()
         cosine = (np.square(np.asarray(length, dtype=np.float64)) - constant) / (2.0 * m)
-        result: Float64 = self.way * straight + np.arccos(np.clip(cosine, -1.0, 1.0))
+        result: Float64 = self.sense * straight + np.arccos(np.clip(cosine, -1.0, 1.0))
         return result
 
     def solve(self, target: Float64, twist: npt.ArrayLike) -> tuple[Float64, Float64]:
-        """Return rotations (..., 3, 3) of the upper bone, and bends (...), that take the end to a target.
+        """Return rotations (..., 3, 3) of the upper bone, and bends (...), that bring the end to a target.
 
-        target: (..., 3), from the root of the limb, in its parent. twist: about the upper bone's own length,
-        the innermost of its turns (abduction, then flexion follow). Out of reach, the limb points at it.
+        target: (..., 3), from the limb's root, in the frame of its parent. twist: angle about the upper bone
+        itself, the innermost of its rotations (abduction, then flexion follow). The limb points at a target
+        that is out of reach.
         """
         twist = np.asarray(twist, dtype=np.float64)
         bend = self.bend(np.linalg.norm(target, axis=-1))
-        end = self.upper + apply(axis_matrices(0, self.way * bend), self.lower)
+        end = self.upper + apply(axis_matrices(0, self.sense * bend), self.lower)
         end = apply(axis_matrices(1, twist), end)
-        size = np.linalg.norm(end, axis=-1) / np.linalg.norm(target, axis=-1)
-        wanted = target * size[..., None]
+        scale = np.linalg.norm(end, axis=-1) / np.linalg.norm(target, axis=-1)
+        wanted = target * scale[..., None]
         flat = np.hypot(end[..., 0], end[..., 1])
-        aside = -np.arccos(np.clip(wanted[..., 0] / flat, -1.0, 1.0)) - np.arctan2(end[..., 1], end[..., 0])
-        leant = apply(axis_matrices(2, aside), end)
-        forward = np.arctan2(wanted[..., 2], wanted[..., 1]) - np.arctan2(leant[..., 2], leant[..., 1])
-        return axis_matrices(0, forward) @ axis_matrices(2, aside) @ axis_matrices(1, twist), bend
+        abduction = -np.arccos(np.clip(wanted[..., 0] / flat, -1.0, 1.0)) - np.arctan2(
+            end[..., 1], end[..., 0]
+        )
+        abducted = apply(axis_matrices(2, abduction), end)
+        flexion = np.arctan2(wanted[..., 2], wanted[..., 1]) - np.arctan2(abducted[..., 2], abducted[..., 1])
+        return axis_matrices(0, flexion) @ axis_matrices(2, abduction) @ axis_matrices(1, twist), bend
 
 
 def limb_angles(rotation: Float64) -> tuple[Float64, Float64, Float64]:

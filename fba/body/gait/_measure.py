@@ -1,4 +1,4 @@
-"""Measurements of a walk on the posed body: contacts, slip, depth below the ground."""
+"""Measurements of a walk on the posed body: contact with the ground, slip, depth below it."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from fba.body.solve.conventions import convention
 from fba.body.solve.solver import BapSolver
 
 ON_GROUND = 0.002
-"""Metres above the ground at which a point still touches."""
+"""Metres above the ground up to which a point counts as touching it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Soles:
-    """Points of the soles in every frame.
+    """Positions of points of both soles in every frame.
 
-    points: float64 (2, 3, T, 3), metres: left and right; heel, ball of the foot, tip of the toes.
+    points: float64 (2, 3, T, 3), metres: of the left and the right foot; heel, ball of the foot, tip of the
+    toes.
     """
 
     points: Float64
 
     @property
     def touching(self) -> Bool:
-        """(2, 3, T) mask of points on the ground."""
+        """(2, 3, T) mask of the points on the ground."""
         result: Bool = self.points[..., 1] <= ON_GROUND
         return result
 
@@ -39,12 +40,12 @@ class Soles:
 
     @property
     def slip(self) -> float:
-        """Metres that a point moves along the ground at most while it touches it, from first to last."""
+        """Largest distance, metres, that a point moves along the ground while it touches it."""
         worst = 0.0
-        for point, touches in zip(self.points.reshape(6, -1, 3), self.touching.reshape(6, -1), strict=True):
+        for points, touches in zip(self.points.reshape(6, -1, 3), self.touching.reshape(6, -1), strict=True):
             edges = np.flatnonzero(np.diff(np.concatenate([[False], touches, [False]]).astype(int)))
             for start, stop in zip(edges[::2], edges[1::2], strict=True):
-                path = point[start:stop][:, [0, 2]]
+                path = points[start:stop][:, [0, 2]]
                 worst = max(worst, float(np.linalg.norm(path - path[0], axis=1).max()))
         return worst
 
@@ -74,18 +75,18 @@ def sole_points(anatomy: Anatomy, matrices: Float64) -> Soles:
     points = np.zeros((2, 3, len(matrices), 3))
     for number, letter in enumerate("lr"):
         side = anatomy.sides[letter]
-        for place, (joint, offset) in enumerate((
+        for point, (joint, offset) in enumerate((
             ("ankle", side.subtalar + side.heel),
             ("metatarsal", side.tip * (0.0, 1.0, 0.0)),
             ("metatarsal", side.tip),
         )):  # fmt: skip
             frame = matrices[:, anatomy.skeleton.number(f"{letter}_{joint}")]
-            points[number, place] = frame[:, :3, 3] + frame[:, :3, :3] @ offset
+            points[number, point] = frame[:, :3, 3] + frame[:, :3, :3] @ offset
     return Soles(points)
 
 
 def advance(animation: Animation, axes: str = "iso") -> float:
-    """Return straight distance over the ground from the first frame's root to the last's, millimetres."""
+    """Return the straight distance of the root over the ground from first frame to last, millimetres."""
     if animation.body is None:
         raise ValueError("gait: the animation has no body track")
     columns = convention(axes).translation

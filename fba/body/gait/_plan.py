@@ -27,17 +27,17 @@ FLAT = 0.09
 SHORTEST = 0.1
 """Metres: the shortest stride."""
 _DOUBLE = TOE_OFF - 0.5
-"""Fraction of the cycle over which the height changes from the rear leg's to the front leg's."""
+"""Fraction of the cycle in which both feet are on the ground, and the front leg takes over the height."""
 _STRAIGHT = 0.9985
-"""Share of its length to which a leg stretches: a knee is never locked."""
+"""Share of its length to which a leg may stretch: a knee is never locked."""
 _RISES = 0.33
 """Fraction of the cycle at which a heel begins to rise."""
 _STRAIN = 0.03
-"""Largest lowering of the body by legs that are too short for the stride, as a share of their length."""
+"""Largest lowering of the body, as a share of the legs' length, by a stride that is long for them."""
 _RELEASE_RATE = 4.0
 """Metres per cycle at which the height limit of a leg rises once it has left the ground."""
 _CLEAR = 0.012
-"""Metres that a swinging foot keeps off the ground."""
+"""Smallest height of a swinging foot above the ground, metres."""
 _TINY = 1e-4
 """A step of phase, for slopes."""
 
@@ -52,18 +52,18 @@ class Plan:
     interpolation: Interpolation
 
     @cached_property
-    def size(self) -> float:
-        """The stride relative to the character's own."""
+    def stride_ratio(self) -> float:
+        """The stride divided by the character's own."""
         return self.stride / (self.character.stride * self.anatomy.scale)
 
     @cached_property
     def _foot(self) -> Float64:
         """(8,) pitch of the foot in the poses, radians."""
-        share = np.clip(self.size, 0.0, 1.3)
+        ratio = np.clip(self.stride_ratio, 0.0, 1.3)
         foot = np.array(self.character.curve("foot"))
-        foot[0] *= share
-        foot[4:6] *= 0.3 + 0.7 * share
-        foot[6:] *= 0.6 + 0.4 * share
+        foot[0] *= ratio
+        foot[4:6] *= 0.3 + 0.7 * ratio
+        foot[6:] *= 0.6 + 0.4 * ratio
         result: Float64 = np.radians(foot)
         return result
 
@@ -71,7 +71,7 @@ class Plan:
     def _knee(self) -> Float64:
         """(8,) bend of the knee in the poses, radians."""
         knee = np.array(self.character.curve("knee"))
-        knee[5:7] *= 0.55 + 0.45 * np.clip(self.size, 0.0, 1.3)
+        knee[5:7] *= 0.55 + 0.45 * np.clip(self.stride_ratio, 0.0, 1.3)
         result: Float64 = np.radians(knee)
         return result
 
@@ -82,7 +82,7 @@ class Plan:
     def pitch(self, phase: Float64) -> Float64:
         """Return (T,) pitch of a foot at phases of its own leg, radians."""
         phase = np.mod(phase, 1.0)
-        # between its contact and lying flat, a foot falls freely; the other poses lead to the contact
+        # from its contact until it lies flat, a foot falls freely; the other poses lead up to the contact
         flat = min(self._foot[0], self._foot[1])
         landing = flat + (self._foot[0] - flat) * np.maximum(1.0 - phase / FLAT, 0.0) ** 1.5
         knots, values = np.array([0.0, FLAT, *KNOTS[1:]]), np.array([self._foot[0], flat, *self._foot[1:]])
@@ -94,7 +94,7 @@ class Plan:
         return periodic_curve(KNOTS, self._knee, phase, self.interpolation)
 
     def toes(self, phase: Float64) -> Float64:
-        """Bend of the toes against the foot, up, radians: they lie flat until they leave the ground."""
+        """Return (T,) bend of the toes upward, radians: they lie flat until they leave the ground."""
         phase = np.mod(phase, 1.0)
         flat = np.maximum(-self.pitch(np.minimum(phase, TOE_OFF)), 0.0)
         return np.where(phase < 0.9, flat * (1.0 - smoothstep((phase - TOE_OFF) / 0.15)), 0.0)
@@ -106,35 +106,36 @@ class Plan:
     def pelvis_angles(self, phase: Float64) -> tuple[Float64, Float64]:
         """Return (torsion about y, roll about z) of the pelvis relative to the root, each (T,), radians."""
         pelvis = self.character.pelvis
-        turn = np.radians(pelvis.turn) * np.clip(self.size, 0.0, 1.5)
-        ahead = cosine_wave(KNOTS, phase, self.interpolation)
-        hangs = cosine_wave(KNOTS, phase - 0.25, self.interpolation)
-        return turn * ahead, -np.radians(pelvis.list) * hangs
+        turn = np.radians(pelvis.turn) * np.clip(self.stride_ratio, 0.0, 1.5)
+        torsion = turn * cosine_wave(KNOTS, phase, self.interpolation)
+        return torsion, -np.radians(pelvis.list) * cosine_wave(KNOTS, phase - 0.25, self.interpolation)
 
     def pelvis(self, phase: Float64) -> Float64:
+        """Return (T, 3, 3) rotation of the pelvis relative to the root."""
         turn, roll = self.pelvis_angles(phase)
         return axis_matrices(1, turn) @ axis_matrices(2, roll)
 
     def side_phase(self, side: Side, phase: Float64) -> Float64:
+        """Return the phase of one leg's own cycle, from the contact of its foot on."""
         return phase if side.letter == "r" else phase - 0.5
 
     def footprint(self, side: Side, phase: Float64) -> Float64:
-        """Return (T, 3) footprint at which a foot stands, or stood last, at phases of the cycle, metres."""
+        """Return (T, 3) footprint, metres, on which a foot stands or stood last."""
         own = self.side_phase(side, phase)
         result = np.zeros((*phase.shape, 3))
-        result[..., 0] = side.way * self.character.width / 2.0 * self.anatomy.scale
+        result[..., 0] = side.sign * self.character.width / 2.0 * self.anatomy.scale
         result[..., 2] = self.stride * (np.floor(own + 1e-9) + (0.0 if side.letter == "r" else 0.5))
         return result
 
     def footing(self, side: Side, phase: Float64) -> Footing:
-        """Poses of the standing foot; meaningless while it swings."""
+        """Return the poses of the standing foot; meaningless while it swings."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
         return ground.place_standing_foot(
-            side, self.footprint(side, phase), self.pitch(own), side.way * self._yaw
+            side, self.footprint(side, phase), self.pitch(own), side.sign * self._yaw
         )
 
     def _root_along(self, phase: Float64) -> Float64:
-        """Return (T, 3) the root's position over the ground, its height still 0, metres."""
+        """Return (T, 3) position of the root over the ground, metres, with height 0."""
         pelvis, scale = self.character.pelvis, self.anatomy.scale
         result = np.zeros((*phase.shape, 3))
         result[..., 0] = -pelvis.sway * scale * np.sin(2.0 * np.pi * (phase - 0.02))
@@ -143,10 +144,11 @@ class Plan:
         return result
 
     def hip(self, side: Side, root: Float64, phase: Float64) -> Float64:
+        """Return (T, 3) position of a hip for positions (T, 3) of the root, metres."""
         return ground.hip_position(side, self.anatomy.pelvis, root, self.lean(phase), self.pelvis(phase))
 
     def _root_height(self, side: Side, root: Float64, phase: Float64, bend: Float64 | None = None) -> Float64:
-        """Return (T,) heights of the root at which a standing leg bends as in its poses, or as given."""
+        """Return (T,) height of the root at which a standing leg bends as in the poses, or by `bend`."""
         own = self.side_phase(side, phase)
         hip = self.hip(side, root, phase)
         ankle = ground.ankle_position(side, self.footing(side, phase))
@@ -191,13 +193,13 @@ class Plan:
         )
 
     def root(self, phase: Float64) -> Float64:
-        """Return (T, 3) position of the root, metres, at the height that the standing leg gives."""
+        """Return (T, 3) position of the root, metres, at the height that the standing leg gives it."""
         root, wanted, limit = self._heights(phase)
         root[..., 1] = np.minimum(wanted, limit)
         return root
 
     def _heights(self, phase: Float64) -> tuple[Float64, Float64, Float64]:
-        """Return the root over the ground (T, 3), its height (T,) in the poses, and the largest possible."""
+        """Return the root over the ground (T, 3), its height (T,) by the poses, and its largest one (T,)."""
         root = self._root_along(phase) - (0.0, 0.0, self._ahead)
         share = smoothstep(np.mod(phase, 0.5) / _DOUBLE)
         right_leads = np.mod(phase, 1.0) < 0.5
@@ -212,8 +214,8 @@ class Plan:
         rear = np.where(right_leads, heights["l"], heights["r"])
         return root, share * front + (1.0 - share) * rear, np.minimum(*limits)
 
-    def largest_hold_down(self) -> float:
-        """Return the largest lowering of the body, metres, by legs that are too short for the stride."""
+    def largest_lowering(self) -> float:
+        """Return the largest lowering of the body, metres, by a stride that is long for the legs."""
         _, wanted, limit = self._heights(np.arange(2 * CYCLE) / (2 * CYCLE))
         return float((wanted - limit).max())
 
@@ -221,15 +223,15 @@ class Plan:
         """Return the leg while its foot is on the ground."""
         root = self.root(phase) if root is None else root
         footing = self.footing(side, phase)
-        yaw, roll = side.way * self._yaw, side.way * self._level_roll
+        yaw, roll = side.sign * self._yaw, side.sign * self._level_roll
         return ground.solve_leg(side, self.hip(side, root, phase), footing, yaw, roll)
 
     @cached_property
     def _level_roll(self) -> float:
-        """Roll of the left subtalar joint as the heel is about to rise, radians."""
-        side, at = self.anatomy.sides["l"], np.array([0.5 + _RISES])
-        hip = self.hip(side, self.root(at), at)
-        leg = ground.solve_leg(side, hip, self.footing(side, at), self._yaw)
+        """Roll of the left subtalar joint when the heel begins to rise, radians."""
+        side, phase = self.anatomy.sides["l"], np.array([0.5 + _RISES])
+        hip = self.hip(side, self.root(phase), phase)
+        leg = ground.solve_leg(side, hip, self.footing(side, phase), self._yaw)
         return float(leg.ankle()[2][0])
 
     @cached_property
@@ -238,6 +240,7 @@ class Plan:
         return {letter: self._swing(side) for letter, side in self.anatomy.sides.items()}
 
     def _swing(self, side: Side) -> tuple[Float64, Float64, Float64, Float64]:
+        """Return the entry of `_swings` for one side."""
         start = 0.0 if side.letter == "r" else 0.5
         ends = start + np.array([TOE_OFF - _TINY, TOE_OFF, 1.0, 1.0 + _TINY])
         leg = self.standing_leg(side, ends)
@@ -247,19 +250,21 @@ class Plan:
         knots = np.array([TOE_OFF, KNOTS[6], KNOTS[7], 1.0])
         poses = self.character.poses
         landing = -np.degrees(solved[2][0])
-        own = landing if abs(self.size - 1.0) < 1e-9 else self._usual_landing(side)
+        usual = landing if abs(self.stride_ratio - 1.0) < 1e-9 else self._usual_landing(side)
         values = [solved[1]]
+        # a swinging thigh follows a longer or shorter stride, the more the nearer the foot is to its contact
         for number, (pose, follow) in enumerate((("passing", 0.6), ("anticipation", 1.0))):
-            thigh = poses[pose, "swing"].thigh + follow * (landing - own)
+            thigh = poses[pose, "swing"].thigh + follow * (landing - usual)
             share = (knots[number + 1] - TOE_OFF) / (1.0 - TOE_OFF)
             aside = solved[1][1] + share * (solved[2][1] - solved[1][1])
             values.append(np.array([-np.radians(thigh), aside, self._knee[6 + number]]))
         values.append(solved[2])
-        natural = 1.5 * (values[3] - values[2]) / (knots[3] - knots[2])
-        natural -= 0.5 * (values[3] - values[1]) / (knots[3] - knots[1])
-        return knots, np.stack(values), off, 0.5 * (natural + on)
+        slope = 1.5 * (values[3] - values[2]) / (knots[3] - knots[2])
+        slope -= 0.5 * (values[3] - values[1]) / (knots[3] - knots[1])
+        return knots, np.stack(values), off, 0.5 * (slope + on)
 
     def _usual_landing(self, side: Side) -> float:
+        """Return degrees of the thigh at the contact of the foot, in the character's own stride."""
         usual = self.character.stride * self.anatomy.scale
         plan = make_plan(self.anatomy, self.character, usual, self.interpolation)
         start = np.array([0.0 if side.letter == "r" else 0.5])
@@ -269,7 +274,7 @@ class Plan:
         """Return the leg at any phase, standing or swinging, for positions (T, 3) of the root."""
         own = np.mod(self.side_phase(side, phase) + 1e-9, 1.0) - 1e-9
         stands = own <= TOE_OFF
-        yaw = side.way * self._yaw
+        yaw = side.sign * self._yaw
         knots, values, off, on = self._swings[side.letter]
         swing = np.clip(own, TOE_OFF, 1.0)
         if self.interpolation == "linear":
@@ -288,13 +293,13 @@ class Plan:
             np.where(stands[..., None, None], standing.turn, swinging.turn),
             np.where(stands[..., None], standing.subtalar, swinging.subtalar),
         )
-        return ground.solve_leg(side, hip, footing, yaw, side.way * self._level_roll)
+        return ground.solve_leg(side, hip, footing, yaw, side.sign * self._level_roll)
 
 
 def make_plan(anatomy: Anatomy, character: Character, stride: float, interpolation: Interpolation) -> Plan:
     """Return the plan of one cycle. stride: metres; ModelError if it is too long for the legs."""
     plan = Plan(anatomy, character, stride, interpolation)
-    if plan.largest_hold_down() > _STRAIN * anatomy.sides["r"].leg.reach:
+    if plan.largest_lowering() > _STRAIN * anatomy.sides["r"].leg.reach:
         raise plan.too_long()
     return plan
 

@@ -1,6 +1,6 @@
 """The upper body of a walk: spine, head, shoulders, arms, fingers.
 
-Inverse kinematics bring the palms to the goals of the poses: digest 2.5.
+Inverse kinematics bring the palms to their positions in the poses: digest 2.5.
 """
 
 from __future__ import annotations
@@ -22,36 +22,34 @@ NECK = tuple(f"vc{n}" for n in range(7, 0, -1))
 HEAD = ("skullbase",)
 FINGERS = ("index", "middle", "ring", "pinky")
 _MORE_CURL = {"index": 0.75, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
-"""A hand at rest closes towards the little finger."""
-
+"""Factors of the curl of each finger: a hand at rest closes towards the little finger."""
 
 _LATE = 0.02
 """Fraction of the cycle by which arms lag behind the legs."""
 _REACH = 0.995
-"""Share of its length to which an arm stretches."""
+"""Share of its length to which an arm may stretch."""
 
 
 def _turn_spine(
     writer: Writer, skeleton: Skeleton, joints: tuple[str, ...], axis: int, angle: Float64
 ) -> None:
-    """Turn a part of the spine by an angle, radians, shared evenly by the joints that the skeleton has."""
-    there = [joint for joint in joints if joint in skeleton]
-    for joint in there:
-        writer.turn(joint, axis, angle / len(there))
+    """Turn a part of the spine by an angle, radians, shared evenly among those joints the skeleton has."""
+    present = [joint for joint in joints if joint in skeleton]
+    for joint in present:
+        writer.turn(joint, axis, angle / len(present))
 
 
 def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64) -> None:
-    """Write the posture at phases of the cycle, from the contact of the right foot on.
+    """Write the angles of spine, head, shoulder girdles and fingers at phases of the cycle.
 
-    The shoulders turn against the pelvis; the neck turns back, so that the face looks ahead.
+    The shoulders turn against the pelvis; the neck turns back, so that the face keeps looking ahead.
     """
     spine, arms = plan.character.spine, plan.character.arms
     kind = plan.interpolation
-    still = np.ones(phase.shape)
-    turn = -np.radians(spine.turn) * min(plan.size, 1.5) * cosine_wave(KNOTS, phase, kind)
-    lean = np.radians(spine.lean) * cosine_wave(
-        KNOTS, phase - 0.25, kind
-    )  # the right leg carries first: to the right
+    constant = np.ones(phase.shape)
+    turn = -np.radians(spine.turn) * min(plan.stride_ratio, 1.5) * cosine_wave(KNOTS, phase, kind)
+    # the right leg carries first, so the first lean is to the right
+    lean = np.radians(spine.lean) * cosine_wave(KNOTS, phase - 0.25, kind)
     nod = np.radians(spine.nod) * np.cos(4.0 * np.pi * phase)
     for joints, x, y, z in (
         (LUMBAR, spine.lumbar, 0.35 * turn, 0.6 * lean),
@@ -59,29 +57,29 @@ def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64
         (NECK, spine.neck, -0.7 * turn, -0.6 * lean),
         (HEAD, spine.head, -0.3 * turn, -0.4 * lean),
     ):
-        bent = np.radians(x) * still + (nod if joints is HEAD else -nod if joints is NECK else 0.0)
+        bent = np.radians(x) * constant + (nod if joints is HEAD else -nod if joints is NECK else 0.0)
         for axis, values in ((0, bent), (1, y), (2, z)):
             _turn_spine(writer, skeleton, joints, axis, values)
-    for letter, way in (("l", 1.0), ("r", -1.0)):
+    for letter, sign in (("l", 1.0), ("r", -1.0)):
         girdle = f"{letter}_sternoclavicular"
         if girdle in skeleton:
-            writer.turn(girdle, 2, way * np.radians(arms.up) * still)
-            writer.turn(girdle, 1, -way * np.radians(arms.forward) * still)
+            writer.turn(girdle, 2, sign * np.radians(arms.up) * constant)
+            writer.turn(girdle, 1, -sign * np.radians(arms.forward) * constant)
         for finger in FINGERS:
             for number in (1, 2, 3):
                 joint = f"{letter}_{finger}{number}"
                 if joint in skeleton:
-                    # below the wrist flexion turns about z: fingers curl towards the thigh, inward
+                    # fingers flex about z: they curl inward, towards the thigh
                     curl = np.radians(arms.curl * _MORE_CURL[finger])
-                    writer.turn(joint, 2, -way * curl * still)
+                    writer.turn(joint, 2, -sign * curl * constant)
 
 
 def _palm_goals(side: Side, character: Character, size: float) -> Float64:
-    """Return (8, 3), metres from the shoulder to the palm at the eight poses of this side's leg."""
+    """Return (8, 3), vectors from the shoulder to the palm in the eight poses of this side's leg, metres."""
     out, down, forward = (np.array(character.curve(field)) for field in ("out", "down", "forward"))
     swing = forward - forward.mean()
     forward = forward.mean() + swing * np.clip(size, 0.0, 1.4)
-    goal = np.stack([side.way * out, -down, forward], axis=-1) * side.arm.reach
+    goal = np.stack([side.sign * out, -down, forward], axis=-1) * side.arm.reach
     length = np.linalg.norm(goal, axis=-1, keepdims=True)
     result: Float64 = goal * np.minimum(1.0, _REACH * side.arm.reach / length)
     return result
@@ -90,25 +88,27 @@ def _palm_goals(side: Side, character: Character, size: float) -> Float64:
 def swing_arms(writer: Writer, plan: Plan, phase: Float64) -> None:
     """Write the angles of shoulders and elbows; writer.values must already hold the spine.
 
-    At the poses the palms are at their goals; in between, angles are interpolated.
+    In the poses the palms are where the character has them; in between, angles are interpolated.
     """
     anatomy, character = plan.anatomy, plan.character
     solver = BapSolver(anatomy.skeleton)
-    girdle = anatomy.skeleton.parents
+    parents = anatomy.skeleton.parents
     for letter, side in anatomy.sides.items():
         start = 0.0 if letter == "r" else 0.5
-        at = np.mod(KNOTS + start + _LATE, 1.0)
-        nearest = np.array([np.argmin(np.abs(np.mod(phase - a + 0.5, 1.0) - 0.5)) for a in at])
+        poses = np.mod(KNOTS + start + _LATE, 1.0)
+        nearest = np.array([np.argmin(np.abs(np.mod(phase - p + 0.5, 1.0) - 0.5)) for p in poses])
         shoulder = anatomy.skeleton.number(f"{letter}_shoulder")
-        matrices = solver.pose(writer.values[nearest])[:, girdle[shoulder], :3, :3]
-        # goals are meant in a frame that walks with the body, level and looking ahead
-        local = np.einsum("tji,tj->ti", matrices, _palm_goals(side, character, plan.size))
-        twist = -side.way * np.radians(character.arms.twist)
+        matrices = solver.pose(writer.values[nearest])[:, parents[shoulder], :3, :3]
+        # goals are relative to a frame that moves with the body, level and facing ahead
+        local = np.einsum("tji,tj->ti", matrices, _palm_goals(side, character, plan.stride_ratio))
+        twist = -side.sign * np.radians(character.arms.twist)
         upper, bend = side.arm.solve(local, np.full(len(KNOTS), twist))
         x, y, z = limb_angles(upper)
-        own = phase - start - _LATE
+        arm_phase = phase - start - _LATE
         for axis, angle in ((0, x), (1, y), (2, z)):
-            writer.turn(f"{letter}_shoulder", axis, periodic_curve(KNOTS, angle, own, plan.interpolation))
-        writer.turn(f"{letter}_elbow", 0, -periodic_curve(KNOTS, bend, own, plan.interpolation))
-        wrist = -side.way * np.radians(character.arms.wrist)
+            writer.turn(
+                f"{letter}_shoulder", axis, periodic_curve(KNOTS, angle, arm_phase, plan.interpolation)
+            )
+        writer.turn(f"{letter}_elbow", 0, -periodic_curve(KNOTS, bend, arm_phase, plan.interpolation))
+        wrist = -side.sign * np.radians(character.arms.wrist)
         writer.turn(f"{letter}_wrist", 2, np.full(phase.shape, wrist))

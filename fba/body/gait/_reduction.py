@@ -18,7 +18,7 @@ from fba.body.solve.solver import BapSolver, wrapped
 from fba.parameters import baps
 
 _STILL = 1e-6
-"""Change of a rotation matrix's entries below which a joint counts as still."""
+"""Largest change of the entries of a rotation matrix of a joint that counts as still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Reduced:
 
     keys: an `Animation` of the poses alone, at their own times, and of the frames between them that belong to
     no step. frames: number of frames from the first key to the last. walking: number of these that belong to
-    steps. poses: number of keys that replace them.
+    steps. poses: number of keys that stand for these.
     """
 
     keys: Animation
@@ -37,29 +37,29 @@ class Reduced:
 
     @property
     def factor(self) -> float:
-        """Frames of walking per pose."""
+        """Number of frames of walking for each pose."""
         return self.walking / self.poses
 
-    def whole(self, interpolation: Interpolation = "smooth") -> Animation:
-        """Return every frame from the first key to the last, evenly spaced.
+    def restore(self, interpolation: Interpolation = "smooth") -> Animation:
+        """Return every frame from the first key to the last, interpolated between the keys.
 
         interpolation: "linear", as in the digest, or "smooth": cubic curves that rise and fall only where the
-        keys do. ValueError on another.
+        keys do. ValueError for another.
         """
         index, values = self.keys.index, _unwrap(_values(self.keys))
-        every = np.arange(int(index[0]), int(index[-1]) + 1)
+        frames = np.arange(int(index[0]), int(index[-1]) + 1)
         if interpolation == "linear":
-            between = np.stack([np.interp(every, index, column) for column in values.T], axis=1)
+            between = np.stack([np.interp(frames, index, column) for column in values.T], axis=1)
         elif interpolation == "smooth":
             from scipy.interpolate import PchipInterpolator
 
-            between = PchipInterpolator(index - index[0], values)(every - index[0])
+            between = PchipInterpolator(index - index[0], values)(frames - index[0])
         else:
             raise ValueError(f"interpolation must be linear or smooth, not {interpolation!r}")
         assert self.keys.body is not None
-        before = np.searchsorted(index, every, side="right") - 1
+        before = np.searchsorted(index, frames, side="right") - 1
         track = BodyTrack(wrapped(np.rint(between)), self.keys.body.mask[before])
-        return Animation(self.keys.rate, every, None, track, self.keys.name)
+        return Animation(self.keys.rate, frames, None, track, self.keys.name)
 
 
 @dataclass(frozen=True)
@@ -79,44 +79,47 @@ class Errors:
     worst_cm_local: float
 
 
-def reduce(animation: Animation, found: Gait | None = None, skeleton: Skeleton | None = None) -> Reduced:
-    """Keep the poses that `detect` finds (or found). ValueError where there is no step."""
-    found = detect(animation, skeleton) if found is None else found
-    keys = found.keys
+def reduce(animation: Animation, gait: Gait | None = None, skeleton: Skeleton | None = None) -> Reduced:
+    """Return a motion reduced to the poses of its gait; ValueError where that has no step.
+
+    gait: what `detect` returns for the animation, detected here where None. skeleton: as of `detect`.
+    """
+    gait = detect(animation, skeleton) if gait is None else gait
+    keys = gait.keys
     if not keys:
         raise ValueError("gait: no steps to reduce this motion to")
     span = np.zeros(len(animation), dtype=bool)
     span[keys[0] : keys[-1] + 1] = True
-    keep = span & ~found.walking
+    keep = span & ~gait.walking
     keep[list(keys)] = True
     rows = np.flatnonzero(keep)
     assert animation.body is not None
     track = BodyTrack(animation.body.values[rows], animation.body.mask[rows])
-    thin = Animation(animation.rate, animation.index[rows], None, track, animation.name)
-    return Reduced(thin, int(span.sum()), int((span & found.walking).sum()), len(keys))
+    keyed = Animation(animation.rate, animation.index[rows], None, track, animation.name)
+    return Reduced(keyed, int(span.sum()), int((span & gait.walking).sum()), len(keys))
 
 
 def compare(one: Animation, other: Animation, skeleton: Skeleton | None = None) -> Errors:
-    """Return differences of two bodies in their common frames, over the joints that turn in `one`.
+    """Return the differences of two bodies in the frames that both have, over the joints that turn in `one`.
 
-    ValueError where rates differ, or no frame is in both.
+    ValueError where the rates differ, or they have no frame in common.
     """
     if one.rate != other.rate:
         raise ValueError(f"compare: frame rates differ: {one.rate} and {other.rate}")
     skeleton = Skeleton.default() if skeleton is None else skeleton
     _, first, second = np.intersect1d(one.index, other.index, return_indices=True)
     if not len(first):
-        raise ValueError("compare: the two have no frame in common")
+        raise ValueError("compare: the animations have no frame in common")
     solver = BapSolver(skeleton)
     a, b = solver.pose(_values(one)[first]), solver.pose(_values(other)[second])
     offsets = a[:, :, :3, 3] - b[:, :, :3, 3]
-    inner = offsets - offsets[:, :1]
-    own = _local_rotations(a, skeleton)
-    moved = np.flatnonzero(np.ptp(own, axis=0).max(axis=(1, 2)) > _STILL)
+    local = offsets - offsets[:, :1]
+    turns = _local_rotations(a, skeleton)
+    moved = np.flatnonzero(np.ptp(turns, axis=0).max(axis=(1, 2)) > _STILL)
     if not len(moved):
         moved = np.arange(len(skeleton))
-    angles = np.degrees(_angles_between(own, _local_rotations(b, skeleton)))[:, moved]
-    far, near = (100.0 * np.linalg.norm(p[:, moved], axis=-1) for p in (offsets, inner))
+    angles = np.degrees(_angles_between(turns, _local_rotations(b, skeleton)))[:, moved]
+    far, near = (100.0 * np.linalg.norm(p[:, moved], axis=-1) for p in (offsets, local))
     return Errors(
         float(angles.mean()), float(angles.max()), skeleton.names[moved[int(angles.max(axis=0).argmax())]],
         float(far.mean()), float(far.max()), float(near.mean()), float(near.max()),
@@ -146,7 +149,7 @@ def _local_rotations(matrices: Float64, skeleton: Skeleton) -> Float64:
 
 
 def _angles_between(a: Float64, b: Float64) -> Float64:
-    """Return radians between rotations; by the chord, which keeps its accuracy near 0."""
+    """Return the angles between rotations, radians, from their chords, which stay accurate near 0."""
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
     result: Float64 = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
     return result

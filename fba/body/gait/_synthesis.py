@@ -18,7 +18,7 @@ from fba.body.skeleton import Skeleton
 from fba.errors import ModelError
 
 FEWEST = 8
-"""Frames of a cycle: one for each pose of it."""
+"""Fewest frames of a cycle: one for each of its poses."""
 MOST = 100_000
 """Most frames of one walk: over half an hour."""
 
@@ -34,20 +34,21 @@ def walk(
     in_place: bool = False,
     skeleton: Skeleton | None = None,
 ) -> Animation:
-    """Return a walk along +z, from the contact of the right foot on: legs, arms, spine and root.
+    """Return a walk along +z that begins with the contact of the right foot: legs, arms, spine and root.
 
-    stride: metres from one contact of a foot to its next, two steps; the character's own, at the size of
-        the skeleton, where None. As the time of a cycle is the character's, it sets the speed. Rounded to mm.
+    stride: metres from one contact of a foot to its next, two steps, rounded to mm; where None, that of the
+        character, scaled to the skeleton. The character sets the time of a cycle, so the stride sets the
+        speed.
     character: a name of `characters()`, or a `Character`.
-    cycles: how many (4 where neither is given); the last frame is the first pose again, one stride on.
-        seconds: in place of cycles, how long, without that last frame.
+    cycles: how many, 4 where seconds is None, too; the last frame is the first pose again, one stride on.
+    seconds: how long, in place of cycles, and without that last frame.
     rate: frames a second; a cycle has a whole number of frames, 32 of the normal character at 30.
     interpolation: between the poses "smooth", by cubic curves, or "linear", as in the digest.
-    in_place: leave out the way forward: the ground moves back instead.
+    in_place: walk on the spot, as on a treadmill.
     skeleton: the default body where None.
 
-    ModelError where a stride is too long for the legs, or a character or a skeleton cannot walk;
-    ValueError for other arguments that make no sense.
+    ModelError for a stride too long for the legs, or a character or skeleton that cannot walk; ValueError for
+    other wrong arguments.
     """
     if not isinstance(character, Character):
         character = Character.named(character)
@@ -60,20 +61,20 @@ def walk(
     if not FEWEST <= period <= MOST:
         raise ValueError(
             f"walk: {rate} frames/s make {float(character.seconds * rate):.4g} frames of a cycle of "
-            f"{character.seconds:g} s; needs at least {FEWEST}, and a plausible rate"
+            f"{character.seconds:g} s; it needs {FEWEST} to {MOST}: change the rate"
         )
     count = _frame_count(cycles, seconds, rate, period)
-    one = write_cycle(make_plan(anatomy, character, stride, check_interpolation(interpolation)), period)
+    cycle = write_cycle(make_plan(anatomy, character, stride, check_interpolation(interpolation)), period)
     frames = np.arange(count)
-    values = one.values[frames % period]
-    forward = one.forward_column
+    values = cycle.values[frames % period]
+    forward = cycle.forward_column
     if not in_place:
         values[:, forward] += frames // period * round(1000.0 * stride)
     else:
         share = np.arange(period) / period * 1000.0 * stride
         values[:, forward] -= np.rint(share[frames % period])
     integers = np.rint(values).astype(np.int32)
-    mask = np.broadcast_to(one.sent, integers.shape)
+    mask = np.broadcast_to(cycle.sent, integers.shape)
     name = f"{character.name} walk"
     return Animation(rate, frames, None, BodyTrack(integers, mask), name)
 
@@ -94,15 +95,15 @@ def write_cycle(plan: Plan, period: int) -> Writer:
     start = root[0, 2]
     root[:, 2] -= start  # the walk begins where the body stands by default
     writer.move(root)
-    # BAPs are whole millimetres: the legs start from where the root will be, so feet do not slip. Not in
-    # height: half a millimetre there would bend a nearly straight knee by degrees, up and down.
+    # The root is sent in whole millimetres; legs that start from the rounded root keep feet from slipping.
+    # Its height is not rounded here: half a millimetre would bend a nearly straight knee by degrees.
     root[:, [0, 2]] = np.rint(root[:, [0, 2]] * 1e3) / 1e3
     pelvis = plan.lean(phase) @ plan.pelvis(phase)
     for side in anatomy.sides.values():
         leg = plan.leg(side, phase, root + rest + (0.0, 0.0, start))
         _write_leg(writer, side.letter, pelvis, leg)
-        own = plan.side_phase(side, phase)
-        writer.turn(f"{side.letter}_metatarsal", 0, -plan.toes(own))
+        toes = plan.toes(plan.side_phase(side, phase))
+        writer.turn(f"{side.letter}_metatarsal", 0, -toes)
     return writer
 
 
@@ -126,7 +127,7 @@ def _check_stride(stride: float | None, character: Character, anatomy: Anatomy) 
     if not (np.isfinite(metres) and metres >= SHORTEST * anatomy.scale):
         raise ModelError(
             f"gait: the stride must be at least {SHORTEST * anatomy.scale:.2g} m, not {stride!r}; it is the "
-            "way from one contact of a foot to its next, two steps: 1.4 m in an even walk"
+            "distance from one contact of a foot to its next, two steps: 1.4 m in an even walk"
         )
     if metres > 4.0 * anatomy.sides["r"].leg.reach:
         raise ModelError(
@@ -137,7 +138,7 @@ def _check_stride(stride: float | None, character: Character, anatomy: Anatomy) 
 
 
 def _frame_count(cycles: float | None, seconds: float | None, rate: Fraction, period: int) -> int:
-    """Return number of frames of a walk; raises ValueError for lengths that make no sense."""
+    """Return the number of frames of a walk; ValueError where its length is not positive or too long."""
     if cycles is not None and seconds is not None:
         raise ValueError("walk: give either cycles or seconds, not both")
     wanted = seconds if seconds is not None else 4 if cycles is None else cycles

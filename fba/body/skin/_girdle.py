@@ -1,13 +1,13 @@
 """Shoulder blades that turn with the arms, and armpits that stay taut.
 
-Lifting an arm turns its shoulder blade and collar bone. BAPs often move the shoulder alone, and skin that
-followed only that would fold deeply between neck and arm. The joints that carry the skin of the shoulder
-girdle are therefore turned by a share of the arm's swing, less the turn that BAPs give the girdle. Joint
-positions do not change.
+Lifting an arm turns its shoulder blade and collar bone. BAPs often turn the shoulder alone, and skin that
+followed only that would fold deeply between neck and arm. So the joints that carry the skin of the shoulder
+girdle are turned by a share of the arm's swing, less what BAPs have turned them already. The positions of
+joints do not change.
 
-Between arm and ribs, dual quaternions would swing the skin of the armpit out in an arc about the shoulder:
-a bag below a raised arm. Skin is stretched there, so it is blended with linear skinning, which moves it in
-a straight line.
+Between arm and ribs, dual quaternions would swing the skin of the armpit out in an arc about the shoulder, as
+a bag below a raised arm. Real skin is stretched there, so linear skinning, which moves it in a straight line,
+is blended in.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ CHAIN = ("sternoclavicular", "acromioclavicular", "shoulder", "elbow")
 TAUT = 0.7
 """Share of linear skinning in the armpit."""
 BELOW = (0.03, 0.08)
-"""Metres below the shoulder over which linear skinning fades in to that share."""
+"""Metres below the shoulder between which linear skinning rises from none to that share."""
 LEAST = 0.02
-"""Vertices whose arm weight is within this of 0 or 1 are not in the armpit."""
+"""Vertices whose arm weight is within this distance of 0 or 1 are not in the armpit."""
 
 
 def find_girdle(
@@ -34,8 +34,9 @@ def find_girdle(
     """Return tables of both shoulder girdles for the compiled loop; empty if the skeleton has none.
 
     Its first fields have a row for each side. joints: the joint that carries the girdle, those of collar
-    bone and blade, and the shoulder. centre: where the collar bone turns. arm: unit vector along the upper
-    arm as modelled. rows, shares: vertices of the armpits, and how far matrices move them.
+    bone and blade, and the shoulder. centre: the point that the collar bone turns about. arm: unit vector
+    along the upper arm as modelled. rows, shares: vertices of the armpits, and their shares of linear
+    skinning.
     """
     chains, centres, arms = [], [], []
     taut = np.zeros(len(vertices))
@@ -45,17 +46,17 @@ def find_girdle(
             continue
         inner, outer, shoulder, elbow = (skeleton.number(name) for name in names)
         trunk = int(skeleton.parents[inner])
-        way = bind[elbow, :3, 3] - bind[shoulder, :3, 3]
-        length = float(np.linalg.norm(way))
+        arm = bind[elbow, :3, 3] - bind[shoulder, :3, 3]
+        length = float(np.linalg.norm(arm))
         if trunk < 0 or length < 1e-9:
             continue
         chains.append((trunk, inner, outer, shoulder))
         centres.append(bind[inner, :3, 3])
-        arms.append(way / length)
+        arms.append(arm / length)
         carried = (weights * np.isin(joints, skeleton.descendants(shoulder))).sum(axis=1)
-        low = bind[shoulder, 1, 3] - vertices[:, 1].astype(np.float64)
+        depth = bind[shoulder, 1, 3] - vertices[:, 1].astype(np.float64)
         between = (carried > LEAST) & (carried < 1 - LEAST)
-        taut = np.maximum(taut, TAUT * between * smoothstep((low - BELOW[0]) / (BELOW[1] - BELOW[0])))
+        taut = np.maximum(taut, TAUT * between * smoothstep((depth - BELOW[0]) / (BELOW[1] - BELOW[0])))
     rows = np.flatnonzero(taut)
     return Girdle(
         np.array(chains, dtype=np.int64).reshape(-1, 4),

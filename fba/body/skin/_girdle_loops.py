@@ -1,4 +1,4 @@
-"""The loops of `fba.body.skin._girdle`. Compiled; plain functions over NumPy arrays."""
+"""The compiled loops of `fba.body.skin._girdle`: plain functions over NumPy arrays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fba.easing import smoothstep_of_one
 
 
 class Girdle(NamedTuple):
-    """The shoulder girdles that turn with the arms, and armpits: see `fba.body.skin._girdle`."""
+    """The shoulder girdles that turn with the arms, and the armpits: see `fba.body.skin._girdle`."""
 
     joints: Int64
     centre: Float64
@@ -22,7 +22,7 @@ class Girdle(NamedTuple):
 
 
 LIFT = 0.16
-"""Share of an arm's swing by which its shoulder blade turns; the collar bone turns by half of that."""
+"""Share of an arm's swing by which its shoulder blade turns; its collar bone turns by half of that."""
 
 
 @compiled
@@ -47,8 +47,8 @@ def turn_girdles(duals: Float32, girdle: Girdle) -> None:
         wanted = LIFT * np.arctan2(sine, cosine) * fade
         a, b, c, d = _relative(duals, trunk, outer)
         along = b * cx + c * cy + d * cz
-        done = 2.0 * np.arctan2(along if a >= 0.0 else -along, abs(a))
-        angle = wanted - min(max(done, 0.0), wanted)
+        turned = 2.0 * np.arctan2(along if a >= 0.0 else -along, abs(a))
+        angle = wanted - min(max(turned, 0.0), wanted)
         _turn(duals, outer, angle, cx, cy, cz, centre)
         _turn(duals, inner, 0.5 * angle, cx, cy, cz, centre)
 
@@ -71,7 +71,7 @@ def _turn(duals: Float32, joint: int, angle: float, cx: float, cy: float, cz: fl
     """Turn a joint, in place in duals, about a unit axis through a point, before its own motion."""
     s, g = np.sin(0.5 * angle), np.cos(0.5 * angle)
     h, i, j = s * cx, s * cy, s * cz
-    # The turn's dual part: a place p is kept by e = p x (h, i, j).
+    # The dual part of a turn that leaves the point p where it is: (e, f, k) = p x (h, i, j).
     px, py, pz = centre[0], centre[1], centre[2]
     e, f, k = py * j - pz * i, pz * h - px * j, px * i - py * h
     w, x, y, z = duals[joint, 0], duals[joint, 1], duals[joint, 2], duals[joint, 3]
@@ -91,7 +91,7 @@ def straighten_armpits(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
     girdle: Girdle, out: Float32,
 ) -> None:  # fmt: skip
-    """Blend vertices, in place in out (V, 3), with linear skinning: see `fba.body.skin._girdle`."""
+    """Blend the armpits' vertices in out (V, 3) with linear skinning: see `fba.body.skin._girdle`."""
     for n in range(len(girdle.rows)):
         i, straight = girdle.rows[n], girdle.shares[n]
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]

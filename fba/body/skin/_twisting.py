@@ -1,8 +1,8 @@
 """Twists of the arms, distributed along them.
 
-BAPs turn a whole forearm about its axis at the elbow, and a hand at the wrist; skin that followed only the
-joints would be wrung there. In a real arm the twist grows along the bone. Before skinning, each vertex of an
-arm is therefore turned about its bone by the difference.
+BAPs twist a whole forearm at the elbow, and a hand at the wrist; skin that followed only the joints would be
+wrung there. In a real arm the twist grows along the bone. So before skinning, each vertex of an arm is turned
+about its bone by the difference.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from fba.easing import smoothstep
 
 LIMB = ("shoulder", "elbow", "wrist")
 WRIST_FROM = 0.35
-"""From this share of the forearm on, it takes part in the twist of the wrist."""
+"""Share of the forearm, from the elbow, beyond which its skin takes part in the twist of the wrist."""
 LEAST = 0.02
-"""Vertices of less arm weight do not belong to the arm."""
+"""Smallest arm weight of a vertex of the arm."""
 SMALL = 1e-3
-"""Vertices whose shares of the twists are smaller are left out."""
+"""Vertices whose shares of both twists are smaller are left out."""
 
 
 def find_twists(
@@ -28,9 +28,9 @@ def find_twists(
 ) -> Twisting:
     """Return tables of the arms' twists for the compiled loop; empty if the skeleton has no arms.
 
-    Of its fields, each bone has rows `starts[b]` to `starts[b + 1]`: the vertices (`rows`) along it, and by
-    how much of the twists of its joint and of the next one they are turned beforehand (`shares`, two
-    each). centre, axis: the line of the bone as modelled; child_axis: that of the next joint's twist.
+    rows: vertices; those of bone b are rows[starts[b]:starts[b + 1]]. shares: (N, 2), shares of the twists of
+    the bone's joint and of the next joint by which they are turned beforehand. centre, axis: line of the bone
+    as modelled. child_axis: axis of the next joint's twist.
     """
     rows, shares, bones, axes = [], [], [], []
     for side in ("l_", "r_"):
@@ -42,7 +42,7 @@ def find_twists(
         along = [_along(bind, pair, vertices) for pair in ((shoulder, elbow), (elbow, wrist))]
         arm = carried[0] > LEAST
         upper = arm & (along[0] < 1)
-        # The shoulder's own twist is not distributed: its skin is wide, and partly belongs to the trunk.
+        # The shoulder's own twist is not distributed: its skin is wide, and part of it belongs to the trunk.
         own, child = np.zeros(len(vertices)), -carried[1]
         for bone in (upper, arm & ~upper):
             turned = np.flatnonzero(bone & (np.maximum(np.abs(own), np.abs(child)) > SMALL))
@@ -68,21 +68,22 @@ def find_twists(
 
 
 def _axis(bind: Float64, joint: int, child: int) -> Float64:
-    way = bind[child, :3, 3] - bind[joint, :3, 3]
-    unit: Float64 = way / max(float(np.linalg.norm(way)), 1e-12)
+    """Return the unit vector (3,) along a bone as modelled."""
+    bone = bind[child, :3, 3] - bind[joint, :3, 3]
+    unit: Float64 = bone / max(float(np.linalg.norm(bone)), 1e-12)
     return unit
 
 
 def _carried_share(skeleton: Skeleton, joint: int, joints: Int32, weights: Float32) -> Float64:
-    """Return (V,), the total weight of a joint and its descendants for each vertex."""
+    """Return (V,) total weight of a joint and its descendants for each vertex."""
     below = np.isin(joints, skeleton.descendants(joint))
     total: Float64 = (weights * below).sum(axis=1, dtype=np.float64)
     return total
 
 
 def _along(bind: Float64, pair: tuple[int, int], vertices: Float32) -> Float64:
-    """Return (V,), positions of vertices along a bone: 0 at its joint, 1 at the next."""
+    """Return (V,) positions of vertices along a bone: 0 at its joint, 1 at the next."""
     start, end = bind[pair[0], :3, 3], bind[pair[1], :3, 3]
-    way = end - start
-    place: Float64 = (vertices - start) @ way / max(float(way @ way), 1e-12)
-    return place
+    bone = end - start
+    share: Float64 = (vertices - start) @ bone / max(float(bone @ bone), 1e-12)
+    return share

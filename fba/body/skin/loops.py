@@ -1,6 +1,6 @@
-"""The loops that move vertices with joints. Compiled; plain functions over NumPy arrays.
+"""The compiled loops that move vertices with joints: plain functions over NumPy arrays.
 
-Everything is in 32 bits, relative to the root joint, so that a body far from the origin loses nothing.
+Vertices are float32 relative to the root joint, so that a body far from the origin loses no precision.
 """
 
 from __future__ import annotations
@@ -30,43 +30,44 @@ class Twisting(NamedTuple):
 
 ONE, TWO, HALF = np.float32(1.0), np.float32(2.0), np.float32(0.5)
 TINY = np.float32(1e-30)
+"""Squared length below which a sum has no direction."""
 
 
 @compiled
 def dual_frames(
-    matrices: Float64, inverse: Float64, parents: Int64, vertices: Float32, upright: Float32,
-    joints: Int32, weights: Float32, counts: Int32, around: Int32, numbers: Float32, scratch: Float32,
-    twists: Twisting, girdle: Girdle, twisted: Float32, out: Float32, normals: Float32,
+    matrices: Float64, inverse: Float64, parents: Int64, vertices: Float32, rest_normals: Float32,
+    joints: Int32, weights: Float32, counts: Int32, neighbours: Int32, coefficients: Float32,
+    scratch: Float32, twists: Twisting, girdle: Girdle, twisted: Float32, out: Float32, normals: Float32,
 ) -> None:  # fmt: skip
-    """Dual-quaternion skinning of T frames (Kavan and others, "Skinning with dual quaternions", 2007).
+    """Fill `out` with T frames of a mesh skinned by dual quaternions, and `normals` with its normals.
 
-    matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, upright (V, 3): as modelled.
-    joints, weights (V, 4): those with a weight first; counts (V,): how many these are. around, numbers: see
-    `normal_rings`. scratch (J, 12). twists: vertices turned beforehand. girdle: joints that turn with the
-    arms. twisted (V, 3): scratch, must hold the vertices. out (T, V, 3). normals: the same, or (0, V, 3) for
-    none.
+    matrices (T, J, 4, 4). inverse (J, 4, 4): of the bind matrices. vertices, rest_normals (V, 3): as
+    modelled. joints, weights (V, 4): those with a weight first. counts (V,): how many those are. neighbours,
+    coefficients: see `normal_rings`. scratch (J, 12). twists: vertices turned beforehand. girdle: joints that
+    turn with the arms. twisted (V, 3): scratch, must hold the vertices. out (T, V, 3). normals: the same, or
+    (0, V, 3) for none. Kavan and others, "Skinning with dual quaternions", 2007.
     """
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
         joint_duals(matrices[frame], inverse, parents, scratch)
         _twist_limbs(vertices, parents, scratch, twists, twisted)
         turn_girdles(scratch, girdle)
-        upper = normals[frame] if normals.shape[0] else out[frame]
-        wanted = upright if normals.shape[0] else upright[:0]
-        _skin_dual(twisted, joints, weights, counts, scratch, out[frame], wanted, around, upper)
+        frame_normals = normals[frame] if normals.shape[0] else out[frame]
+        wanted = rest_normals if normals.shape[0] else rest_normals[:0]
+        _skin_dual(twisted, joints, weights, counts, scratch, out[frame], wanted, neighbours, frame_normals)
         straighten_armpits(twisted, joints, weights, counts, scratch, girdle, out[frame])
         if normals.shape[0]:
-            _normals_from_neighbours(out[frame], around, numbers, upper)
+            _normals_from_neighbours(out[frame], neighbours, coefficients, frame_normals)
         _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
 @compiled
 def linear_frames(
-    matrices: Float64, inverse: Float64, vertices: Float32, upright: Float32,
-    joints: Int32, weights: Float32, counts: Int32, around: Int32, numbers: Float32, scratch: Float32,
-    out: Float32, normals: Float32,
+    matrices: Float64, inverse: Float64, vertices: Float32, rest_normals: Float32,
+    joints: Int32, weights: Float32, counts: Int32, neighbours: Int32, coefficients: Float32,
+    scratch: Float32, out: Float32, normals: Float32,
 ) -> None:  # fmt: skip
-    """Linear-blend skinning of T frames; arguments as `dual_frames`."""
+    """Fill `out` and `normals` by linear blend skinning; arguments as of `dual_frames`."""
     for frame in range(matrices.shape[0]):
         root = matrices[frame, 0]
         for joint in range(matrices.shape[1]):
@@ -78,11 +79,13 @@ def linear_frames(
                     if column == 3:
                         total -= root[row, 3]
                     scratch[joint, 4 * row + column] = total
-        upper = normals[frame] if normals.shape[0] else out[frame]
-        wanted = upright if normals.shape[0] else upright[:0]
-        _skin_linear(vertices, joints, weights, counts, scratch, out[frame], wanted, around, upper)
+        frame_normals = normals[frame] if normals.shape[0] else out[frame]
+        wanted = rest_normals if normals.shape[0] else rest_normals[:0]
+        _skin_linear(
+            vertices, joints, weights, counts, scratch, out[frame], wanted, neighbours, frame_normals
+        )
         if normals.shape[0]:
-            _normals_from_neighbours(out[frame], around, numbers, upper)
+            _normals_from_neighbours(out[frame], neighbours, coefficients, frame_normals)
         _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
 
 
@@ -123,7 +126,7 @@ def joint_duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Floa
 def _twist_limbs(
     vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, twisted: Float32
 ) -> None:
-    """Turn vertices of limbs about their bones into `twisted`: see `fba.body.skin._twisting`."""
+    """Write to `twisted` vertices of limbs turned about their bones: see `fba.body.skin._twisting`."""
     for bone in range(len(twists.joint)):
         own = twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
         child = twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
@@ -142,9 +145,9 @@ def _twist_limbs(
 
 @inlined
 def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
-    """Return angle by which a joint turns about an axis, seen from its parent, radians.
+    """Return the angle by which a joint turns about an axis, seen from its parent, radians.
 
-    It fades to 0 where the limb points the opposite way, as the twist is undefined there.
+    It fades to 0 where the limb is turned back on itself, as its twist is undefined there.
     """
     parent = int(parents[joint])
     if parent < 0:
@@ -164,7 +167,7 @@ def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
 
 @inlined
 def _quaternion(s: Float64) -> tuple[float, float, float, float]:
-    """Return unit quaternion w, x, y, z of the rotation in a matrix (3, 4), from its largest component."""
+    """Return the unit quaternion w, x, y, z of the rotation in a matrix (3, 4), by its largest component."""
     trace = s[0, 0] + s[1, 1] + s[2, 2]
     if trace > 0.0:
         r = np.sqrt(1.0 + trace)
@@ -189,23 +192,24 @@ def _quaternion(s: Float64) -> tuple[float, float, float, float]:
 @compiled
 def _skin_dual(
     vertices: Float32, joints: Int32, weights: Float32, counts: Int32, duals: Float32,
-    out: Float32, upright: Float32, around: Int32, normals: Float32,
+    out: Float32, rest_normals: Float32, neighbours: Int32, normals: Float32,
 ) -> None:  # fmt: skip
-    with_normals = upright.shape[0] > 0
-    tops = np.empty((len(duals), 12), dtype=np.float32)
-    _matrices(duals, tops)
+    """Fill `out` with one frame, and normals of the vertices that have no neighbours to compute them from."""
+    with_normals = rest_normals.shape[0] > 0
+    rows = np.empty((len(duals), 12), dtype=np.float32)
+    _matrices(duals, rows)
     for i in range(vertices.shape[0]):
         j = joints[i, 0]
         if counts[i] == 1:  # one joint, as for most of a head: nothing to blend
             px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-            out[i, 0] = tops[j, 0] * px + tops[j, 1] * py + tops[j, 2] * pz + tops[j, 3]
-            out[i, 1] = tops[j, 4] * px + tops[j, 5] * py + tops[j, 6] * pz + tops[j, 7]
-            out[i, 2] = tops[j, 8] * px + tops[j, 9] * py + tops[j, 10] * pz + tops[j, 11]
-            if with_normals and around[i, 0] < 0:
-                px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
-                normals[i, 0] = tops[j, 0] * px + tops[j, 1] * py + tops[j, 2] * pz
-                normals[i, 1] = tops[j, 4] * px + tops[j, 5] * py + tops[j, 6] * pz
-                normals[i, 2] = tops[j, 8] * px + tops[j, 9] * py + tops[j, 10] * pz
+            out[i, 0] = rows[j, 0] * px + rows[j, 1] * py + rows[j, 2] * pz + rows[j, 3]
+            out[i, 1] = rows[j, 4] * px + rows[j, 5] * py + rows[j, 6] * pz + rows[j, 7]
+            out[i, 2] = rows[j, 8] * px + rows[j, 9] * py + rows[j, 10] * pz + rows[j, 11]
+            if with_normals and neighbours[i, 0] < 0:
+                px, py, pz = rest_normals[i, 0], rest_normals[i, 1], rest_normals[i, 2]
+                normals[i, 0] = rows[j, 0] * px + rows[j, 1] * py + rows[j, 2] * pz
+                normals[i, 1] = rows[j, 4] * px + rows[j, 5] * py + rows[j, 6] * pz
+                normals[i, 2] = rows[j, 8] * px + rows[j, 9] * py + rows[j, 10] * pz
             continue
         share = weights[i, 0]
         w, x, y, z = share * duals[j, 0], share * duals[j, 1], share * duals[j, 2], share * duals[j, 3]
@@ -220,8 +224,8 @@ def _skin_dual(
             b += share * duals[j, 5]
             c += share * duals[j, 6]
             d += share * duals[j, 7]
-        # 2 / length^2: normalises, with the factor 2 of the rotation formula.
-        per = TWO / max(w * w + x * x + y * y + z * z, TINY)
+        # 2 / length^2: normalises, and has the factor 2 of the rotation formula
+        factor = TWO / max(w * w + x * x + y * y + z * z, TINY)
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         # v + 2 q x (q x v + w v)
         ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
@@ -230,108 +234,119 @@ def _skin_dual(
             w * c - y * a + z * b - x * d,
             w * d - z * a + x * c - y * b,
         )
-        out[i, 0] = px + per * (y * uz - z * uy + tx)
-        out[i, 1] = py + per * (z * ux - x * uz + ty)
-        out[i, 2] = pz + per * (x * uy - y * ux + tz)
-        if with_normals and around[i, 0] < 0:
-            px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
+        out[i, 0] = px + factor * (y * uz - z * uy + tx)
+        out[i, 1] = py + factor * (z * ux - x * uz + ty)
+        out[i, 2] = pz + factor * (x * uy - y * ux + tz)
+        if with_normals and neighbours[i, 0] < 0:
+            px, py, pz = rest_normals[i, 0], rest_normals[i, 1], rest_normals[i, 2]
             ux, uy, uz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
-            normals[i, 0] = px + per * (y * uz - z * uy)
-            normals[i, 1] = py + per * (z * ux - x * uz)
-            normals[i, 2] = pz + per * (x * uy - y * ux)
+            normals[i, 0] = px + factor * (y * uz - z * uy)
+            normals[i, 1] = py + factor * (z * ux - x * uz)
+            normals[i, 2] = pz + factor * (x * uy - y * ux)
 
 
 @compiled
-def _matrices(duals: Float32, tops: Float32) -> None:
-    """Fill tops (J, 12) with the 3x4 matrices of dual quaternions (J, 8), row by row."""
+def _matrices(duals: Float32, rows: Float32) -> None:
+    """Fill rows (J, 12) with the 3x4 matrices of dual quaternions (J, 8), row by row."""
     for j in range(len(duals)):
         w, x, y, z = duals[j, 0], duals[j, 1], duals[j, 2], duals[j, 3]
         a, b, c, d = duals[j, 4], duals[j, 5], duals[j, 6], duals[j, 7]
-        per = TWO / max(w * w + x * x + y * y + z * z, TINY)
-        tops[j, 0], tops[j, 1], tops[j, 2] = (
-            ONE - per * (y * y + z * z),
-            per * (x * y - w * z),
-            per * (x * z + w * y),
+        factor = TWO / max(w * w + x * x + y * y + z * z, TINY)
+        rows[j, 0], rows[j, 1], rows[j, 2] = (
+            ONE - factor * (y * y + z * z),
+            factor * (x * y - w * z),
+            factor * (x * z + w * y),
         )
-        tops[j, 4], tops[j, 5], tops[j, 6] = (
-            per * (x * y + w * z),
-            ONE - per * (x * x + z * z),
-            per * (y * z - w * x),
+        rows[j, 4], rows[j, 5], rows[j, 6] = (
+            factor * (x * y + w * z),
+            ONE - factor * (x * x + z * z),
+            factor * (y * z - w * x),
         )
-        tops[j, 8], tops[j, 9], tops[j, 10] = (
-            per * (x * z - w * y),
-            per * (y * z + w * x),
-            ONE - per * (x * x + y * y),
+        rows[j, 8], rows[j, 9], rows[j, 10] = (
+            factor * (x * z - w * y),
+            factor * (y * z + w * x),
+            ONE - factor * (x * x + y * y),
         )
-        tops[j, 3] = per * (w * b - x * a + y * d - z * c)
-        tops[j, 7] = per * (w * c - y * a + z * b - x * d)
-        tops[j, 11] = per * (w * d - z * a + x * c - y * b)
+        rows[j, 3] = factor * (w * b - x * a + y * d - z * c)
+        rows[j, 7] = factor * (w * c - y * a + z * b - x * d)
+        rows[j, 11] = factor * (w * d - z * a + x * c - y * b)
 
 
 @compiled
 def scale_and_shift(vertices: Float32, size: float, shift: Float32, out: Float32) -> None:
-    """out (V, 3) = size x vertices + shift (3,)."""
-    times = np.float32(size)
+    """Fill out (V, 3) with size x vertices + shift (3,)."""
+    factor = np.float32(size)
     x, y, z = shift[0], shift[1], shift[2]
     for i in range(len(vertices)):
-        out[i, 0] = times * vertices[i, 0] + x
-        out[i, 1] = times * vertices[i, 1] + y
-        out[i, 2] = times * vertices[i, 2] + z
+        out[i, 0] = factor * vertices[i, 0] + x
+        out[i, 1] = factor * vertices[i, 1] + y
+        out[i, 2] = factor * vertices[i, 2] + z
 
 
 @compiled
 def _skin_linear(
-    vertices: Float32, joints: Int32, weights: Float32, counts: Int32, tops: Float32,
-    out: Float32, upright: Float32, around: Int32, normals: Float32,
+    vertices: Float32, joints: Int32, weights: Float32, counts: Int32, rows: Float32,
+    out: Float32, rest_normals: Float32, neighbours: Int32, normals: Float32,
 ) -> None:  # fmt: skip
-    with_normals = upright.shape[0] > 0
+    """Fill the same as `_skin_dual`, with the 3x4 matrices of joints, rows (J, 12)."""
+    with_normals = rest_normals.shape[0] > 0
     m = np.empty(12, dtype=np.float32)
     for i in range(vertices.shape[0]):
         m[:] = 0
         for k in range(counts[i]):
             j, share = joints[i, k], weights[i, k]
             for e in range(12):
-                m[e] += share * tops[j, e]
+                m[e] += share * rows[j, e]
         px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         out[i, 0] = m[0] * px + m[1] * py + m[2] * pz + m[3]
         out[i, 1] = m[4] * px + m[5] * py + m[6] * pz + m[7]
         out[i, 2] = m[8] * px + m[9] * py + m[10] * pz + m[11]
-        if with_normals and around[i, 0] < 0:
-            px, py, pz = upright[i, 0], upright[i, 1], upright[i, 2]
+        if with_normals and neighbours[i, 0] < 0:
+            px, py, pz = rest_normals[i, 0], rest_normals[i, 1], rest_normals[i, 2]
             nx = m[0] * px + m[1] * py + m[2] * pz
             ny = m[4] * px + m[5] * py + m[6] * pz
             nz = m[8] * px + m[9] * py + m[10] * pz
             length = nx * nx + ny * ny + nz * nz
-            per = ONE / np.sqrt(length) if length > TINY else ONE
-            normals[i, 0] = nx * per
-            normals[i, 1] = ny * per
-            normals[i, 2] = nz * per
+            factor = ONE / np.sqrt(length) if length > TINY else ONE
+            normals[i, 0] = nx * factor
+            normals[i, 1] = ny * factor
+            normals[i, 2] = nz * factor
 
 
 @compiled
-def _normals_from_neighbours(places: Float32, around: Int32, numbers: Float32, normals: Float32) -> None:
-    """Normals from the positions of neighbours: see `normal_rings`."""
-    for i in range(places.shape[0]):
-        a, b, c, d = around[i, 0], around[i, 1], around[i, 2], around[i, 3]
+def _normals_from_neighbours(
+    positions: Float32, neighbours: Int32, coefficients: Float32, normals: Float32
+) -> None:
+    """Fill normals from the positions of neighbours: see `normal_rings`."""
+    for i in range(positions.shape[0]):
+        a, b, c, d = neighbours[i, 0], neighbours[i, 1], neighbours[i, 2], neighbours[i, 3]
         if a < 0:
             continue
-        tx, ty, tz = places[a, 0] - places[c, 0], places[a, 1] - places[c, 1], places[a, 2] - places[c, 2]
-        ux, uy, uz = places[b, 0] - places[d, 0], places[b, 1] - places[d, 1], places[b, 2] - places[d, 2]
-        x, y, z = numbers[i, 0], numbers[i, 1], numbers[i, 2]
+        tx, ty, tz = (
+            positions[a, 0] - positions[c, 0],
+            positions[a, 1] - positions[c, 1],
+            positions[a, 2] - positions[c, 2],
+        )
+        ux, uy, uz = (
+            positions[b, 0] - positions[d, 0],
+            positions[b, 1] - positions[d, 1],
+            positions[b, 2] - positions[d, 2],
+        )
+        x, y, z = coefficients[i, 0], coefficients[i, 1], coefficients[i, 2]
         nx = x * tx + y * ux + z * (ty * uz - tz * uy)
         ny = x * ty + y * uy + z * (tz * ux - tx * uz)
         nz = x * tz + y * uz + z * (tx * uy - ty * ux)
         length = nx * nx + ny * ny + nz * nz
-        per = ONE / np.sqrt(length) if length > TINY else ONE
-        normals[i, 0] = nx * per
-        normals[i, 1] = ny * per
-        normals[i, 2] = nz * per
+        factor = ONE / np.sqrt(length) if length > TINY else ONE
+        normals[i, 0] = nx * factor
+        normals[i, 1] = ny * factor
+        normals[i, 2] = nz * factor
 
 
 @compiled
-def _shift(places: Float32, x: float, y: float, z: float) -> None:
-    """Positions from the root's frame to the world; done last, so that large offsets cost no precision."""
-    for i in range(places.shape[0]):
-        places[i, 0] += x
-        places[i, 1] += y
-        places[i, 2] += z
+def _shift(positions: Float32, x: float, y: float, z: float) -> None:
+    """Shift positions to the world, in place; done last, so that large offsets cost no precision."""
+    for i in range(positions.shape[0]):
+        positions[i, 0] += x
+        positions[i, 1] += y
+        positions[i, 2] += z

@@ -1,4 +1,4 @@
-"""Checks joints and weights of vertices, and reduces them to the few joints that a vertex can have."""
+"""Checks of the joints and weights of vertices, and their reduction to the most that a vertex can have."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ INFLUENCES = 4
 WEIGHT_TOLERANCE = 1e-3
 """Largest error of the sum of a vertex's weights; they are then scaled to a sum of 1."""
 LEAST = 0.012
-"""Subtracted from every weight of a chain, so that tiny weights take up no joint."""
+"""Subtracted from every weight where chains are thinned, so that tiny weights take up no joint."""
 
 
 def checked_weights(
     where: str, joints: npt.ArrayLike, weights: npt.ArrayLike, count: int
 ) -> tuple[Int32, Float32]:
-    """Read-only copies of joints and weights, (count, 4), their sums made 1. ModelError as `BodyPart`."""
+    """Return read-only copies of joints and weights, (count, 4), that sum to 1; ModelError as `BodyPart`."""
     which = np.array(joints)
     if which.shape != (count, INFLUENCES) or which.dtype.kind not in "iu":
         raise ModelError(f"{where}: joints must be whole numbers, ({count}, {INFLUENCES}), not {which.shape}")
@@ -48,10 +48,10 @@ def checked_weights(
 def strongest_weights(dense: Float64, alike: Sequence[bool] | None = None) -> tuple[Int32, Float32]:
     """Return (joints, weights), each (V, 4), of dense weights (V, J).
 
-    Where there are more than four joints, the fifth weight is subtracted from all, so that weights fade in
-    and out over the surface without a step. alike: (J,) whether a joint belongs to a chain of neighbours that
-    move almost as one, as vertebrae do. Those are dropped first, and the strongest of them take over their
-    weight.
+    Where a vertex has more than four joints, the fifth weight is subtracted from all, so that weights change
+    over the surface without a step. alike: (J,) whether a joint belongs to a chain of neighbours that move
+    almost as one, as vertebrae do. Joints of a chain are dropped first, and the strongest of them take over
+    their weight.
     """
     if alike is not None:
         dense = _thin_chain(dense, np.asarray(alike, dtype=bool))
@@ -73,13 +73,13 @@ def _thin_chain(dense: Float64, alike: Bool) -> Float64:
     """Return (V, J) weights with chain joints dropped so that each vertex has at most `INFLUENCES` joints."""
     dense = np.maximum(dense - LEAST, 0.0)
     dense /= np.maximum(dense.sum(axis=1, keepdims=True), 1e-12)
-    rooms = np.clip(INFLUENCES - (dense[:, ~alike] > 0).sum(axis=1), 1, INFLUENCES)
+    free = np.clip(INFLUENCES - (dense[:, ~alike] > 0).sum(axis=1), 1, INFLUENCES)
     chain = dense[:, alike]
     if chain.shape[1] <= 1:
         return dense
     total = chain.sum(axis=1, keepdims=True)
     ranked = np.pad(-np.sort(-chain, axis=1), ((0, 0), (0, INFLUENCES)))
-    less = np.maximum(chain - np.take_along_axis(ranked, rooms[:, None], axis=1), 0.0)
+    less = np.maximum(chain - np.take_along_axis(ranked, free[:, None], axis=1), 0.0)
     remaining = less.sum(axis=1, keepdims=True)
     dense[:, alike] = np.where(remaining > 1e-9, less * (total / np.maximum(remaining, 1e-12)), chain)
     return dense

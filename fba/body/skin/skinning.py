@@ -21,7 +21,7 @@ from fba.mesh.meshes import result_array
 METHODS = ("dual", "linear")
 """Ways to blend the motion of several joints."""
 BLOCK = 64
-"""Frames per call of the compiled loop: an interrupt can only get through between calls."""
+"""Frames per call of the compiled loop: Ctrl+C takes effect between calls only."""
 
 
 @dataclass(eq=False)
@@ -29,11 +29,11 @@ class Skinner:
     """Moves vertices with joints; `build_skinner` makes it.
 
     vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), largest
-    first, rows sum to 1. counts: int32 (V,), of weights above 0. inverse: float64 (J, 4, 4), of the joints as
-    modelled. parents: int64 (J,). neighbours: int32 (V, 4), coefficients: float32 (V, 3), see
-    `fba.body.skin._moving_normals`.
+    first, rows sum to 1. counts: int32 (V,), number of weights above 0. inverse: float64 (J, 4, 4), inverses
+    of the joints as modelled. parents: int64 (J,). neighbours: int32 (V, 4), and coefficients: float32
+    (V, 3), see `fba.body.skin._moving_normals`.
 
-    Calls allocate nothing but their result. May be used by several threads, one after the other.
+    Calls allocate nothing but their result. Threads that share a Skinner wait for each other.
     """
 
     vertices: Float32
@@ -64,29 +64,29 @@ class Skinner:
         """Return vertices for joint matrices: see `BodyModel.skin`."""
         return self._run(self.vertices, self.normals, matrices, out, normals, method)
 
-    def carry(
+    def skin_vertices(
         self,
         vertices: Float32,
-        upright: Float32 | None,
+        rest_normals: Float32 | None,
         matrices: npt.ArrayLike,
         out: Float32 | None = None,
         normals: Float32 | None = None,
         method: str = "dual",
     ) -> Float32:
-        """Return the result of `skin` for other rest positions (V, 3) and, if given, their normals (V, 3)."""
-        if normals is not None and upright is None:
-            raise ValueError("normals are wanted, but not given as modelled")
-        for array in (vertices, upright):
+        """Return what `skin` does for other rest positions (V, 3), and their normals (V, 3) or None."""
+        if normals is not None and rest_normals is None:
+            raise ValueError("normals need rest_normals, those of the vertices before skinning")
+        for array in (vertices, rest_normals):
             if array is not None and array.shape != self.vertices.shape:
                 raise ValueError(
                     f"vertices and normals must have shape {self.vertices.shape}, not {array.shape}"
                 )
-        return self._run(vertices, upright, matrices, out, normals, method)
+        return self._run(vertices, rest_normals, matrices, out, normals, method)
 
     def _run(
         self,
         vertices: Float32,
-        upright: Float32 | None,
+        rest_normals: Float32 | None,
         matrices: npt.ArrayLike,
         out: Float32 | None,
         normals: Float32 | None,
@@ -97,19 +97,21 @@ class Skinner:
         frames, single = self._frames(matrices)
         shape = (*(() if single else (len(frames),)), len(vertices), 3)
         out = result_array(shape, out, normals)
-        placed = out[None] if single else out
-        turned = placed[:0] if normals is None else normals[None] if single else normals
+        out_frames = out[None] if single else out
+        normal_frames = out_frames[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
             vertices = _as_writable(vertices, self._vertices)
-            upright = self._normals if upright is None else _as_writable(upright, self._normals)
+            rest_normals = (
+                self._normals if rest_normals is None else _as_writable(rest_normals, self._normals)
+            )
             mesh = (
-                vertices, upright, self.joints, self.weights, self.counts, self.neighbours,
+                vertices, rest_normals, self.joints, self.weights, self.counts, self.neighbours,
                 self.coefficients,
             )  # fmt: skip
             twisted = vertices
             if method == "dual" and len(self.twists.rows):
                 twisted = self._twisted
-                # where nothing else was written, every twisted vertex is overwritten below
+                # if it holds the vertices as modelled, it can stay: all twisted ones are overwritten below
                 if not (self._twisted_is_modelled and vertices is self.vertices):
                     np.copyto(twisted, vertices)
                 self._twisted_is_modelled = vertices is self.vertices
@@ -125,12 +127,17 @@ class Skinner:
                         self.twists,
                         self.girdle,
                         twisted,
-                        placed[part],
-                        turned[part],
+                        out_frames[part],
+                        normal_frames[part],
                     )
                 else:
                     loops.linear_frames(
-                        frames[part], self.inverse, *mesh, self._scratch, placed[part], turned[part]
+                        frames[part],
+                        self.inverse,
+                        *mesh,
+                        self._scratch,
+                        out_frames[part],
+                        normal_frames[part],
                     )
         return out
 

@@ -154,7 +154,7 @@ def test_real_walks_reduced(
     walk = fba.read(shared / "data" / name)
     reduced = gait.reduce(walk)
     assert reduced.factor > factor
-    errors = {kind: gait.compare(reduced.whole(kind), walk) for kind in ("linear", "smooth")}
+    errors = {kind: gait.compare(reduced.restore(kind), walk) for kind in ("linear", "smooth")}
     assert errors["smooth"].mean_degrees < degrees
     assert errors["smooth"].mean_cm < centimetres
     assert errors["smooth"].mean_cm < errors["linear"].mean_cm
@@ -167,11 +167,11 @@ def test_reduction_keeps_its_keys_and_counts() -> None:
     assert len(reduced.keys) == reduced.poses == len(keys) == 33
     assert reduced.factor == pytest.approx(129 / 33)
     for kind in ("linear", "smooth"):
-        whole = reduced.whole(kind)
-        np.testing.assert_array_equal(whole.index, walk.index)
-        np.testing.assert_array_equal(whole.body.values[list(keys)], walk.body.values[list(keys)])
+        restored = reduced.restore(kind)
+        np.testing.assert_array_equal(restored.index, walk.index)
+        np.testing.assert_array_equal(restored.body.values[list(keys)], walk.body.values[list(keys)])
     with pytest.raises(ValueError, match="linear or smooth"):
-        reduced.whole("cubic")
+        reduced.restore("cubic")
 
 
 def test_compare_measures_angles_and_places() -> None:
@@ -197,5 +197,5 @@ def test_turns_past_half_a_turn_are_reduced_without_spinning() -> None:
     walk = turned(gait.walk(cycles=6), 2.0)  # 386 degrees in all
     reduced = gait.reduce(fba.Animation(walk.rate, walk.index, None, BodyTrack(
         fba.body.wrapped(walk.body.values), walk.body.mask)))  # fmt: skip
-    errors = gait.compare(reduced.whole("linear"), walk)
+    errors = gait.compare(reduced.restore("linear"), walk)
     assert errors.worst_degrees < 30
