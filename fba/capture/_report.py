@@ -93,15 +93,11 @@ def retarget_report(
 
     joints, scale, solver: as they were given to `from_skeleton`. If frame rates differ, the motion is
     resampled; frames that only one of the two has are left out. ModelError if the animation has no body or no
-    frame in common with the motion, or no family of names fits.
+    frame in common with the motion; errors of names and skeletons as from `from_skeleton`.
     """
     solver = solver if solver is not None else BapSolver()
     skeleton = solver.skeleton
-    if joints is None:
-        family, mapped = matching.match(motion.names)
-    else:
-        family, mapped = "", {ours: motion.names.index(theirs) for theirs, ours in joints.items()}
-    mapped = {joint: number for joint, number in mapped.items() if joint in skeleton}
+    family, mapped = matching.map_joints(motion.names, joints, skeleton)
     if animation.body is None:
         raise ModelError("retarget_report: the animation has no body")
     motion = motion.resample(animation.rate)

@@ -9,14 +9,15 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 
+from fba.body.skeleton import ROOT, Skeleton
 from fba.errors import ModelError, Remedy
 from fba.parameters import joints
 
-REQUIRED = ("HumanoidRoot",)
+REQUIRED = (ROOT,)
 """Joints that every source must have."""
 FEWEST = 5
 """Least number of names by which a family fits."""
@@ -86,3 +87,32 @@ def _shared_prefixes(names: Sequence[str]) -> list[str]:
     counts.update({name: sum(n.startswith(name) for n in names) for name in names[:PREFIX_NAMES]})
     many = [prefix for prefix, count in counts.items() if 2 * count >= len(names) > 1]
     return sorted(many, key=len)
+
+
+def map_joints(
+    names: Sequence[str], joints: Mapping[str, str] | None, skeleton: Skeleton
+) -> tuple[str, dict[str, int]]:
+    """Return the family of a source's names, and body joint -> number of the source's joint.
+
+    joints: source's joint -> body's joint, for which the family is ""; None to match by name. Joints that the
+    skeleton lacks are left out. ModelError where no family fits or the skeleton's root is not `ROOT`,
+    ValueError for an unknown joint.
+    """
+    if skeleton.names[0] != ROOT:
+        raise ModelError(
+            f"the root of the body's skeleton is {skeleton.names[0]!r}, but capture moves {ROOT!r}: "
+            "rename the root, or put one above it"
+        )
+    if joints is None:
+        family, mapped = match(names)
+        return family, {joint: number for joint, number in mapped.items() if joint in skeleton}
+    mapped = {}
+    for source, joint in joints.items():
+        if joint not in skeleton:
+            raise ValueError(f"joints: the body has no joint {joint!r}")
+        if source not in names:
+            raise ValueError(f"joints: the motion has no joint {source!r}")
+        mapped[joint] = names.index(source)
+    if ROOT not in mapped:
+        raise ValueError(f"joints: one source joint must be given for {ROOT}")
+    return "", mapped

@@ -70,15 +70,13 @@ def from_skeleton(
     joint for joint, wherever its feet are: ground has no effect, and spine only if it is "simple", "full" or
     a number.
 
-    Raises ModelError if no family of names fits, the skeleton has no size or there are more than 500,000
-    frames, ValueError for a bad option or joint name. Warns (FbaWarning) of missing joints of a limb: they
-    stay in the default posture. `fba.capture.retarget_report` measures how close the result comes.
+    Raises ModelError if no family of names fits, the root of the solver's skeleton is not HumanoidRoot, the
+    source has no size or there are more than 500,000 frames, ValueError for a bad option or joint name. Warns
+    (FbaWarning) of missing joints of a limb: they stay in the default posture.
+    `fba.capture.retarget_report` measures how close the result comes.
     """
     solver = solver if solver is not None else BapSolver()
-    _, mapped = (
-        matching.match(motion.names) if joints is None else ("", _check_joints(motion, joints, solver))
-    )
-    mapped = {joint: number for joint, number in mapped.items() if joint in solver.skeleton}
+    _, mapped = matching.map_joints(motion.names, joints, solver.skeleton)
     rate = motion.rate if rate is None else Fraction(rate)
     if not len(motion):
         raise ModelError("the motion has no frames")
@@ -129,17 +127,3 @@ def from_skeleton(
 
     track = solve_track(solver, turned, len(root), matrices)
     return Animation(motion.rate, np.arange(len(root)), None, track, motion.name)
-
-
-def _check_joints(motion: SkeletonMotion, joints: Mapping[str, str], solver: BapSolver) -> dict[str, int]:
-    """Return joint of the standard -> number of the source joint; ValueError for unknown joints."""
-    result = {}
-    for source, joint in joints.items():
-        if joint not in solver.skeleton:
-            raise ValueError(f"joints: the body has no joint {joint!r}")
-        if source not in motion.names:
-            raise ValueError(f"joints: the motion has no joint {source!r}")
-        result[joint] = motion.names.index(source)
-    if "HumanoidRoot" not in result:
-        raise ValueError("joints: one source joint must be given for HumanoidRoot")
-    return result

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from fba.body import BapSolver
-from fba.body.head_attachment import HeadOnBody, placement
+from fba.body.head_attachment import AttachedHead, attach_head, placement
 from fba.body.model import BodyModel
 from fba.body.skin.skin_weights import strongest_weights
 from fba.errors import ModelError
@@ -27,10 +27,10 @@ def pupils(model: FaceModel) -> Float64:
 
 
 @pytest.fixture(scope="module")
-def head() -> HeadOnBody:
+def head() -> AttachedHead:
     model = FaceModel.default()
     skull = np.concatenate([np.full(len(part.vertices), part.kind not in FREE) for part in model.parts])
-    return HeadOnBody(BodyModel.default(), model.vertices, pupils(model), skull)
+    return attach_head(BodyModel.default(), model.vertices, pupils(model), skull)
 
 
 def posed(**degrees: float) -> Float64:
@@ -44,7 +44,7 @@ def posed(**degrees: float) -> Float64:
 NOD = {"skullbase_tilt": 30, "vc4_roll": 10, "vc6_torsion": 25, "vt3_tilt": 10}
 
 
-def test_the_built_in_head_fits_as_it_is(head: HeadOnBody) -> None:
+def test_the_built_in_head_fits_as_it_is(head: AttachedHead) -> None:
     assert head.brings_neck
     np.testing.assert_array_equal(head.place[:3, :3], np.eye(3))
     model = FaceModel.default()
@@ -52,7 +52,7 @@ def test_the_built_in_head_fits_as_it_is(head: HeadOnBody) -> None:
     np.testing.assert_allclose(placed, model.vertices + head.place[:3, 3], atol=2e-6)
 
 
-def test_head_neck_and_bust_are_one_skin(head: HeadOnBody) -> None:
+def test_head_neck_and_bust_are_one_skin(head: AttachedHead) -> None:
     """Where the figure's own neck and the face have a vertex in one place, they stay together."""
     body, model = BodyModel.default(), FaceModel.default()
     neck = body.part("neck")
@@ -66,7 +66,7 @@ def test_head_neck_and_bust_are_one_skin(head: HeadOnBody) -> None:
     assert apart.max() < 2e-4
 
 
-def test_triangles_of_the_neck_are_not_torn(head: HeadOnBody) -> None:
+def test_triangles_of_the_neck_are_not_torn(head: AttachedHead) -> None:
     part = FaceModel.default().part("skin")
     model = FaceModel.default()
     still, moved = (head.skin(model.vertices, m)[: len(part.vertices)] for m in (posed(), posed(**NOD)))
@@ -79,7 +79,7 @@ def test_triangles_of_the_neck_are_not_torn(head: HeadOnBody) -> None:
     assert longer.min() > 0.3
 
 
-def test_the_face_itself_is_stiff(head: HeadOnBody) -> None:
+def test_the_face_itself_is_stiff(head: AttachedHead) -> None:
     """Everything above the mouth moves with the skull alone."""
     model = FaceModel.default()
     matrices = posed(**NOD)
@@ -91,7 +91,7 @@ def test_the_face_itself_is_stiff(head: HeadOnBody) -> None:
     np.testing.assert_allclose(moved[upper], expected, atol=3e-4)
 
 
-def test_faps_turn_the_head_on_the_skull_base(head: HeadOnBody) -> None:
+def test_faps_turn_the_head_on_the_skull_base(head: AttachedHead) -> None:
     """FAP 48 to 50 are relative to the skull base: they come after (inside) what BAPs do to it."""
     model = FaceModel.default()
     deformer = Deformer(model)
@@ -110,21 +110,21 @@ def test_faps_turn_the_head_on_the_skull_base(head: HeadOnBody) -> None:
     np.testing.assert_allclose(head.skin(deformer.local(faps), turned)[crown], expected, atol=1e-5)
 
 
-def test_no_turn_leaves_the_joints(head: HeadOnBody) -> None:
+def test_no_turn_leaves_the_joints(head: AttachedHead) -> None:
     matrices = posed(**NOD)
     np.testing.assert_array_equal(head.matrices(matrices, np.eye(4)), matrices)
 
 
-def test_normals_turn_along(head: HeadOnBody) -> None:
+def test_normals_turn_along(head: AttachedHead) -> None:
     model = FaceModel.default()
     normals = np.empty_like(model.vertices)
-    head.skin(model.vertices, posed(**NOD), upright=model.normals, normals=normals)
+    head.skin(model.vertices, posed(**NOD), local_normals=model.normals, normals=normals)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-4)
-    with pytest.raises(ValueError, match="normals are wanted"):
+    with pytest.raises(ValueError, match="normals need rest_normals"):
         head.skin(model.vertices, posed(), normals=normals)
 
 
-def test_what_lies_under_the_clothes(head: HeadOnBody) -> None:
+def test_what_lies_under_the_clothes(head: AttachedHead) -> None:
     model = FaceModel.default()
     chin = model.points[point_row("2.1")][1]
     hidden = head.hidden[: len(model.part("skin").vertices)]
@@ -136,14 +136,14 @@ def test_another_face_is_sized_by_its_pupils() -> None:
     """In centimetres, and elsewhere."""
     model, body = FaceModel.default(), BodyModel.default()
     shift = np.array([5.0, -2.0, 1.0])
-    other = HeadOnBody(body, model.vertices * 100 + shift, pupils(model) * 100 + shift)
+    other = attach_head(body, model.vertices * 100 + shift, pupils(model) * 100 + shift)
     assert other.place[0, 0] == pytest.approx(0.01, rel=1e-6)
     assert other.brings_neck
     assert body.eyes is not None
     found = other.place[:3, :3] @ (pupils(model)[0] * 100 + shift) + other.place[:3, 3]
     np.testing.assert_allclose(found, body.eyes[0], atol=1e-6)
     matrices = posed(**NOD)
-    own = HeadOnBody(body, model.vertices, pupils(model)).skin(model.vertices, matrices)
+    own = attach_head(body, model.vertices, pupils(model)).skin(model.vertices, matrices)
     scaled = (model.vertices * 100 + shift).astype(np.float32)
     np.testing.assert_allclose(other.skin(scaled, matrices), own, atol=1e-4)
 
@@ -151,7 +151,7 @@ def test_another_face_is_sized_by_its_pupils() -> None:
 def test_a_mask_brings_no_neck_and_is_stiff() -> None:
     model, body = FaceModel.default(), BodyModel.default()
     rows = np.flatnonzero(model.vertices[:, 1] > 0.0)
-    mask = HeadOnBody(body, model.vertices[rows], pupils(model))
+    mask = attach_head(body, model.vertices[rows], pupils(model))
     assert not mask.brings_neck
     assert not mask.hidden.any()
     np.testing.assert_array_equal(
@@ -162,7 +162,7 @@ def test_a_mask_brings_no_neck_and_is_stiff() -> None:
 def test_a_body_without_a_skull_base_or_neck() -> None:
     body = rod()
     model = FaceModel.default()
-    head = HeadOnBody(body, model.vertices, pupils(model))
+    head = attach_head(body, model.vertices, pupils(model))
     assert head.brings_neck
     assert set(np.unique(head.joints[head.weights > 0]).tolist()) == {2}  # the highest joint
     turn = np.eye(4)
@@ -193,3 +193,8 @@ def test_four_joints_of_many_fade_in_without_a_step() -> None:
         np.add.at(found, (np.arange(61), joints[:, slot]), weights[:, slot])
     np.testing.assert_allclose(found.sum(axis=1), 1, atol=1e-6)
     assert np.abs(np.diff(found, axis=0)).max() < 0.01
+
+
+def test_the_old_name_names_the_new_one() -> None:
+    with pytest.raises(ImportError, match="now attach_head"):
+        from fba.body.head_attachment import HeadOnBody  # noqa: F401

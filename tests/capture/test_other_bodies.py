@@ -73,6 +73,34 @@ def test_a_body_without_some_joints_still_points_every_bone(missing: str) -> Non
     assert (report.feet is None) == (missing in ("subtalar", "metatarsal midtarsal"))
 
 
+def test_a_body_without_the_root_is_refused() -> None:
+    """Its legs alone, which hang on the sacrum."""
+    body = Skeleton.default()
+    number = body.number
+    legs = [number(f"{side}_{joint}") for side in "lr" for joint in ("hip", "knee", "ankle")]
+    kept = [number("sacroiliac"), *legs]
+    names = tuple(body.names[joint] for joint in kept)
+    solver = BapSolver(Skeleton(names, np.array([-1, 0, 1, 2, 0, 4, 5]), body.centres[kept]))
+    captured = motion("T", 4)
+    animation = from_skeleton(captured)
+    for convert in (
+        lambda: from_skeleton(captured, solver=solver),
+        lambda: retarget_report(captured, animation, solver=solver),
+        lambda: from_skeleton(captured, joints={"Hips": "sacroiliac"}, solver=solver),
+    ):
+        with pytest.raises(ModelError, match=r"root of the body's skeleton is 'sacroiliac'.*HumanoidRoot"):
+            convert()
+
+
+def test_a_report_names_unknown_joints() -> None:
+    captured = motion("T", 4)
+    animation = from_skeleton(captured)
+    with pytest.raises(ValueError, match="the motion has no joint 'Hip'"):
+        retarget_report(captured, animation, joints={"Hip": "HumanoidRoot"})
+    with pytest.raises(ValueError, match="one source joint must be given for HumanoidRoot"):
+        retarget_report(captured, animation, joints={"LeftUpLeg": "l_hip"})
+
+
 @pytest.mark.parametrize("axes", convention_names())
 def test_every_order_of_the_axes_points_every_bone(axes: str) -> None:
     """With flexion innermost, an elbow reaches any direction alone; elsewhere the upper arm turns, too."""

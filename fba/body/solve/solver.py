@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,58 @@ HALF_TURN = 314159
 """pi in 1e-5 rad."""
 
 
+class _Tables(NamedTuple):
+    """The angles of J joints as arrays for the compiled loops; N of the 3 J angles have a BAP."""
+
+    bap: Int64
+    """(J, 3) column of the BAP of each angle, outermost first; `NO_BAP` for none."""
+    axis: Int64
+    """(J, 3) axis that it turns about: 0, 1, 2."""
+    sign: Float64
+    """(J, 3) 1 or -1."""
+    counts: Int64
+    """(J,) how many angles have a BAP."""
+    columns: Int64
+    """(N,) columns of the BAPs, joint by joint."""
+    radians: Float64
+    """(N,) radians of one unit of each."""
+    turns: Int64
+    """(J, 3) index of each angle among the N."""
+    offsets: Float64
+    """(J, 3) `Skeleton.offsets`."""
+    metres: Float64
+    """(3,) metres of one unit of the root's translation."""
+    limits: Float64
+    """(J, 3, 2) lowest and highest angle of a human, radians."""
+
+
+def _make_tables(skeleton: Skeleton, rules: Convention) -> _Tables:
+    count = len(skeleton)
+    bap = np.full((count, 3), NO_BAP, dtype=np.int64)
+    axis = np.tile(np.arange(3, dtype=np.int64), (count, 1))
+    sign = np.ones((count, 3))
+    for row, joint in enumerate(rules.joints):
+        if joint in skeleton:
+            number = skeleton.number(joint)
+            bap[number], axis[number], sign[number] = rules.bap[row], rules.axis[row], rules.sign[row]
+    used = bap != NO_BAP
+    columns = bap[used]
+    turns = np.zeros((count, 3), dtype=np.int64)
+    turns[used] = np.arange(len(columns))
+    limits = np.zeros((count, 3, 2))
+    limits[used] = np.radians(widest_limits())[columns]
+    return _Tables(
+        bap, axis, sign,
+        counts=used.sum(axis=1),
+        columns=columns,
+        radians=sign[used] * pose_loops.UNIT,
+        turns=turns,
+        offsets=skeleton.offsets,
+        metres=rules.translation_sign * pose_loops.MILLIMETRE,
+        limits=limits,
+    )  # fmt: skip
+
+
 class BapSolver:
     """Poses a skeleton by BAPs, and finds the BAPs of a pose.
 
@@ -34,30 +87,12 @@ class BapSolver:
     def __init__(self, skeleton: Skeleton | None = None, axes: str = "iso") -> None:
         self.skeleton = skeleton if skeleton is not None else Skeleton.default()
         self.convention: Convention = convention(axes)
-        rules = self.convention
-        count = len(self.skeleton)
-        self._bap = np.full((count, 3), NO_BAP, dtype=np.int64)
-        self._axis = np.tile(np.arange(3, dtype=np.int64), (count, 1))
-        self._sign = np.ones((count, 3))
-        for row, joint in enumerate(rules.joints):
-            if joint in self.skeleton:
-                number = self.skeleton.number(joint)
-                self._bap[number] = rules.bap[row]
-                self._axis[number] = rules.axis[row]
-                self._sign[number] = rules.sign[row]
-        self.missing = tuple(joint for joint in rules.joints if joint not in self.skeleton)
+        self._tables = _make_tables(self.skeleton, self.convention)
 
-        used = self._bap != NO_BAP
-        self._counts = used.sum(axis=1)
-        self._columns = self._bap[used]
-        self._radians = self._sign[used] * pose_loops.UNIT
-        self._turns = np.zeros((count, 3), dtype=np.int64)
-        self._turns[used] = np.arange(len(self._columns))
-        self._offsets = self.skeleton.offsets
-        self._metres = rules.translation_sign * pose_loops.MILLIMETRE
-        ranges = np.radians(widest_limits())
-        self._limits = np.zeros((count, 3, 2))
-        self._limits[used] = ranges[self._columns]
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Joints of the standard that the skeleton lacks."""
+        return tuple(joint for joint in self.convention.joints if joint not in self.skeleton)
 
     def pose(self, baps: npt.ArrayLike, out: Float64 | None = None) -> Float64:
         """Return joint matrices of a pose: float64 (J, 4, 4) for baps (296,), (T, J, 4, 4) for (T, 296).
@@ -91,9 +126,10 @@ class BapSolver:
             and out.flags.writeable
         ):
             raise ValueError(f"BapSolver.pose: out must be a writeable, C-contiguous float64 array {shape}")
+        tables = self._tables
         pose_loops.pose(
-            np.ascontiguousarray(frames), self.skeleton.parents, self._offsets, self._turns, self._axis,
-            self._radians, self._columns, self._counts, self.convention.translation, self._metres,
+            np.ascontiguousarray(frames), self.skeleton.parents, tables.offsets, tables.turns, tables.axis,
+            tables.radians, tables.columns, tables.counts, self.convention.translation, tables.metres,
             out.reshape(-1),
         )  # fmt: skip
         return out
@@ -133,23 +169,25 @@ class BapSolver:
             wanted[:] = False
             wanted[[self.skeleton.number(name) for name in joints]] = True
         values = np.zeros((len(frames), BAP_COUNT), dtype=np.int32)
+        tables = self._tables
         fits = solver_loops.solve(
-            frames, self.skeleton.parents, self.skeleton.centres[0], self._counts, self._bap, self._axis,
-            self._sign, self.convention.translation, self._metres, wanted, self._angles(previous),
-            self._limits, previous is None, VALUE_LIMIT, values,
+            frames, self.skeleton.parents, self.skeleton.centres[0], tables.counts, tables.bap, tables.axis,
+            tables.sign, self.convention.translation, tables.metres, wanted, self._angles(previous),
+            tables.limits, previous is None, VALUE_LIMIT, values,
         )  # fmt: skip
         if not fits:
             raise ModelError("BapSolver.solve: the pose lies beyond what 32 bits of mm or 1e-5 rad can say")
         return values if array.ndim == 4 else values[0]
 
     def _angles(self, baps: npt.ArrayLike | None) -> Float64:
-        angles = np.zeros(self._bap.shape)
+        columns = self._tables.bap
+        angles = np.zeros(columns.shape)
         if baps is not None:
             values = np.asarray(baps, dtype=np.float64)
             if values.shape != (BAP_COUNT,) or not np.isfinite(values).all():
                 raise ValueError(f"BapSolver.solve: previous must be {BAP_COUNT} finite BAPs")
-            used = self._bap >= 0
-            angles[used] = values[self._bap[used]] * pose_loops.UNIT
+            used = columns >= 0
+            angles[used] = values[columns[used]] * pose_loops.UNIT
         return angles
 
 

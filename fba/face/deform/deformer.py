@@ -6,6 +6,7 @@ ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
 from __future__ import annotations
 
 import threading
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +15,14 @@ from fba.arrays import Float32, Float64, Int64
 from fba.errors import RangeError
 from fba.face.deform.flat_tables import (
     VALUE_MAX,
+    Shifts,
+    Transforms,
     all_vertices,
     bound_points,
     flatten_shifts,
     flatten_transforms,
 )
-from fba.face.deform.normals import build_surface
+from fba.face.deform.normals import Surface, build_surface
 from fba.face.feature_points import names
 from fba.face.model import FaceModel
 from fba.mesh.meshes import result_array
@@ -27,6 +30,32 @@ from fba.parameters import FAP_COUNT, faps
 
 BLOCK = 64
 """Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
+
+
+class _FlatModel(NamedTuple):
+    """The tables of a model as flat arrays for the compiled loops."""
+
+    part_start: Int64
+    """(P + 1,) first vertex of each part, and the number of all."""
+    shifts: Shifts
+    transforms: Transforms
+    surface: Surface
+    point_shifts: Shifts
+    """The shifts of feature points that are bound to vertices."""
+    owner: Int64
+    """(84,) part whose transforms move each feature point, -1 for the head alone."""
+
+
+def _flatten(model: FaceModel) -> _FlatModel:
+    shifts = flatten_shifts(model, all_vertices(model), np.float32)
+    return _FlatModel(
+        part_start=np.cumsum([0, *(len(part.vertices) for part in model.parts)], dtype=np.int64),
+        shifts=shifts,
+        transforms=flatten_transforms(model),
+        surface=build_surface(model, shifts.rows),
+        point_shifts=flatten_shifts(model, bound_points(model), np.float64),
+        owner=_find_owners(model),
+    )
 
 
 class Deformer:
@@ -44,7 +73,7 @@ class Deformer:
     A rotation turns by value x FAPU x amount (radians about each axis), a translation shifts by that
     vector, a scale multiplies each axis by 1 + value x FAPU x amount.
 
-    The constructor copies the model's tables into flat arrays; calls allocate nothing but their result.
+    Making one copies the model's tables into flat arrays; calls allocate nothing but their result.
     Threads that share a Deformer wait for each other; for speed, give each its own.
     Raises ModelError for displacements too large for 32-bit floats.
     """
@@ -54,13 +83,7 @@ class Deformer:
 
         self.model = model
         self._loops = loops
-        sizes = [len(part.vertices) for part in model.parts]
-        self._part_start: Int64 = np.cumsum([0, *sizes], dtype=np.int64)
-        self._shifts = flatten_shifts(model, all_vertices(model), np.float32)
-        self._transforms = flatten_transforms(model)
-        self._surface = build_surface(model, self._shifts.rows)
-        self._point_shifts = flatten_shifts(model, bound_points(model), np.float64)
-        self._owner = _find_owners(model)
+        self._tables = _flatten(model)
         self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts))
         self._lock = threading.Lock()
 
@@ -121,9 +144,9 @@ class Deformer:
             self._loops.points_of_frames(
                 values,
                 self.model.points,
-                self._owner,
-                self._point_shifts,
-                self._transforms,
+                self._tables.owner,
+                self._tables.point_shifts,
+                self._tables.transforms,
                 not local,
                 points,
             )
@@ -133,7 +156,7 @@ class Deformer:
         matrices = np.zeros((len(values), len(self.model.parts) + 1, 4, 4))
         matrices[..., 3, 3] = 1
         top = np.empty((*matrices.shape[:2], 3, 4))
-        self._loops.poses_of_frames(values, self._transforms, top)
+        self._loops.poses_of_frames(values, self._tables.transforms, top)
         matrices[..., :3, :] = top
         return matrices
 
@@ -152,10 +175,10 @@ class Deformer:
                 self._loops.deform_frames(
                     values[start:stop],
                     self.model.vertices,
-                    self._part_start,
-                    self._shifts,
-                    self._transforms,
-                    self._surface,
+                    self._tables.part_start,
+                    self._tables.shifts,
+                    self._tables.transforms,
+                    self._tables.surface,
                     self._scratch,
                     with_head,
                     out_frames[start:stop],

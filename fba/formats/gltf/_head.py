@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Array, Float32, Float64
-from fba.body.head_attachment import HeadOnBody
+from fba.body.head_attachment import AttachedHead, attach_head
 from fba.body.model import BodyModel
 from fba.face.deform.deformer import Deformer
 from fba.face.model import FaceModel, Part, point_row
@@ -42,7 +42,7 @@ class HeadParts:
     deformer: Deformer
     shown: Float32
     all_targets: list[Targets]
-    on: HeadOnBody | None
+    on: AttachedHead | None
     place: Float64
     bound: list[tuple[int, Float64]] = field(default_factory=list)
     fap_joints: list[tuple[FapJoint, dict[int, Float64]]] = field(default_factory=list)
@@ -218,7 +218,7 @@ def start_head(
     if body is not None:
         skull = np.concatenate([np.full(len(p.vertices), p.kind not in BENDING_KINDS) for p in model.parts])
         eyes = model.points[[point_row("3.5"), point_row("3.6")]]
-        on = HeadOnBody(body, model.vertices, eyes, skull)
+        on = attach_head(body, model.vertices, eyes, skull)
     place = np.eye(4) if on is None else on.place
     targets = list(make_targets(model, shown))
     return HeadParts(builder, clip, model, Deformer(model), shown, targets, on, place)

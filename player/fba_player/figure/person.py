@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba.body.head_attachment import HeadOnBody
+from fba.body.head_attachment import AttachedHead, attach_head
 from fba.body.model import BodyModel, BodyPart
 from fba.face.model import Part, point_row
 from fba_player.figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
@@ -34,7 +34,7 @@ class Person:
 
     body: BodyModel
     figure: FaceFigure
-    head: HeadOnBody
+    head: AttachedHead
     body_shapes: dict[str, FaceShape]
     face_shapes: dict[str, FaceShape]
     light: BodyLight
@@ -58,7 +58,7 @@ class Person:
         ]
         pose = self.figure.pose(faps)
         positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
-        self.head.skin(pose.positions, joints, positions, upright=pose.normals, normals=normals)
+        self.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
         light = self.figure.shade(faps, self.frame(joints))
         for name, shape in self.face_shapes.items():
             meshes.append(_mesh_in_world(shape, self.figure.rows(name), positions, normals, light))
@@ -78,14 +78,14 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
     model = figure.model
     skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
     eyes = model.points[[point_row("3.5"), point_row("3.6")]]
-    head = HeadOnBody(body, model.vertices, eyes, skull)
+    head = attach_head(body, model.vertices, eyes, skull)
     left_out = ("head", "neck") if head.brings_neck else ("head",)
     shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts if part.kind not in left_out}
     light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
     return Person(body, figure, head, shapes, _face_shapes(figure, head), light)
 
 
-def _face_shapes(figure: FaceFigure, head: HeadOnBody) -> dict[str, FaceShape]:
+def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]:
     """The face's parts by name, without the triangles that clothes hide."""
     model, shapes = figure.model, {}
     chin = model.points[point_row("2.1")][1]

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fba.body import BapSolver
-from fba.body.head_attachment import HeadOnBody
+from fba.body.head_attachment import attach_head
 from fba.body.importers import import_makehuman
 from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
@@ -78,7 +78,7 @@ def test_its_own_head_continues_its_skin(folder: Path, body: BodyModel) -> None:
     from fba.face.model import point_row
 
     model = import_head(folder)
-    head = HeadOnBody(body, model.vertices, model.points[[point_row("3.5"), point_row("3.6")]])
+    head = attach_head(body, model.vertices, model.points[[point_row("3.5"), point_row("3.6")]])
     assert head.brings_neck
     skin = model.part("skin")
     skin_rows = np.arange(len(skin.vertices))

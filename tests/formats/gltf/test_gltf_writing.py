@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation, Slerp
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.body import BapSolver, Skeleton
-from fba.body.head_attachment import HeadOnBody
+from fba.body.head_attachment import attach_head
 from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
 from fba.face.deform.deformer import Deformer
@@ -183,7 +183,7 @@ def test_every_vertex_is_where_body_and_face_are(written: Path, frame: int) -> N
     skull = np.concatenate(
         [np.full(len(p.vertices), p.kind in ("eye", "teeth", "tongue", "brow", "lash")) for p in face.parts]
     )
-    head = HeadOnBody(body, face.vertices, face.points[[point_row("3.5"), point_row("3.6")]], skull)
+    head = attach_head(body, face.vertices, face.points[[point_row("3.5"), point_row("3.6")]], skull)
     matrices = head.matrices(matrices, move.head_matrices(faps))
     wanted_face = head.skin(move.local(faps), matrices, method="linear")
     wanted_body = body.skin(matrices, method="linear")
