@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,18 @@ from fba.parameters import (
     VISEME_FIELDS,
     VISEME_SELECT_MAX,
 )
+
+_CHUNK = 4096
+"""Frames that are compared at once, so that compact tracks stay so."""
+
+
+class CompactFrames(Protocol):
+    """Frames as a decoder holds them, without what was not sent: a track's arrays are made when asked for."""
+
+    def __len__(self) -> int: ...
+
+    def array(self, name: str, frames: slice) -> Array | None:
+        """Return the field `name` of the track for these frames, as the track describes it."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -43,6 +55,13 @@ class FaceTrack:
     viseme: Int16 = None  # type: ignore[assignment]
     expression: Int16 = None  # type: ignore[assignment]
     interpolated: Bool | None = None
+    _compact: tuple[CompactFrames, range] | None = field(default=None, init=False, repr=False)
+
+    if not TYPE_CHECKING:  # or it would accept any attribute
+
+        def __getattr__(self, name: str) -> Array | None:
+            """Return a field that is asked for the first time."""
+            return _fill_in(self, name)
 
     def __post_init__(self) -> None:
         values, mask = _check_values(self.values, self.mask, FAP_COUNT, "FaceTrack")
@@ -98,9 +117,11 @@ class FaceTrack:
         )
 
     def __len__(self) -> int:
-        return len(self.values)
+        return len(self._compact[1]) if self._compact is not None else len(self.values)
 
     def __getitem__(self, frames: slice) -> FaceTrack:
+        if self._compact is not None:
+            return compact_track(FaceTrack, self._compact[0], self._compact[1][frames])
         names = ("values", "mask", "viseme", "expression")
         arrays = {name: getattr(self, name)[frames] for name in names}
         return trusted(
@@ -112,12 +133,7 @@ class FaceTrack:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FaceTrack):
             return NotImplemented
-        return (
-            np.array_equal(self.mask, other.mask)
-            and np.array_equal(self.values, other.values)
-            and np.array_equal(self.viseme, other.viseme)
-            and np.array_equal(self.expression, other.expression)
-        )
+        return _equal(self, other, ("mask", "values", "viseme", "expression"))
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -134,6 +150,13 @@ class BodyTrack:
 
     values: Int32
     mask: Bool
+    _compact: tuple[CompactFrames, range] | None = field(default=None, init=False, repr=False)
+
+    if not TYPE_CHECKING:  # or it would accept any attribute
+
+        def __getattr__(self, name: str) -> Array | None:
+            """Return a field that is asked for the first time."""
+            return _fill_in(self, name)
 
     def __post_init__(self) -> None:
         values, mask = _check_values(self.values, self.mask, BAP_COUNT, "BodyTrack")
@@ -157,15 +180,17 @@ class BodyTrack:
         return cls(_stack([t.values for t in tracks]), _stack([t.mask for t in tracks]))
 
     def __len__(self) -> int:
-        return len(self.values)
+        return len(self._compact[1]) if self._compact is not None else len(self.values)
 
     def __getitem__(self, frames: slice) -> BodyTrack:
+        if self._compact is not None:
+            return compact_track(BodyTrack, self._compact[0], self._compact[1][frames])
         return trusted(BodyTrack, values=self.values[frames], mask=self.mask[frames])
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, BodyTrack):
             return NotImplemented
-        return np.array_equal(self.mask, other.mask) and np.array_equal(self.values, other.values)
+        return _equal(self, other, ("mask", "values"))
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -176,8 +201,39 @@ Track = TypeVar("Track", FaceTrack, BodyTrack)
 def trusted(kind: type[Track], **arrays: Array | None) -> Track:
     """Return a track without checking its arrays, for arrays that are known to be valid."""
     track: Track = object.__new__(kind)
-    freeze(track, **arrays)
+    freeze(track, _compact=None, **arrays)
     return track
+
+
+def compact_track(kind: type[Track], source: CompactFrames, frames: range) -> Track:
+    """Return a track of these frames of the source, whose arrays are made when they are asked for."""
+    track: Track = object.__new__(kind)
+    object.__setattr__(track, "_compact", (source, frames))
+    return track
+
+
+def _fill_in(track: FaceTrack | BodyTrack, name: str) -> Array | None:
+    """Return a field that a compact track does not hold yet, and store it."""
+    if name.startswith("_") or name not in track.__slots__:
+        raise AttributeError(f"{type(track).__name__!r} object has no attribute {name!r}")
+    assert track._compact is not None
+    source, frames = track._compact
+    array = source.array(name, slice(frames.start, frames.stop, frames.step))
+    freeze(track, **{name: array})
+    return array
+
+
+def _equal(one: Track, other: Track, names: tuple[str, ...]) -> bool:
+    """Whether tracks have equal fields of these names; compact tracks stay compact."""
+    count = len(one)
+    if count != len(other):
+        return False
+    for start in range(0, count, _CHUNK):
+        frames = slice(start, start + _CHUNK)
+        parts = one[frames], other[frames]
+        if not all(np.array_equal(getattr(parts[0], name), getattr(parts[1], name)) for name in names):
+            return False
+    return True
 
 
 def _check_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:

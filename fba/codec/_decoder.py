@@ -11,11 +11,11 @@ from typing import Literal
 from fba.animation import Animation, Frame
 from fba.codec._buffer import Buffer
 from fba.codec._clock import StreamClock
-from fba.codec._plane import loops, slots, syntax
+from fba.codec._compact_buffer import CompactBuffer
+from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec.block import Block
-from fba.codec.frame_buffer import FrameBuffer
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEP_TABLES
@@ -290,20 +290,18 @@ class Decoder:
             self._doubtful.extend(borders[-1 - _DOUBTFUL : -1].tolist())  # after start codes
         if self._code_bit is not None:
             borders[0] = self._code_bit
-        face, body = settings.face, settings.body
         start = clock.time
         block = Block(
             index=clock.advance(planes.skips),
             start=start,
             rate=clock.rate,
-            face=slots.face_track(planes.rows, face.mask, syntax.interpolated(face))
-            if face is not None
-            else None,
-            body=slots.body_track(planes.rows, body.mask) if body is not None else None,
             number=self.planes,
             borders=borders,
-            skips=planes.skips.copy(),
+            skips=planes.skips,
             settings=settings,
+            parts=planes.parts,
+            rows=planes.rows,
+            columns=planes.columns,
         )
         self.planes += len(planes.skips)
         self._bit = int(planes.borders[-1])
@@ -391,7 +389,7 @@ def decode(
     """
     view = memoryview(data)
     decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
-    frames = FrameBuffer(in_place=True, limits=limits, source=len(view))
+    frames = CompactBuffer(limits, len(view))
     for start in range(0, len(view), _CHUNK):
         for block in decoder.push_blocks(view[start : start + _CHUNK]):
             frames.add(block)
@@ -404,4 +402,4 @@ def decode(
     if not frames.frames:
         error = decoder.damage[0].error if decoder.damage else None
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error
-    return frames.decoded().animation()
+    return frames.animation()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fba.arrays import Array, Bool
+from fba.arrays import Array, Bool, Int64
 
 
 class Rows:
@@ -15,13 +15,13 @@ class Rows:
     """
 
     def __init__(
-        self, shape: tuple[int, ...], dtype: type[np.generic], count: int = 0, *, in_place: bool
+        self, shape: tuple[int, ...], dtype: type[np.generic], count: int = 0, *, in_place: bool = False
     ) -> None:
         self.count = count
         self._in_place = in_place
         self._array: Array = np.zeros((count, *shape), dtype=dtype)
 
-    def append(self, rows: Array | bool | None, count: int) -> None:
+    def append(self, rows: Array | int | None, count: int) -> None:
         """Append `count` rows: those given, one value for all of them, or zeros."""
         need = self.count + count
         if need > len(self._array):
@@ -29,6 +29,24 @@ class Rows:
         if rows is not None:
             self._array[self.count : need] = rows
         self.count = need
+
+    @property
+    def width(self) -> int:
+        """Number of columns of an array of rows."""
+        return int(self._array.shape[1])
+
+    def append_columns(self, rows: Array, columns: Int64 | slice) -> None:
+        """Append rows, of which only these columns are given; the others are zeros."""
+        first = self.count
+        self.append(None, len(rows))
+        if rows.shape[1]:
+            self._array[first : self.count, columns] = rows
+
+    def widen(self, width: int) -> None:
+        """Add columns of zeros up to this number."""
+        wider = np.zeros((len(self._array), width), dtype=self._array.dtype)
+        wider[:, : self.width] = self._array
+        self._array = wider
 
     def view(self) -> Array:
         """Return all rows, read-only, without a copy."""
@@ -49,28 +67,27 @@ class Rows:
             self._array = larger
 
 
-class Masks:
-    """Masks bool (T, columns); stored as one row until a block has another, which is rare."""
+class GrowingMasks:
+    """Masks bool (T, columns) that grow; stored as one row until there is another, which is rare."""
 
-    def __init__(self, columns: int, count: int, *, in_place: bool) -> None:
+    def __init__(self, columns: int, count: int) -> None:
         self.any = False
         """Whether a bit is set anywhere."""
-        self._in_place = in_place
         self._row: Bool = np.zeros(columns, dtype=np.bool_)
         self._count = count
         self._rows: Rows | None = None
 
     def append(self, mask: Bool | None, count: int) -> None:
-        """Append a row, bool (columns,), `count` times; None for zeros."""
-        row = mask if mask is not None else np.zeros_like(self._row)
-        self.any = self.any or bool(row.any())
-        if not self._count:
-            self._row = row
-        elif self._rows is None and not np.array_equal(row, self._row):
-            self._rows = Rows(self._row.shape, np.bool_, in_place=self._in_place)
+        """Append a row (columns,) `count` times, or rows (count, columns); None for zeros."""
+        new = mask if mask is not None else np.zeros_like(self._row)
+        self.any = self.any or bool(new.any())
+        if not self._count and new.ndim == 1:
+            self._row = new
+        elif self._rows is None and (new.ndim > 1 or not np.array_equal(new, self._row)):
+            self._rows = Rows(self._row.shape, np.bool_)
             self._rows.append(self._row, self._count)
         if self._rows is not None:
-            self._rows.append(row, count)
+            self._rows.append(new, count)
         self._count += count
 
     def view(self) -> Bool:

@@ -37,10 +37,10 @@ class TimeBase:
     have integer indices; beyond `COMMON_RATE_MAX`, it is the highest of the stream's rates, and times are
     rounded to the nearest frame. The result does not depend on how planes are divided into blocks.
 
-    in_place: see `fba.codec.frame_buffer.FrameBuffer`.
+    in_place: see `fba.codec._rows.Rows`; `index` may then be called only once, at the end.
     """
 
-    def __init__(self, *, in_place: bool) -> None:
+    def __init__(self, *, in_place: bool = False) -> None:
         self._in_place = in_place
         self._runs: list[_Run] = []
         self._rates: set[Fraction] = set()

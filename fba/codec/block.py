@@ -3,49 +3,110 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
 
 from fba.animation import BodyTrack, FaceTrack, Frame
-from fba.arrays import Int64
+from fba.arrays import Bool, Int32, Int64, UInt8
+from fba.codec._coded_frames import CodedFrames, Masks
+from fba.codec._plane import slots, syntax
 from fba.codec.settings import PlaneInfo, PlaneSettings
 
 
 @dataclass(frozen=True)
 class Block:
-    """Consecutive planes that share their settings.
+    """Consecutive planes that share their settings: an I plane, or P planes behind one.
 
     index: int64 (T,); frame t is shown at start + (index[t] - index[0]) / rate seconds. number: that of the
     first plane. borders: int64 (T + 1,), absolute bit positions of the planes, and the end of the last.
     skips: int64 (T,).
+
+    parts: uint8 (T,), fba_object_mask of each plane. settings: those of a plane with all parts that planes
+    of the block carry. rows: int32 (T, K), the values of columns (K,), which are numbers of slots; 0 where a
+    plane lacks the part. `face` and `body` are made from them when they are asked for; a frame without the
+    part sends nothing.
     """
 
     index: Int64
     start: Fraction
     rate: Fraction
-    face: FaceTrack | None
-    body: BodyTrack | None
     number: int
     borders: Int64
     skips: Int64
     settings: PlaneSettings
+    parts: UInt8
+    rows: Int32
+    columns: Int64
+
+    @cached_property
+    def face(self) -> FaceTrack | None:
+        """The FAPs of all frames; None if no plane carries any."""
+        settings = self.settings.face
+        if settings is None:
+            return None
+        interpolated = syntax.interpolated(settings)
+        return CodedFrames(
+            slots.FACE_BIT,
+            self.rows,
+            self._places,
+            self._masks(slots.FACE_BIT, settings.mask),
+            None if interpolated is None else self._masks(slots.FACE_BIT, interpolated),
+        ).face()
+
+    @cached_property
+    def body(self) -> BodyTrack | None:
+        """The BAPs of all frames; None if no plane carries any."""
+        settings = self.settings.body
+        if settings is None:
+            return None
+        mask = self._masks(slots.BODY_BIT, settings.mask)
+        return CodedFrames(slots.BODY_BIT, self.rows, self._places, mask).body()
+
+    @cached_property
+    def same_parts(self) -> bool:
+        """Whether all planes carry the same parts."""
+        return len(self.parts) == 1 or bool((self.parts == self.parts[0]).all())
+
+    @cached_property
+    def _places(self) -> Int64:
+        """int64 (slots,): the column of each slot, -1 where there is none."""
+        places = np.full(slots.SLOTS, -1, dtype=np.int64)
+        places[self.columns] = np.arange(len(self.columns))
+        return places
+
+    def _masks(self, part: int, mask: Bool) -> Masks:
+        """Return the masks of all frames, empty where a plane lacks the part."""
+        if self.same_parts:
+            return Masks(mask[None])
+        return Masks(np.stack([np.zeros_like(mask), mask]), (self.parts & part != 0).astype(np.uint8))
 
     def frames(self) -> Iterator[Frame]:
         """Yield the frames one by one."""
+        whole = self.settings
+        parts, skips, borders = self.parts.tolist(), self.skips.tolist(), self.borders.tolist()
         for position, index in enumerate(self.index.tolist()):
             frame = slice(position, position + 1)
-            bit, after = int(self.borders[position]), int(self.borders[position + 1])
-            settings = replace(
-                self.settings,
-                face_frame=None if self.settings.face is None else index,
-                body_frame=None if self.settings.body is None else index,
-                skip=int(self.skips[position]),
-                start_code=self.settings.start_code and position == 0,
+            face = self.face if parts[position] & slots.FACE_BIT else None
+            body = self.body if parts[position] & slots.BODY_BIT else None
+            settings = PlaneSettings(
+                intra=whole.intra,
+                face_frame=None if face is None else index,
+                body_frame=None if body is None else index,
+                face=None if face is None else whole.face,
+                body=None if body is None else whole.body,
+                frame_rate=whole.frame_rate,
+                time_code=whole.time_code,
+                skip=skips[position],
+                start_code=whole.start_code and position == 0,
             )
+            bit, after = borders[position], borders[position + 1]
             yield Frame(
                 index,
                 self.rate,
-                self.face[frame] if self.face is not None else None,
-                self.body[frame] if self.body is not None else None,
+                face[frame] if face is not None else None,
+                body[frame] if body is not None else None,
                 PlaneInfo(self.number + position, bit, after - bit, settings),
             )

@@ -1,4 +1,4 @@
-"""Join decoded blocks: for `decode`, at the end of a stream, and for live streams, at any time."""
+"""Join the blocks of a live stream, at any time."""
 
 from __future__ import annotations
 
@@ -10,15 +10,11 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Array, Bool, Int64
-from fba.codec._rows import Masks, Rows
+from fba.codec._rows import GrowingMasks, Rows
 from fba.codec._time_base import TimeBase
 from fba.codec.block import Block
-from fba.limits import Limits
 from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS
 from fba.tracks import trusted
-
-_PARAMETER_BYTES = 5
-"""Memory of a parameter in a frame: an int32 and a bool."""
 
 
 @dataclass(frozen=True)
@@ -45,22 +41,17 @@ class DecodedFrames:
 class FrameBuffer:
     """Collects decoded blocks in stream order; `decoded` returns all their frames without a copy.
 
-    in_place: arrays grow in place, which needs less memory; `decoded` may then be called only once, at the
-    end. Otherwise arrays that it returned do not change when more blocks come. frames: their number.
-    limits: LimitError for more frames or memory. source: bytes of the stream.
+    Arrays that it returned do not change when more blocks come. frames: their number.
     left_out: "a face" or "a body" if one came only after `fix_parts`, else "".
     """
 
-    def __init__(self, *, in_place: bool = False, limits: Limits | None = None, source: int = 0) -> None:
+    def __init__(self) -> None:
         self.frames = 0
         self.left_out = ""
-        self._in_place = in_place
-        self._limits = limits
-        self._source = source
         self._parts_fixed = False
-        self._times = TimeBase(in_place=in_place)
-        self._bits = Rows((), np.int64, in_place=in_place)
-        self._intra = Rows((), np.bool_, in_place=in_place)
+        self._times = TimeBase()
+        self._bits = Rows((), np.int64)
+        self._intra = Rows((), np.bool_)
         self._face: dict[str, Any] = {}
         self._body: dict[str, Any] = {}
 
@@ -73,20 +64,18 @@ class FrameBuffer:
         count = len(block.index)
         if not count:
             return
-        if self._limits is not None:
-            self._check_limits(self._limits, count)
         if block.face is not None and not self._face and self._accepts("a face"):
             self._face = {
                 "values": self._rows(FAP_COUNT, np.int32),
-                "mask": Masks(FAP_COUNT, self.frames, in_place=self._in_place),
+                "mask": GrowingMasks(FAP_COUNT, self.frames),
                 "viseme": self._rows(len(VISEME_FIELDS), np.int16),
                 "expression": self._rows(len(EXPRESSION_FIELDS), np.int16),
-                "interpolated": Masks(FAP_COUNT, self.frames, in_place=self._in_place),
+                "interpolated": GrowingMasks(FAP_COUNT, self.frames),
             }
         if block.body is not None and not self._body and self._accepts("a body"):
             self._body = {
                 "values": self._rows(BAP_COUNT, np.int32),
-                "mask": Masks(BAP_COUNT, self.frames, in_place=self._in_place),
+                "mask": GrowingMasks(BAP_COUNT, self.frames),
             }
         self._times.add(block.index, block.start, block.rate)
         self._bits.append(np.diff(block.borders), count)
@@ -94,8 +83,8 @@ class FrameBuffer:
         for fields, track in ((self._face, block.face), (self._body, block.body)):
             for name, field in fields.items():
                 rows: Array | None = getattr(track, name) if track is not None else None
-                if rows is not None and isinstance(field, Masks):
-                    rows = rows[0]  # a block has one mask for all of its frames
+                if rows is not None and isinstance(field, GrowingMasks) and block.same_parts:
+                    rows = rows[0]
                 field.append(rows, count)
         self.frames += count
 
@@ -114,13 +103,6 @@ class FrameBuffer:
             self._intra.view(),
         )
 
-    def _check_limits(self, limits: Limits, count: int) -> None:
-        """Raise LimitError if there is no room for `count` frames more."""
-        frames = self.frames + count
-        limits.check_frames(frames, "the stream")
-        columns = FAP_COUNT * bool(self._face) + BAP_COUNT * bool(self._body)
-        limits.check_bytes(frames * columns * _PARAMETER_BYTES, "the decoded stream", source=self._source)
-
     def _accepts(self, part: str) -> bool:
         """Whether a new part may be added; otherwise set `left_out`."""
         if self._parts_fixed:
@@ -129,4 +111,4 @@ class FrameBuffer:
 
     def _rows(self, columns: int, dtype: type[np.generic]) -> Rows:
         """Return rows of zeros for all frames so far."""
-        return Rows((columns,), dtype, self.frames, in_place=self._in_place)
+        return Rows((columns,), dtype, self.frames)

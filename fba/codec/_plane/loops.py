@@ -19,8 +19,8 @@ from fba.compiled import compiled
 # Why a run of planes ended; 0 to 3 are those of the arithmetic coder.
 INTRA = 4
 """An I plane comes next."""
-OTHER_MASK = 5
-"""A P plane with another fba_object_mask comes next."""
+MISSING_PART = 5
+"""A P plane comes next that carries a part without settings."""
 START_CODE = 6
 BAD_MASK = 7
 """fba_object_mask 0."""
@@ -51,6 +51,18 @@ class Layout(NamedTuple):
 
     order: Int64
     segments: Int64
+
+
+class Layouts(NamedTuple):
+    """Layouts of planes with FAPs, with BAPs, and with both: those of both are the FAPs', then the BAPs'.
+
+    available: the parts, added up, that planes can carry. A layout of others is empty.
+    """
+
+    available: int
+    face: Layout
+    body: Layout
+    both: Layout
 
 
 class Coding(NamedTuple):
@@ -253,25 +265,26 @@ def decode_run(
     bit: int,
     end: int,
     after_code: bool,
-    object_mask: int,
-    layout: Layout,
+    layouts: Layouts,
     coding: Coding,
     rows: Int32,
+    parts: UInt8,
     skips: Int64,
     borders: Int64,
 ) -> tuple[int, int, int, int]:
     """Decode P planes from `bit` on until something else comes; return (planes, status, bit, place).
 
-    after_code: a start code ends at `bit`. Fills rows[t] (columns: see `slots`; only coded ones are written),
-    skips[t], borders[t] (first bit) and borders[t + 1].
+    after_code: a start code ends at `bit`. Fills rows[t] (columns: the slots of layouts.both, then the flags;
+    0 where a plane lacks the part), parts[t] (fba_object_mask), skips[t], borders[t] (first bit) and
+    borders[t + 1].
 
     planes: how many were decoded. status: OK if rows are full, else why the run ended. bit: after the last
     complete plane. place: the bit, or slot, at which the next plane failed. A plane that fails does not
     change models and `last`.
     """
-    order = layout.order
-    symbols = np.zeros(len(order), np.int64)
-    values = np.zeros(len(order), np.int64)
+    width = len(layouts.both.order)
+    symbols = np.zeros(width, np.int64)
+    values = np.zeros(width, np.int64)
     flags = np.zeros(3, np.int64)
     count = 0
     borders[0] = bit
@@ -286,8 +299,15 @@ def decode_run(
         mask = 2 * read_bit(data, bit + 1) + read_bit(data, bit + 2)
         if mask == 0:
             return count, BAD_MASK, bit, bit + 1
-        if mask != object_mask:
-            return count, OTHER_MASK, bit, bit
+        if mask & layouts.available != mask:
+            return count, MISSING_PART, bit, bit
+        layout = layouts.both
+        first = 0
+        if mask == slots.FACE_BIT:
+            layout = layouts.face
+        elif mask == slots.BODY_BIT:
+            layout = layouts.body
+            first = len(layouts.face.order)
         place = bit + 4
         skip = 0
         if read_bit(data, bit + 3):
@@ -297,13 +317,16 @@ def decode_run(
         status, place = decode_values(data, place, end, layout, coding, True, symbols, values, flags)
         if status != OK:
             return count, status, bit, place
+        order = layout.order
         learn(order, symbols, coding.models)
+        if len(order) < width:
+            rows[count] = 0
         for position in range(len(order)):
-            slot = int(order[position])
-            coding.last[slot] = values[position]
-            rows[count, slot] = values[position]
-        for flag in range(3):
-            rows[count, FIRST_FLAG + flag] = flags[flag]
+            coding.last[int(order[position])] = values[position]
+            rows[count, first + position] = values[position]
+        for flag in range(rows.shape[1] - width):
+            rows[count, width + flag] = flags[flag]
+        parts[count] = mask
         skips[count] = skip
         bit = place
         count += 1

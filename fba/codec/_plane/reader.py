@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Int32, Int64, UInt8
+from fba.arrays import Bool, Int32, Int64, UInt8
 from fba.codec._plane import loops, slots, syntax
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, OutOfDataError
 from fba.codec._plane.coder_state import Models
-from fba.codec._plane.loops import Layout
+from fba.codec._plane.loops import Layout, Layouts
 from fba.codec.settings import FrameRate, PartSettings, PlaneSettings
 from fba.errors import BitstreamError, UnsupportedError
 
@@ -22,16 +22,45 @@ _PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
 
 @dataclass(frozen=True)
 class Planes:
-    """Planes that share their settings.
+    """An I plane, or P planes behind one; see `fba.codec.Block` for rows, columns, parts and settings.
 
-    rows: int32 (T, columns), values, see `slots`. borders: int64 (T + 1,), first bit of each plane, and the
-    bit after the last. skips: int64 (T,). The next call of the reader overwrites the arrays.
+    borders: int64 (T + 1,), first bit of each plane, and the bit after the last. skips: int64 (T,).
     """
 
     rows: Int32
+    columns: Int64
+    parts: UInt8
     borders: Int64
     skips: Int64
     settings: PlaneSettings
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What decoding P planes needs besides the models: layouts, and rows for values of columns (K,)."""
+
+    layouts: Layouts
+    columns: Int64
+    rows: Int32
+
+    @classmethod
+    def prepare(cls, settings: dict[int, PartSettings]) -> _Run:
+        """Return layouts and room for planes with these settings of each part."""
+        masks = [settings[part].mask if part in settings else None for part, _ in _PARTS]
+        layouts = Layouts(
+            sum(settings),
+            Layout(*slots.coding_order(masks[0], None)),
+            Layout(*slots.coding_order(None, masks[1])),
+            Layout(*slots.coding_order(*masks)),
+        )
+        columns = _columns(layouts.both.order, masks[0])
+        return cls(layouts, columns, np.zeros((_RUN, len(columns)), dtype=np.int32))
+
+
+def _columns(order: Int64, face_mask: Bool | None) -> Int64:
+    """Return the columns of rows for slots in this order: those, and the flags if there are any."""
+    flags = face_mask is not None and face_mask[:2].any()
+    return np.append(order, np.arange(slots.FLAGS.start, slots.FLAGS.stop)) if flags else order
 
 
 class PlaneReader:
@@ -45,9 +74,8 @@ class PlaneReader:
         self._models = Models(bap_table)
         self._models_used = False
         self._settings: dict[int, PartSettings] = {}
-        self._layouts: dict[int, Layout] = {}
-        self._rows = np.zeros((0, 0), dtype=np.int32)
-        self._rows_layout: Layout | None = None
+        self._run: _Run | None = None  # for P planes with these settings, once there are any
+        self._parts = np.zeros(_RUN, dtype=np.uint8)
         self._skips = np.zeros(_RUN, dtype=np.int64)
         self._borders = np.zeros(_RUN + 1, dtype=np.int64)
 
@@ -61,7 +89,7 @@ class PlaneReader:
     def forget_values(self) -> None:
         """Reset settings after damage: P planes are errors until the next I plane."""
         self._settings.clear()
-        self._layouts.clear()
+        self._run = None
 
     def read(self, data: UInt8, bit: int, end: int, *, after_code: bool) -> Planes | None:
         """Return the plane at `bit` and the P planes that follow it; None if none is complete.
@@ -82,24 +110,30 @@ class PlaneReader:
         frame_rate = _read_frame_rate(reader)
         time_code = syntax.read_time_code(reader) if reader.read(1) else None
         skip = syntax.read_skip(reader)
-        row = np.zeros((1, slots.row_width(body=bool(mask & slots.BODY_BIT))), dtype=np.int32)
         settings: dict[int, PartSettings] = {}
+        flags = np.zeros(3, dtype=np.int64)
         decoded: list[tuple[Int64, Int64]] = []
         for part, name in _PARTS:
             if mask & part:
                 settings[part] = self._read_part(reader, part, name)
-                decoded.append(self._read_intra_values(reader, part, settings[part], row))
+                decoded.append(self._read_intra_values(reader, part, settings[part], flags))
         for order, values in decoded:
             self._models.last[order] = values
+        face = settings.get(slots.FACE_BIT)
+        order = np.concatenate([order for order, _ in decoded])
+        columns = _columns(order, face.mask if face is not None else None)
+        row = np.concatenate([*(values for _, values in decoded), flags])[: len(columns)].astype(np.int32)
         self._settings.update(settings)
-        self._layouts.clear()
+        self._run = None
         return Planes(
-            row,
+            row[None],
+            columns,
+            np.array([mask], dtype=np.uint8),
             np.array([start, reader.bit], dtype=np.int64),
             np.array([skip], dtype=np.int64),
             PlaneSettings(
                 intra=True,
-                face=settings.get(slots.FACE_BIT),
+                face=face,
                 body=settings.get(slots.BODY_BIT),
                 frame_rate=frame_rate,
                 time_code=time_code,
@@ -129,26 +163,25 @@ class PlaneReader:
         return settings
 
     def _read_intra_values(
-        self, reader: BitReader, part: int, settings: PartSettings, row: Int32
+        self, reader: BitReader, part: int, settings: PartSettings, flags: Int64
     ) -> tuple[Int64, Int64]:
-        """Return slots (K,) and values (K,) of a part in an I plane; also write row (1, columns)."""
+        """Return slots (K,) and values (K,) of a part in an I plane; also write flags (3,)."""
         face = part == slots.FACE_BIT
         layout = Layout(*slots.coding_order(settings.mask if face else None, None if face else settings.mask))
         symbols, values = np.zeros_like(layout.order), np.zeros_like(layout.order)
-        flags = np.zeros(3, dtype=np.int64)
+        own_flags = np.zeros(3, dtype=np.int64)
         coding = self._models.intra
         status, place = loops.decode_values(
-            reader.data, reader.bit, reader.end, layout, coding, False, symbols, values, flags
+            reader.data, reader.bit, reader.end, layout, coding, False, symbols, values, own_flags
         )
         self._check(status, place, reader.bit)
         reader.bit = place
-        row[0, layout.order] = values
         if face:
-            row[0, slots.FLAGS] = flags
+            flags[:] = own_flags
         return layout.order, values
 
     def _read_predicted(self, reader: BitReader, after_code: bool) -> Planes | None:
-        """Read a run of P planes with the same fba_object_mask; None if the first is incomplete."""
+        """Read a run of P planes; None if the first is incomplete."""
         start = reader.bit - 1
         mask = _read_object_mask(reader)
         for part, name in _PARTS:
@@ -157,30 +190,32 @@ class PlaneReader:
                     f"a P plane carries {name}, but no I plane with {name} came before it in this object",
                     bit=start,
                 )
-        face = self._settings[slots.FACE_BIT] if mask & slots.FACE_BIT else None
-        body = self._settings[slots.BODY_BIT] if mask & slots.BODY_BIT else None
-        if mask not in self._layouts:
-            self._layouts[mask] = Layout(
-                *slots.coding_order(
-                    face.mask if face is not None else None, body.mask if body is not None else None
-                )
-            )
-        layout = self._layouts[mask]
-        if self._rows_layout is not layout:
-            self._rows_layout = layout
-            width = slots.row_width(body=body is not None)
-            self._rows = np.zeros(
-                (_RUN, width), dtype=np.int32
-            )  # slots that this layout does not code stay 0
+        if self._run is None:
+            self._run = _Run.prepare(self._settings)
+        run = self._run
         count, status, _, place = loops.decode_run(
-            reader.data, start, reader.end, after_code, mask, layout, self._models.predicted,
-            self._rows, self._skips, self._borders,
+            reader.data, start, reader.end, after_code, run.layouts, self._models.predicted,
+            run.rows, self._parts, self._skips, self._borders,
         )  # fmt: skip
         if count == 0:
             self._check(status, place, start)
             return None
-        settings = PlaneSettings(intra=False, face=face, body=body, start_code=after_code)
-        return Planes(self._rows[:count], self._borders[: count + 1], self._skips[:count], settings)
+        parts = self._parts[:count].copy()
+        carried = int(np.bitwise_or.reduce(parts))
+        settings = PlaneSettings(
+            intra=False,
+            face=self._settings[slots.FACE_BIT] if carried & slots.FACE_BIT else None,
+            body=self._settings[slots.BODY_BIT] if carried & slots.BODY_BIT else None,
+            start_code=after_code,
+        )
+        return Planes(
+            run.rows[:count].copy(),
+            run.columns,
+            parts,
+            self._borders[: count + 1].copy(),
+            self._skips[:count].copy(),
+            settings,
+        )
 
     def _check(self, status: int, place: int, start: int) -> None:
         """Raise the error for the status of a compiled loop. place: a bit, or a slot for OUT_OF_RANGE."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from fba.animation import BodyTrack, FaceTrack
 from fba.arrays import Bool, Int32, Int64
-from fba.parameters import BAP_COUNT, EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, bap_groups, baps, faps
+from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, bap_groups, baps, faps
 
 VISEME = slice(0, 3)
 EXPRESSION = slice(3, 7)
@@ -106,28 +106,3 @@ def track_rows(face: FaceTrack | None, body: BodyTrack | None) -> Int32:
     if body is not None:
         result[:, BAPS] = body.values
     return result
-
-
-def face_track(rows: Int32, mask: Bool, interpolated: Bool | None) -> FaceTrack:
-    """Return the face track of rows (T, columns). mask, interpolated: (68,), the same for all frames."""
-    count = len(rows)
-    values = np.zeros((count, FAP_COUNT), dtype=np.int32)
-    values[:, 2:] = rows[:, FAPS]
-    viseme = np.zeros((count, len(VISEME_FIELDS)), dtype=np.int16)
-    viseme[:, :3] = rows[:, VISEME]
-    viseme[:, 3] = rows[:, VISEME_DEF]
-    expression = np.zeros((count, len(EXPRESSION_FIELDS)), dtype=np.int16)
-    expression[:, :4] = rows[:, EXPRESSION]
-    expression[:, 4:] = rows[:, INIT_FACE : FLAGS.stop]
-    for array in (values, viseme, expression):
-        array.flags.writeable = False
-    shape = (count, FAP_COUNT)
-    interpolated_rows = np.broadcast_to(interpolated, shape) if interpolated is not None else None
-    return FaceTrack(values, np.broadcast_to(mask, shape), viseme, expression, interpolated_rows)
-
-
-def body_track(rows: Int32, mask: Bool) -> BodyTrack:
-    """Return the body track of rows (T, columns). mask: (296,), the same for all frames."""
-    values = rows[:, BAPS].copy()
-    values.flags.writeable = False
-    return BodyTrack(values, np.broadcast_to(mask, (len(rows), BAP_COUNT)))

@@ -1,0 +1,125 @@
+"""Join the blocks of a whole stream, without what was not sent: for `decode`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Array, Bool, Int64
+from fba.codec._coded_frames import CodedFrames, Masks
+from fba.codec._plane import slots, syntax
+from fba.codec._rows import Rows
+from fba.codec._time_base import TimeBase
+from fba.codec.block import Block
+from fba.codec.settings import PartSettings
+from fba.limits import Limits
+from fba.parameters import BAP_COUNT, FAP_COUNT
+
+_FRAME_BYTES = 16
+"""Memory of a frame besides its values: its index, and the number of its masks."""
+_MASKS_BYTES = 1000
+"""Memory of a set of masks, with its key."""
+
+
+class CompactBuffer:
+    """Collects decoded blocks in stream order; `animation` returns all their frames, once, at the end.
+
+    Columns are stored for slots that were sent, and each set of masks once. limits: LimitError beyond them.
+    source: bytes of the stream. frames: their number.
+    """
+
+    def __init__(self, limits: Limits, source: int) -> None:
+        self.frames = 0
+        self._limits = limits
+        self._source = source
+        self._times = TimeBase(in_place=True)
+        self._places = np.full(slots.SLOTS, -1, dtype=np.int64)
+        self._rows = Rows((0,), np.int32, in_place=True)
+        self._kinds = Rows((), np.int32, in_place=True)  # which of `_masks` a frame has
+        self._masks: list[tuple[Bool, Bool | None, Bool]] = []  # FAPs, those to be interpolated, BAPs
+        self._kind_of: dict[tuple[bytes, bytes, bytes], int] = {}
+        self._parts = 0
+        self._known: tuple[Int64 | None, Int64 | slice] = None, slice(0)  # result of `_columns`
+
+    def add(self, block: Block) -> None:
+        """Append the frames of a block."""
+        count = len(block.index)
+        columns = self._columns(block.columns)
+        self._check_limits(count)
+        self._times.add(block.index, block.start, block.rate)
+        self._rows.append_columns(block.rows, columns)
+        if block.same_parts:
+            self._kinds.append(self._kind(block, int(block.parts[0])), count)
+        else:
+            kinds = np.zeros(4, dtype=np.int32)
+            for parts in np.unique(block.parts).tolist():
+                kinds[parts] = self._kind(block, parts)
+            self._kinds.append(kinds[block.parts], count)
+        self.frames += count
+
+    def animation(self) -> Animation:
+        """Return all frames. ValueError without frames."""
+        if not self.frames:
+            raise ValueError("there is no frame to make an animation of")
+        rows, kinds = self._rows.view(), self._kinds.view()
+        face = body = None
+        if self._parts & slots.FACE_BIT:
+            mask = _masks([face for face, _, _ in self._masks], kinds)
+            asked = [wanted for _, wanted, _ in self._masks]
+            wanted = [np.zeros(FAP_COUNT, dtype=bool) if row is None else row for row in asked]
+            interpolated = _masks(wanted, kinds) if any(row is not None for row in asked) else None
+            face = CodedFrames(slots.FACE_BIT, rows, self._places, mask, interpolated).face()
+        if self._parts & slots.BODY_BIT:
+            mask = _masks([body for _, _, body in self._masks], kinds)
+            body = CodedFrames(slots.BODY_BIT, rows, self._places, mask).body()
+        return Animation(self._times.rate, self._times.index(), face, body)
+
+    def _columns(self, wanted: Int64) -> Int64 | slice:
+        """Return the columns of rows in which the values of these slots are stored; make those that lack."""
+        if wanted is not self._known[0]:
+            new = wanted[self._places[wanted] < 0]
+            if len(new):
+                used = int(self._places.max()) + 1
+                if used + len(new) > self._rows.width:
+                    # More than are needed, because making columns copies all rows.
+                    self._rows.widen(min(max(used + len(new), 2 * used), slots.SLOTS))
+                self._places[new] = np.arange(used, used + len(new))
+            columns = self._places[wanted]
+            start, stop = int(columns.min(initial=slots.SLOTS)), int(columns.max(initial=-1)) + 1
+            in_order = np.array_equal(columns, np.arange(start, stop))
+            self._known = wanted, slice(start, stop) if in_order else columns
+        return self._known[1]
+
+    def _kind(self, block: Block, parts: int) -> int:
+        """Return the number of the masks of a plane with these parts of a block."""
+        self._parts |= parts
+        face = block.settings.face if parts & slots.FACE_BIT else None
+        body = block.settings.body if parts & slots.BODY_BIT else None
+        key = (*_face_key(face), body.mask.tobytes() if body is not None else b"")
+        if key not in self._kind_of:
+            self._kind_of[key] = len(self._masks)
+            self._masks.append(
+                (
+                    face.mask if face is not None else np.zeros(FAP_COUNT, dtype=bool),
+                    syntax.interpolated(face) if face is not None else None,
+                    body.mask if body is not None else np.zeros(BAP_COUNT, dtype=bool),
+                )
+            )
+        return self._kind_of[key]
+
+    def _check_limits(self, count: int) -> None:
+        """Raise LimitError if there is no room for `count` frames more."""
+        frames = self.frames + count
+        self._limits.check_frames(frames, "the stream")
+        memory = frames * (4 * self._rows.width + _FRAME_BYTES) + len(self._masks) * _MASKS_BYTES
+        self._limits.check_bytes(memory, "the decoded stream", source=self._source)
+
+
+def _face_key(face: PartSettings | None) -> tuple[bytes, bytes]:
+    """Return what tells masks of FAPs apart."""
+    return (face.mask.tobytes(), bytes(face.mask_types)) if face is not None else (b"", b"")
+
+
+def _masks(rows: list[Bool], kinds: Array) -> Masks:
+    """Return masks that name a row only where they differ."""
+    return Masks(np.stack(rows), kinds if len(rows) > 1 else None)
