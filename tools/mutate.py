@@ -10,6 +10,7 @@ mutant survives.
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -62,6 +63,13 @@ REPORT = "fba/capture/_report.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
 FAP_JOINTS = "fba/formats/gltf/_fap_joints.py"
 DECODER = "fba/codec/_decoder.py"
+HINGES = "fba/capture/limbs/hinges.py"
+LEG_IK = "fba/capture/limbs/_leg_ik.py"
+READ_AHEAD = "player/fba_player/sound/_read_ahead.py"
+PLAUSIBILITY = "fba/body/plausibility.py"
+GAIT_CURVES = "fba/body/gait/_signals.py"
+GAIT_DETECTION = "fba/body/gait/_detection.py"
+GAIT_MEASURE = "fba/body/gait/_measure.py"
 
 TIMES_TEST = "tests/codec/test_codec_rules.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
@@ -81,6 +89,12 @@ OTHER_BODIES_TEST = "tests/capture/test_other_bodies.py"
 LIVE_TEST = "tests/player/playback/test_live.py"
 MIXER_TEST = "tests/player/sound/test_sound_mixer.py"
 DEVICE_CLOCK_TEST = "tests/player/sound/test_sound_clock.py"
+CAPTURE_RULES_TEST = "tests/capture/test_capture_rules.py"
+AUDIO_TEST = "tests/player/sound/test_audio.py -k in_advance"
+PLAUSIBLE_TEST = "tests/body/test_plausibility.py -k 'limits or twenty or carry or underground'"
+MOMENT_TEST = "tests/body/test_plausibility.py -k moment"
+LONG_TEST = "tests/body/test_plausibility.py -k long_motion"
+GAIT_TEST = "tests/body/gait/test_gait_rules.py"
 
 MUTANTS = (
     Mutant(CLOCK, "DEFAULT_RATE = Fraction(25)", "DEFAULT_RATE = Fraction(30)", TIMES_TEST),
@@ -197,6 +211,55 @@ MUTANTS = (
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.1", RENDER_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),
     Mutant(DECODER, "_DOUBTFUL = 8", "_DOUBTFUL = 0", "tests/codec/test_damage.py"),
+    Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.0", CAPTURE_RULES_TEST),
+    Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.4", CAPTURE_RULES_TEST),
+    Mutant(LEG_IK, "ROUNDS = 3", "ROUNDS = 1", CAPTURE_RULES_TEST),
+    Mutant(LEG_IK, "ROUNDS = 3", "ROUNDS = 2", CAPTURE_RULES_TEST),
+    Mutant(GROUND, "NEAR = 0.03", "NEAR = 0.003", CAPTURE_RULES_TEST),
+    Mutant(GROUND, "NEAR = 0.03", "NEAR = 0.1", CAPTURE_RULES_TEST),
+    Mutant(PLANTING, "stiff = 1.0 - np.array", "stiff = 0.1 * np.array", CAPTURE_TEST),
+    Mutant(SESSION, "IDLE_MOUSE = 3.0", "IDLE_MOUSE = 2.0", NOTICES_TEST),
+    Mutant(SESSION, "IDLE_MOUSE = 3.0", "IDLE_MOUSE = 4.0", NOTICES_TEST),
+    Mutant(READ_AHEAD, "AHEAD = 2.5", "AHEAD = 2.0", AUDIO_TEST),
+    Mutant(READ_AHEAD, "AHEAD = 2.5", "AHEAD = 3.0", AUDIO_TEST),
+    Mutant(PLAUSIBILITY, "MARGIN = 20.0", "MARGIN = 18.0", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "MARGIN = 20.0", "MARGIN = 22.0", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "BEYOND = 0.3", "BEYOND = 0.27", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "BEYOND = 0.3", "BEYOND = 0.33", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "SWAY = 0.08", "SWAY = 0.07", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "SWAY = 0.08", "SWAY = 0.09", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "SLACK = 2.0", "SLACK = 1.9", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "SLACK = 2.0", "SLACK = 2.1", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "FASTEST = 8.0", "FASTEST = 7.5", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "FASTEST = 8.0", "FASTEST = 8.5", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "STRIDING = 0.2", "STRIDING = 0.18", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "STRIDING = 0.2", "STRIDING = 0.22", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "STANDS = 0.15", "STANDS = 0.13", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "STANDS = 0.15", "STANDS = 0.17", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -1.8", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "SUNK = -2.0", "SUNK = -2.2", PLAUSIBLE_TEST),
+    Mutant(PLAUSIBILITY, "LEAST = 1.0", "LEAST = 0.9", MOMENT_TEST),
+    Mutant(PLAUSIBILITY, "LEAST = 1.0", "LEAST = 1.1", MOMENT_TEST),
+    Mutant(PLAUSIBILITY, "SAMPLES = 32", "SAMPLES = 31", LONG_TEST),
+    Mutant(PLAUSIBILITY, "RUN = 64", "RUN = 65", LONG_TEST),
+    Mutant(GAIT_CURVES, "STEP_SECONDS = (0.2, 1.8)", "STEP_SECONDS = (0.15, 1.8)", GAIT_TEST),
+    Mutant(GAIT_CURVES, "STEP_SECONDS = (0.2, 1.8)", "STEP_SECONDS = (0.22, 1.8)", GAIT_TEST),
+    Mutant(GAIT_CURVES, "STEP_SECONDS = (0.2, 1.8)", "STEP_SECONDS = (0.2, 1.7)", GAIT_TEST),
+    Mutant(GAIT_CURVES, "STEP_SECONDS = (0.2, 1.8)", "STEP_SECONDS = (0.2, 1.9)", GAIT_TEST),
+    Mutant(GAIT_CURVES, "SHORTEST_SWING = 0.12", "SHORTEST_SWING = 0.1", GAIT_TEST),
+    Mutant(GAIT_CURVES, "SHORTEST_SWING = 0.12", "SHORTEST_SWING = 0.14", GAIT_TEST),
+    Mutant(GAIT_CURVES, "SHORTEST_STEP = 0.08", "SHORTEST_STEP = 0.06", GAIT_TEST),
+    Mutant(GAIT_CURVES, "SHORTEST_STEP = 0.08", "SHORTEST_STEP = 0.1", GAIT_TEST),
+    Mutant(GAIT_CURVES, "LEAVING = 0.06, 0.08", "LEAVING = 0.05, 0.08", GAIT_TEST),
+    Mutant(GAIT_CURVES, "LEAVING = 0.06, 0.08", "LEAVING = 0.08, 0.08", GAIT_TEST),
+    Mutant(GAIT_CURVES, "LEAVING = 0.06, 0.08", "LEAVING = 0.06, 0.05", GAIT_TEST),
+    Mutant(GAIT_CURVES, "LEAVING = 0.06, 0.08", "LEAVING = 0.06, 0.12", GAIT_TEST),
+    Mutant(GAIT_CURVES, "TOUCH = 0.008", "TOUCH = 0.006", GAIT_TEST),
+    Mutant(GAIT_CURVES, "TOUCH = 0.008", "TOUCH = 0.01", GAIT_TEST),
+    Mutant(GAIT_DETECTION, "UNEVEN = 2.2", "UNEVEN = 1.9", GAIT_TEST),
+    Mutant(GAIT_DETECTION, "UNEVEN = 2.2", "UNEVEN = 3.1", GAIT_TEST),
+    Mutant(GAIT_MEASURE, "ON_GROUND = 0.002", "ON_GROUND = 0.0018", GAIT_TEST),
+    Mutant(GAIT_MEASURE, "ON_GROUND = 0.002", "ON_GROUND = 0.0022", GAIT_TEST),
 )
 
 
@@ -240,7 +303,18 @@ def fails(tests: str, copy: Path) -> bool:
     roots = (copy, copy / "player", copy / "conformance")
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "pytest", "-n", "0", "-q", "-x", "-p", "no:cacheprovider", *tests.split()],
+            [
+                sys.executable,
+                "-m",
+                "pytest",
+                "-n",
+                "0",
+                "-q",
+                "-x",
+                "-p",
+                "no:cacheprovider",
+                *shlex.split(tests),
+            ],
             cwd=copy,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, roots))},
             capture_output=True,

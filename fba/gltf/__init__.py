@@ -1,7 +1,7 @@
-"""glTF 2.0 files: read into plain arrays, and written.
+"""glTF 2.0 files, read into plain arrays and written.
 
-read_gltf(path) -> Gltf          # meshes with morph targets, nodes with matrices, skins, animations
-surfaces(gltf) -> Surface ...    # what its scene shows, in one frame
+read_gltf(path) -> Gltf                  # meshes with morph targets, nodes with matrices, skins, animations
+surfaces(gltf) -> tuple[Surface, ...]    # the surfaces of its scene, all in the frame of the scene
 """
 
 from fba.gltf.reader import read_gltf

@@ -12,16 +12,16 @@ from fba.gltf.document import Document
 from fba.gltf.values import Value
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-"""Component types by number, as NumPy knows them."""
+"""NumPy types of the component types, by number."""
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-"""How many components an element has."""
+"""Numbers of components of an element, by its type."""
 UNSIGNED = (5121, 5123, 5125)
 MAX_ELEMENTS = 1 << 22
 """Most elements of one accessor: 4 million vertices or indices."""
 
 
 class Accessors:
-    """The accessors of a document, each unpacked once and kept; everything is checked before use."""
+    """Reads the accessors of a document, each once, and checks everything before it is used."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -32,8 +32,8 @@ class Accessors:
     def floats(self, reference: Value, *types: str, count: int | None = None) -> Float32:
         """Return float32 (N, width), finite, read-only; integers scaled as the document says.
 
-        reference: a JSON value, the accessor's index. types: allowed element types. count: the N that
-        must be there. Raises ModelError.
+        reference: the JSON value that is the accessor's index. types: allowed types of elements. count: the N
+        that is needed, None for any. ModelError where the accessor is another.
         """
         index, entry = self._entry(reference)
         if index not in self._floats:
@@ -48,7 +48,7 @@ class Accessors:
         return self._floats[index]
 
     def integers(self, reference: Value, *types: str, count: int | None = None) -> Array:
-        """Return the same for unsigned integers, unscaled, in their own dtype."""
+        """Return unsigned integers (N, width), unscaled, in their own dtype; else as `floats`."""
         index, entry = self._entry(reference)
         if entry.member("componentType").data not in UNSIGNED or _flag(entry, "normalized"):
             raise reference.error(
@@ -81,15 +81,15 @@ class Accessors:
         if code not in COMPONENTS:
             raise entry.error(f"componentType {code} is none of {', '.join(map(str, COMPONENTS))}")
         kind = np.dtype(COMPONENTS[code])
-        word = entry.member("type").text(100)
-        if word not in WIDTHS:
-            raise entry.error(f"type {word!r} is none of {', '.join(WIDTHS)}")
-        width = WIDTHS[word]
+        shape = entry.member("type").text(100)
+        if shape not in WIDTHS:
+            raise entry.error(f"type {shape!r} is none of {', '.join(WIDTHS)}")
+        width = WIDTHS[shape]
         given = entry.member("count")
         if isinstance(given.data, int) and given.data > MAX_ELEMENTS:
             raise given.error(f"more than the {MAX_ELEMENTS} elements that are read; simplify the model")
         count = given.integer(1, MAX_ELEMENTS)
-        # the raw numbers, and once more as float32
+        # charged for the raw numbers and the float32 array
         self._document.budget.charge(count * width * (kind.itemsize + 4), entry)
         if entry.get("bufferView") is None:
             array: Array = np.zeros((count, width), kind)
@@ -104,17 +104,17 @@ class Accessors:
     def _substitute(self, array: Array, sparse: Value, width: int, kind: np.dtype[Any]) -> None:
         count = sparse.member("count").integer(1, len(array))
         self._document.budget.charge(count * (4 + width * kind.itemsize), sparse)
-        places, values = sparse.member("indices"), sparse.member("values")
-        code = places.member("componentType").integer(0, 1 << 16)
+        indices, values = sparse.member("indices"), sparse.member("values")
+        code = indices.member("componentType").integer(0, 1 << 16)
         if code not in UNSIGNED:
-            raise places.error(f"componentType {code} is no unsigned integer")
+            raise indices.error(f"componentType {code} is not an unsigned integer")
         rows = self._window(
-            places.member("bufferView"), _offset(places), count, 1, np.dtype(COMPONENTS[code]), places
+            indices.member("bufferView"), _offset(indices), count, 1, np.dtype(COMPONENTS[code]), indices
         )[:, 0].astype(np.int64)
         if int(rows.max()) >= len(array):
-            raise places.error(f"names element {rows.max()}, but there are {len(array)}")
+            raise indices.error(f"names element {rows.max()}, but there are {len(array)}")
         if (np.diff(rows) <= 0).any():
-            raise places.error("the indices do not rise")
+            raise indices.error("the indices must increase")
         array[rows] = self._window(values.member("bufferView"), _offset(values), count, width, kind, values)
 
     def _window(
@@ -150,6 +150,6 @@ def _scaled(raw: Array, normalized: bool) -> Float32:
     if raw.dtype.kind == "f" or not normalized:
         return raw.astype(np.float32, copy=False)
     top = np.float32(np.iinfo(raw.dtype).max)
-    # the lowest signed number has no counterpart, and counts as -1 too
+    # the lowest signed number would be a little below -1
     scaled: Float32 = np.maximum(raw.astype(np.float32) / top, np.float32(-1.0))
     return scaled

@@ -15,7 +15,7 @@ TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": 
 def read_animations(
     document: Document, accessors: Accessors, nodes: tuple[Node, ...], meshes: tuple[Mesh, ...]
 ) -> tuple[Animation, ...]:
-    """Return all animations, in order, without channels of no node, or of extensions."""
+    """Return all animations, in order, without channels that have no node or belong to extensions."""
     animations = []
     for number, entry in enumerate(document.entries("animations")):
         document.budget.charge(1024, entry)
@@ -32,7 +32,7 @@ def read_animations(
                 where = node.index(len(nodes), "node")
                 width = _width(target, path, nodes[where], meshes)
                 channel = _channel(accessors, sampler, where, path, width)
-                # many channels may share keys: what is looked through has a limit too
+                # charged for every channel that shares the keys, so that millions of channels are refused
                 document.budget.charge(channel.times.nbytes + channel.values.nbytes, each)
                 channels.append(channel)
         animations.append(Animation(f"animation {number}" if name is None else name.text(), tuple(channels)))
@@ -40,12 +40,12 @@ def read_animations(
 
 
 def _width(target: Value, path: str, node: Node, meshes: tuple[Mesh, ...]) -> int:
-    """Return the numbers per key: as many weights as the node's mesh has morph targets."""
+    """Return how many numbers a key has; for weights, one for each morph target of the node's mesh."""
     if path != "weights":
         return 4 if path == "rotation" else 3
     count = 0 if node.mesh is None else len(meshes[node.mesh].morph_names)
     if not count:
-        raise target.error("animates weights of a node whose mesh has no morph targets")
+        raise target.error("animates the weights of a node whose mesh has no morph targets")
     return count
 
 
@@ -54,7 +54,7 @@ def _channel(accessors: Accessors, sampler: Value, node: int, path: str, width: 
     interpolation = "LINEAR" if given is None else given.choice("LINEAR", "STEP", "CUBICSPLINE")
     times = accessors.floats(sampler.member("input"), "SCALAR")[:, 0]
     if (np.diff(times) <= 0).any() or times[0] < 0:
-        raise sampler.member("input").error("the times of the keys must rise from 0 or later")
+        raise sampler.member("input").error("the times of the keys must increase, from 0 or later")
     cubic = 3 if interpolation == "CUBICSPLINE" else 1
     per_key = width if path == "weights" else 1
     values = accessors.floats(sampler.member("output"), TYPES[path], count=len(times) * cubic * per_key)

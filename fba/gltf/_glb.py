@@ -15,7 +15,7 @@ MAX_BYTES = 1 << 30
 
 
 def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
-    """Return JSON text and binary chunk (None where there is none) of a container.
+    """Return the JSON text and the binary chunk, None where there is none, of a container.
 
     data: all bytes of the file. file: its name for messages. Raises ModelError where the container is
     cut off, of another version, or damaged; bytes after its end are an FbaWarning.
@@ -24,16 +24,16 @@ def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | No
         raise ModelError(f"{file}: header: the file ends after {len(data)} bytes; was it fully copied?")
     magic, version, length = struct.unpack_from("<4sII", data)
     if magic != MAGIC:
-        raise ModelError(f"{file}: header: begins with {magic!r}, not with {MAGIC!r}: no binary glTF")
+        raise ModelError(f"{file}: header: begins with {magic!r}, not with {MAGIC!r}: this is no binary glTF")
     if version != 2:
-        raise ModelError(f"{file}: header: is glTF of version {version}; only version 2 is read")
+        raise ModelError(f"{file}: header: this is glTF {version}; only glTF 2 is read")
     if length > len(data):
         raise ModelError(
             f"{file}: header: announces {length} bytes, but the file has {len(data)}; was it fully copied?"
         )
     if length < len(data):
         warnings.warn(
-            f"{file}: {len(data) - length} bytes after the end of the glTF container are left aside",
+            f"{file}: {len(data) - length} bytes after the end of the glTF container are ignored",
             FbaWarning,
             stacklevel=2,
         )
@@ -45,7 +45,7 @@ def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | No
 
 
 def _chunks(data: memoryview, file: str) -> list[tuple[bytes, memoryview]]:
-    """Return the first chunks; others come after JSON and bytes, and may be skipped."""
+    """Return type and content of the first two chunks; readers may skip those after JSON and bytes."""
     chunks: list[tuple[bytes, memoryview]] = []
     position = HEADER_BYTES
     while position < len(data) and len(chunks) < 2:
@@ -64,9 +64,9 @@ def _chunks(data: memoryview, file: str) -> list[tuple[bytes, memoryview]]:
 
 
 def join_container(text: bytes, binary: bytes) -> bytes:
-    """Return a container of JSON text and bytes, both padded to whole words as the format asks.
+    """Return a container of JSON text and bytes, both padded to multiples of 4 bytes, as the format requires.
 
-    Raises ModelError where the whole would be longer than `MAX_BYTES`.
+    Raises ModelError where it would be longer than `MAX_BYTES`.
     """
     text += b" " * (-len(text) % 4)
     binary += b"\0" * (-len(binary) % 4)

@@ -10,11 +10,11 @@ from fba.gltf.scene import Material
 from fba.gltf.values import Value, optional_member
 
 PICTURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
-"""First bytes of the pictures that a glTF file may hold."""
+"""First bytes and media types of the pictures that a glTF file may hold."""
 
 
 def media_type(data: bytes) -> str | None:
-    """Return "image/png" or "image/jpeg" by the first bytes, or None for another content."""
+    """Return "image/png" or "image/jpeg" by the first bytes of a picture, None for other content."""
     return next((name for mark, name in PICTURES.items() if data.startswith(mark)), None)
 
 
@@ -27,9 +27,9 @@ def read_materials(document: Document) -> tuple[Material, ...]:
 def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
     pictures.document.budget.charge(1024, entry)
     name = entry.get("name")
-    look = entry.get("pbrMetallicRoughness")
+    surface = entry.get("pbrMetallicRoughness")
     colour, metallic, roughness, texture = (
-        optional_member(look, key)
+        optional_member(surface, key)
         for key in ("baseColorFactor", "metallicFactor", "roughnessFactor", "baseColorTexture")
     )
     red, green, blue, alpha = (1.0,) * 4 if colour is None else colour.numbers(4, 0.0, 1.0)
@@ -45,6 +45,8 @@ def _material(entry: Value, number: int, pictures: _Pictures) -> Material:
 
 
 class _Pictures:
+    """Reads the pictures of a document, each once."""
+
     def __init__(self, document: Document) -> None:
         self.document = document
         self._textures = document.entries("textures")
@@ -54,7 +56,7 @@ class _Pictures:
     def texture(self, info: Value) -> bytes | None:
         index = info.member("index").index(len(self._textures), "texture")
         source = self._textures[index].get("source")
-        if source is None:  # a picture that only an extension knows how to read
+        if source is None:  # only an extension names its picture
             self._warn(self._textures[index], "has no PNG or JPEG picture")
             return None
         number = source.index(len(self._images), "image")

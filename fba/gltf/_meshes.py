@@ -17,10 +17,11 @@ from fba.gltf.values import Value
 TRIANGLES, STRIP, FAN = 4, 5, 6
 """Modes of primitives that are surfaces."""
 MODES = 7
+"""Number of modes of primitives."""
 MAX_TARGETS = 4096
 """Most morph targets of a mesh."""
 MAX_SETS = 8
-"""Most sets of texture coordinates, or of joints, that are looked for."""
+"""Most sets of texture coordinates, or of joints, that are read."""
 
 
 def read_meshes(document: Document, accessors: Accessors, materials: int) -> tuple[Mesh, ...]:
@@ -47,7 +48,9 @@ def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, m
         primitives.append(_Reader(document, accessors, each, materials).primitive())
     counts = {len(primitive.morphs) for primitive in primitives}
     if len(counts) > 1:
-        raise entry.error(f"its primitives have {sorted(counts)} morph targets; all must have as many")
+        raise entry.error(
+            f"its primitives have {sorted(counts)} morph targets; all must have the same number"
+        )
     count = counts.pop() if counts else 0
     weights = entry.get("weights")
     if weights is not None and primitives and len(weights.elements(MAX_TARGETS)) != count:
@@ -61,7 +64,7 @@ def _mesh(document: Document, accessors: Accessors, entry: Value, number: int, m
 
 
 def _names(entry: Value, primitives: list[Value], count: int) -> tuple[str, ...]:
-    """Return names of the morph targets: from the extras of the mesh, else of a primitive."""
+    """Return the names of the morph targets, from the extras of the mesh or of its first primitive."""
     for holder in (entry, *primitives[:1]):
         extras = holder.get("extras")
         names = extras.get("targetNames") if extras is not None and isinstance(extras.data, dict) else None
@@ -72,7 +75,7 @@ def _names(entry: Value, primitives: list[Value], count: int) -> tuple[str, ...]
             return tuple(given)
         if count:
             warnings.warn(
-                f"{names.file}: {names.path}: {len(given)} names for {count} morph targets; left aside",
+                f"{names.file}: {names.path}: {len(given)} names for {count} morph targets; ignored",
                 FbaWarning,
                 stacklevel=6,
             )
@@ -90,6 +93,7 @@ class _Reader:
         self._attributes = entry.member("attributes")
 
     def primitive(self) -> Primitive:
+        """Return the primitive; ModelError where it is damaged."""
         positions = self._accessors.floats(self._attributes.member("POSITION"), "VEC3")
         count = len(positions)
         normals = self._attributes.get("NORMAL")
@@ -165,10 +169,10 @@ class _Reader:
         where = self._entry if reference is None else reference
         shape = TRIANGLES if mode is None else mode.integer(0, MODES - 1)
         if shape == TRIANGLES and len(corners) % 3:
-            raise where.error(f"{len(corners)} corners make no whole number of triangles")
+            raise where.error(f"{len(corners)} corners are not a multiple of 3")
         if shape != TRIANGLES:
             self._document.budget.charge(len(corners) * 24, where)
-        triangles = _ARRANGED[shape](corners).astype(np.int32)
+        triangles = _TO_TRIANGLES[shape](corners).astype(np.int32)
         triangles.flags.writeable = False
         return triangles
 
@@ -186,7 +190,7 @@ Corners = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 def _strip(corners: Corners) -> Corners:
     triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-    triangles[1::2] = triangles[1::2][:, [1, 0, 2]]  # every other one is listed the other way round
+    triangles[1::2] = triangles[1::2][:, [1, 0, 2]]  # every other triangle has the opposite order
     return triangles
 
 
@@ -194,7 +198,7 @@ def _fan(corners: Corners) -> Corners:
     return np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], len(corners[2:]))], axis=1)
 
 
-_ARRANGED: dict[int, Callable[[Corners], Corners]] = {
+_TO_TRIANGLES: dict[int, Callable[[Corners], Corners]] = {
     TRIANGLES: lambda corners: corners.reshape(-1, 3),
     STRIP: _strip,
     FAN: _fan,

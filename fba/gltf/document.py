@@ -83,7 +83,7 @@ def parse_document(data: bytes, file: str, folder: str | None = None) -> Documen
         text, binary = glb.split_container(data, file)
     elif data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
         kind = recognition_hint(data[:HEAD_BYTES])
-        raise ModelError(f"{file}: is no glTF 2.0: neither a .glb container nor the JSON of a .gltf{kind}")
+        raise ModelError(f"{file}: is not glTF 2.0: neither a .glb container nor the JSON of a .gltf{kind}")
     root = Value(parse_json(text, file), file)
     asset = root.member("asset")
     version = asset.member("version").text(100)
@@ -108,7 +108,7 @@ def parse_json(text: memoryview, file: str) -> Any:
             bytes(text).decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_unique
         )
     except RecursionError:
-        raise ModelError(f"{file}: the JSON is nested too deeply; no glTF needs that") from None
+        raise ModelError(f"{file}: the JSON is nested too deeply; glTF never needs that") from None
     except UnicodeDecodeError as error:
         raise ModelError(f"{file}: the JSON is not UTF-8 text (byte {error.start})") from None
     except ValueError as error:  # syntax, and numbers of thousands of digits
@@ -119,15 +119,15 @@ def parse_json(text: memoryview, file: str) -> Any:
 
 
 def _refuse_constant(word: str) -> float:
-    raise ValueError(f"{word} is no number")
+    raise ValueError(f"{word} is not a number")
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
+    members = dict(pairs)
+    if len(members) != len(pairs):
         twice, _ = Counter(name for name, _ in pairs).most_common(1)[0]
         raise ValueError(f"an object names {ascii(twice)[:60]} twice")
-    return found
+    return members
 
 
 def _buffer(document: Document, entry: Value, binary: memoryview | None) -> memoryview:
@@ -135,21 +135,21 @@ def _buffer(document: Document, entry: Value, binary: memoryview | None) -> memo
     uri = entry.get("uri")
     if uri is None:
         if binary is None:
-            raise entry.error("has no uri, and there is no binary chunk that it could stand for")
-        held = binary
+            raise entry.error("has no uri, and there is no binary chunk in its place")
+        content = binary
     else:
         if not (isinstance(uri.data, str) and uri.data.startswith("data:")):
             document.budget.charge(length, entry)
-        held = memoryview(document.resource(uri, length))
-    if len(held) < length:
-        raise entry.error(f"should have {length} bytes, but only {len(held)} are there; was all copied?")
-    return held[:length]
+        content = memoryview(document.resource(uri, length))
+    if len(content) < length:
+        raise entry.error(f"should have {length} bytes, but has only {len(content)}; was it fully copied?")
+    return content[:length]
 
 
 def _inline(uri: Value) -> bytes:
     head, comma, body = uri.data.partition(",")
     if not comma or not head.endswith(";base64"):
-        raise uri.error("is no data URI in base64 (data:...;base64,...)")
+        raise uri.error("is not a data URI in base64 (data:...;base64,...)")
     try:
         return base64.b64decode(body, validate=True)
     except (binascii.Error, ValueError) as error:

@@ -1,4 +1,4 @@
-"""The tree of nodes of a glTF file, with the transform of every node to its parent and to the world, and the
+"""The tree of nodes of a glTF file, with the transforms of every node to its parent and to the scene, and the
 skins: the joints that carry a mesh."""
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def read_nodes(
 ) -> tuple[tuple[Node, ...], tuple[int, ...]]:
     """Return all nodes, and their indices with parents before children.
 
-    ModelError where a node has two parents or is its own ancestor, or a transform is unusable.
+    ModelError where a node has two parents or is its own ancestor, or a transform is wrong or overflows.
     """
     entries = document.entries("nodes")
     for entry in entries:
@@ -64,7 +64,7 @@ def read_nodes(
 
 
 def read_roots(document: Document, nodes: tuple[Node, ...]) -> tuple[int, ...]:
-    """Return nodes at the top of the default scene; of all nodes, where the file has no scenes."""
+    """Return the nodes at the top of the default scene, or of the file where it has no scenes."""
     scenes = document.entries("scenes")
     if not scenes:
         return tuple(number for number, node in enumerate(nodes) if node.parent is None)
@@ -74,7 +74,9 @@ def read_roots(document: Document, nodes: tuple[Node, ...]) -> tuple[int, ...]:
     for value in scene.elements(MAX_ITEMS, "nodes"):
         root = value.index(len(nodes), "node")
         if nodes[root].parent is not None:
-            raise value.error(f"names node {root}, which is no root: it is a child of {nodes[root].parent}")
+            raise value.error(
+                f"names node {root}, which is not a root: it is a child of node {nodes[root].parent}"
+            )
         roots[root] = None
     return tuple(roots)
 
@@ -97,16 +99,17 @@ def _parents(entries: list[Value], children: list[tuple[int, ...]]) -> list[int 
 
 def _order(entries: list[Value], children: list[tuple[int, ...]], parents: list[int | None]) -> list[int]:
     order = [number for number, parent in enumerate(parents) if parent is None]
-    for number in order:  # grows while it is walked
+    for number in order:  # grows during the loop
         order.extend(children[number])
     if len(order) < len(entries):
         reached = set(order)
-        lost = next(number for number in range(len(entries)) if number not in reached)
-        raise entries[lost].error("is its own ancestor: the tree of nodes runs in a circle")
+        circular = next(number for number in range(len(entries)) if number not in reached)
+        raise entries[circular].error("is its own ancestor: the tree of nodes has a cycle")
     return order
 
 
 def _transform(entry: Value) -> tuple[Float64 | None, Float64 | None, Float64 | None, Float64]:
+    """Return translation, rotation and scale of a node, None where it has a matrix, and its matrix."""
     matrix = entry.get("matrix")
     if matrix is not None:
         numbers = np.array(matrix.numbers(16)).reshape(4, 4).T.copy()  # column by column in the file
@@ -114,25 +117,28 @@ def _transform(entry: Value) -> tuple[Float64 | None, Float64 | None, Float64 | 
             raise matrix.error(f"its last row is {numbers[3].tolist()}, but must be 0 0 0 1")
         return None, None, None, numbers
     given = {key: entry.get(key) for key in ("translation", "rotation", "scale")}
-    shift = np.array((0.0, 0.0, 0.0) if given["translation"] is None else given["translation"].numbers(3))
-    size = np.array((1.0, 1.0, 1.0) if given["scale"] is None else given["scale"].numbers(3))
-    turn = np.array((0.0, 0.0, 0.0, 1.0))
+    translation = np.array(
+        (0.0, 0.0, 0.0) if given["translation"] is None else given["translation"].numbers(3)
+    )
+    scale = np.array((1.0, 1.0, 1.0) if given["scale"] is None else given["scale"].numbers(3))
+    rotation = np.array((0.0, 0.0, 0.0, 1.0))
     if given["rotation"] is not None:
-        turn = np.array(given["rotation"].numbers(4, -1e9, 1e9))
-        length = float(np.linalg.norm(turn))
+        rotation = np.array(given["rotation"].numbers(4, -1e9, 1e9))
+        length = float(np.linalg.norm(rotation))
         if length < 1e-6:
-            raise given["rotation"].error("is no rotation: a quaternion of length 0")
-        turn /= length
+            raise given["rotation"].error("is not a rotation: the quaternion has length 0")
+        rotation /= length
     matrix_out = np.eye(4)
-    with np.errstate(all="ignore"):  # what overflows is found where the frames are multiplied
-        matrix_out[:3, :3] = rotations.matrices(turn[[3, 0, 1, 2]]) * size
-    matrix_out[:3, 3] = shift
-    for array in (shift, turn, size):
+    with np.errstate(all="ignore"):  # overflow is detected where the matrices are multiplied
+        matrix_out[:3, :3] = rotations.matrices(rotation[[3, 0, 1, 2]]) * scale
+    matrix_out[:3, 3] = translation
+    for array in (translation, rotation, scale):
         array.flags.writeable = False
-    return shift, turn, size, matrix_out
+    return translation, rotation, scale, matrix_out
 
 
 def _highest_joint(mesh: Mesh) -> int:
+    """Return the highest number of a joint that a mesh names, -1 where it names none."""
     return max((int(p.joints.max()) for p in mesh.primitives if p.joints is not None), default=-1)
 
 

@@ -1,7 +1,7 @@
-"""Arrays packed without loss, for data that only this project reads: deflate over sorted bytes.
+"""Lossless packing of arrays that only this project reads: deflate over sorted bytes.
 
-Numbers are 32 bits, the lowest byte first. Of all numbers come first the lowest bytes, then the second,
-third and highest ones, which are much alike in neighbours and deflate well; the whole is a zlib stream.
+Numbers have 32 bits. The lowest bytes of all numbers come first, then all second, third and highest ones:
+the higher bytes of neighbours are much alike, so they deflate well. The result is one zlib stream.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ def unpack(document: Document, reference: Value, dtype: type[np.generic], shape:
     Raises ModelError where the stream is damaged, or holds more or fewer numbers.
     """
     count = int(np.prod(shape, dtype=object))
-    document.budget.charge(count * 12, reference)  # as bytes, in order, and as the caller's array
+    document.budget.charge(count * 12, reference)  # as bytes, sorted back, and as the array returned
     data, view = document.view(reference)
     stream = zlib.decompressobj()
     try:
         raw = stream.decompress(data, count * 4) if count else b""
-        more = stream.decompress(stream.unconsumed_tail, 1)
+        excess = stream.decompress(stream.unconsumed_tail, 1)
     except zlib.error as error:
         raise reference.error(f"the packed numbers in {view.path} are damaged ({error})") from None
-    if len(raw) != count * 4 or more or not stream.eof:
+    if len(raw) != count * 4 or excess or not stream.eof:
         raise reference.error(f"{view.path} does not unpack to the {count} numbers that are needed")
     planes = np.frombuffer(raw, np.uint8).reshape(4, count)
     words = np.ascontiguousarray(planes.T).view(np.dtype(dtype).newbyteorder("<")).reshape(shape)

@@ -1,4 +1,4 @@
-"""Meshes of faces and bodies to glTF primitives and materials, and materials back."""
+"""Conversion of parts of faces and bodies to glTF primitives and materials, and of materials back."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class MeshPart(Mesh, Protocol):
 
 
 class PartWriter:
-    """Writes parts as primitives of a document; each material and texture once."""
+    """Writes parts as primitives of a document, and each material and texture once."""
 
     def __init__(self, builder: Builder) -> None:
         self._builder = builder
@@ -37,7 +37,7 @@ class PartWriter:
         """Return the primitive of a part, for the list of a mesh. ModelError where glTF cannot hold it."""
         if not len(part.triangles):
             raise ModelError(
-                f"part {part.name!r} has no triangles; a glTF mesh needs some: leave the part out"
+                f"part {part.name!r} has no triangles; a glTF mesh needs some: leave this part out"
             )
         if part.material.texture is not None and part.texcoords is None:
             raise ModelError(
@@ -56,7 +56,7 @@ class PartWriter:
         }
 
     def _material(self, part: MeshPart) -> int:
-        # in glTF the colours of vertices multiply the material's, here they replace it
+        # colours of vertices multiply the material's in glTF, but replace it in fba
         material, colour = part.material, part.material.colour if part.colours is None else WHITE
         shown = Material(material.name, colour, material.roughness, material.texture)
         if shown not in self._known:
@@ -69,7 +69,7 @@ class PartWriter:
             raise ModelError(
                 f"part {part!r}: colour and roughness of its material must be within 0..1, not {numbers}"
             )
-        look: dict[str, Any] = {
+        surface: dict[str, Any] = {
             "baseColorFactor": [*map(float, material.colour), 1.0],
             "metallicFactor": 0.0,
             "roughnessFactor": float(material.roughness),
@@ -78,19 +78,19 @@ class PartWriter:
             image = self._builder.image(material.texture, material.name)
             if image not in self._textures:
                 self._textures[image] = self._builder.add("textures", {"source": image})
-            look["baseColorTexture"] = {"index": self._textures[image]}
-        return {"name": material.name, "pbrMetallicRoughness": look}
+            surface["baseColorTexture"] = {"index": self._textures[image]}
+        return {"name": material.name, "pbrMetallicRoughness": surface}
 
 
 def read_material(entry: Value, gltf: Gltf, index: int | None) -> Material:
     """Return the material of a part.
 
-    entry: its entry in our extension, which has the colour that colours of vertices replace. index: of the
-    document's material, or None.
+    entry: the part's entry in our extension, which has the material's colour where colours of vertices
+    replace it. index: of the document's material, or None.
     """
     given = entry.get("colour")
     if index is None:
         return Material()
-    shown = gltf.materials[index]
-    red, green, blue = shown.colour[:3] if given is None else given.numbers(3, 0.0, 1.0)
-    return Material(shown.name, (red, green, blue), shown.roughness, shown.texture)
+    material = gltf.materials[index]
+    red, green, blue = material.colour[:3] if given is None else given.numbers(3, 0.0, 1.0)
+    return Material(material.name, (red, green, blue), material.roughness, material.texture)

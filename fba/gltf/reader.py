@@ -1,7 +1,7 @@
 """glTF 2.0 files read into plain arrays: `read_gltf`.
 
-Read are triangles with morph targets and skins, the tree of nodes, metallic-roughness materials with
-PNG or JPEG textures, and animations. Everything is checked before it is used or allocated.
+It reads triangles with morph targets and skins, the tree of nodes, metallic-roughness materials with PNG or
+JPEG textures, and animations. Everything is checked before it is used or allocated.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ PACKED = {
     "EXT_meshopt_compression": "meshopt-compressed buffers",
     "KHR_meshopt_compression": "meshopt-compressed buffers",
 }
-"""Extensions that hide the geometry itself."""
+"""Extensions by which the geometry itself is compressed."""
 KNOWN = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "FBA_face"}
-"""Extensions that may be required: honoured, or without influence on shapes."""
+"""Extensions that a file may require: they are read, or do not change shapes."""
 
 
 def read_gltf(path: Path) -> Gltf:
-    """Read a .glb or .gltf file.
+    """Return the content of a .glb or .gltf file.
 
-    Buffers and pictures may lie in the file, in data URIs, or in files of the same folder or below it.
-    Raises FormatError where the file cannot be opened, ModelError, which names the place in the
-    document, where it is damaged, larger than what is read, or needs an extension not known here. Points,
-    lines and pictures of other kinds are left out with an FbaWarning.
+    Buffers and pictures may be in the file, in data URIs, or in files in the same folder or below it. Points,
+    lines, and pictures that are neither PNG nor JPEG are left out with an FbaWarning. FormatError where the
+    file cannot be opened; ModelError, which names the place in the document, where it is damaged, too large,
+    or requires an unknown extension.
     """
     return read_document(open_document(path))
 
@@ -69,7 +69,7 @@ def _check_extensions(document: Document) -> None:
                 f"{name}: {PACKED[name]} are not read; export or convert the file without compression"
             )
         if name not in KNOWN and not name.startswith("KHR_materials_"):
-            if "texture" in name:  # a kind of picture: the shape is read without it
+            if "texture" in name:  # another kind of picture: shapes can be read without it
                 warnings.warn(f"{entry.file}: {name} is not read", FbaWarning, stacklevel=3)
                 continue
-            raise entry.error(f"the file needs the extension {name}, which is not known here")
+            raise entry.error(f"the file needs the extension {name}, which fba does not support")

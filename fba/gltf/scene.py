@@ -11,9 +11,10 @@ from fba.gltf.values import Value
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """How a surface looks. colour: linear light and opacity, 0..1; it multiplies the texture.
+    """The look of a surface.
 
-    texture: PNG or JPEG bytes, sRGB, or None. texcoord: which set of texture coordinates it uses.
+    colour: red, green, blue in linear light, and opacity, 0..1; it multiplies the texture. texture: PNG or
+    JPEG bytes, sRGB, or None. texcoord: number of the set of texture coordinates that it uses.
     """
 
     name: str
@@ -31,7 +32,7 @@ class Primitive:
     positions: float32 (V, 3). triangles: int32 (F, 3). normals: float32 (V, 3) or None. texcoords: one
     float32 (V, 2) a set, origin at the picture's top left. colours: float32 (V, 4) or None. joints:
     int32 (V, 4 n), positions in the skin's list of joints, and weights: float32 (V, 4 n), or None.
-    morphs: one float32 (V, 3) a morph target, displacements at weight 1, or None where it moves nothing.
+    morphs: one float32 (V, 3) a morph target, displacements at weight 1, or None for one that moves nothing.
     material: its index, or None.
     """
 
@@ -48,7 +49,7 @@ class Primitive:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Primitives that share morph targets. morph_names: one a target. weights: the targets' defaults."""
+    """Primitives with the same morph targets. morph_names, weights: the targets' names and defaults."""
 
     name: str
     primitives: tuple[Primitive, ...]
@@ -79,7 +80,10 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """joints: indices of nodes. inverse_bind: float64 (J, 4, 4), from the mesh's frame to each joint's."""
+    """The joints that carry a mesh.
+
+    joints: indices of nodes. inverse_bind: float64 (J, 4, 4), from the mesh's frame to each joint's.
+    """
 
     name: str
     joints: tuple[int, ...]
@@ -91,7 +95,7 @@ class Channel:
     """One animated property of one node.
 
     path: "translation", "rotation", "scale" or "weights". interpolation: "LINEAR", "STEP" or
-    "CUBICSPLINE". times: float32 (T,), seconds, rising. values: float32 (T, width), or (T, 3, width) for
+    "CUBICSPLINE". times: float32 (T,), seconds, increasing. values: float32 (T, width), or (T, 3, width) for
     CUBICSPLINE: in-tangent, value, out-tangent.
     """
 
@@ -112,10 +116,10 @@ class Animation:
 
 @dataclass(frozen=True, eq=False)
 class Gltf:
-    """A whole file. roots: nodes at the top of the default scene. order: all nodes, parents first.
+    """The content of a glTF file.
 
-    document: the JSON, and accessors: the arrays, for extensions and extras. Lengths are metres, +y is up,
-    models face +z.
+    roots: nodes at the top of the default scene. order: all nodes, parents first. document: the JSON,
+    accessors: the arrays, both for extensions and extras. Lengths are metres, +y is up, models face +z.
     """
 
     file: str
@@ -130,7 +134,7 @@ class Gltf:
     accessors: Accessors
 
     def shown(self) -> tuple[int, ...]:
-        """Return nodes of the default scene, parents first."""
+        """Return the nodes of the default scene, parents first."""
         inside: set[int] = set()
         for number in self.order:
             parent = self.nodes[number].parent

@@ -1,4 +1,4 @@
-"""The surfaces that a glTF file shows, in the frame of its scene: transforms and skins applied."""
+"""The surfaces of a glTF scene, in the frame of the scene: transforms and skins are applied."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fba.gltf.values import Budget
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """One primitive of one node, at rest: morph targets at 0, joints where the file has them.
+    """One primitive of one node, at rest: morph targets at 0, joints as in the file.
 
     name: the node's, else the mesh's, made unique. positions: float32 (V, 3), in the scene's frame.
     triangles: int32 (F, 3), counter-clockwise from outside. normals: float32 (V, 3) unit, or None.
@@ -41,11 +41,11 @@ class Surface:
 def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
     """Return every surface of the default scene, parents first.
 
-    Raises ModelError where they take more than 1 GiB together, as a mesh shown a million times can.
+    Raises ModelError where they take more than 1 GiB together, as a mesh that is shown a million times does.
     """
     budget = Budget(MAX_UNPACKED)
     result: list[Surface] = []
-    taken: set[str] = set()
+    names: set[str] = set()
     for number in gltf.shown():
         node = gltf.nodes[number]
         if node.mesh is None:
@@ -53,16 +53,17 @@ def surfaces(gltf: Gltf) -> tuple[Surface, ...]:
         mesh = gltf.meshes[node.mesh]
         for primitive in mesh.primitives:
             moving = sum(morph is not None for morph in primitive.morphs)
-            # float64 positions and normals on the way; where joints carry, a matrix each
+            # float64 positions and normals; with a skin, a matrix for each vertex
             each = 200 + 12 * moving + (0 if node.skin is None else 600)
             budget.charge(len(primitive.positions) * each, gltf.document)
-            name = _unique(node.name if not node.name.startswith("node ") else mesh.name, taken)
-            with np.errstate(all="ignore"):  # what overflows is found at the end
+            name = _unique(node.name if not node.name.startswith("node ") else mesh.name, names)
+            with np.errstate(all="ignore"):  # overflow is detected at the end
                 result.append(_surface(gltf, node, number, primitive, mesh.morph_names, name))
     return tuple(result)
 
 
 def _unique(name: str, taken: set[str]) -> str:
+    """Return the name, with a number where it is taken, and add it to those taken."""
     unique, count = name, 1
     while unique in taken:
         count += 1
@@ -78,12 +79,12 @@ def _surface(
     linear = matrices[..., :3, :3]
     positions = _moved(linear, primitive.positions) + matrices[..., :3, 3]
     morphs = {
-        word: _moved(linear, morph).astype(np.float32)
-        for word, morph in zip(names, primitive.morphs, strict=True)
+        target: _moved(linear, morph).astype(np.float32)
+        for target, morph in zip(names, primitive.morphs, strict=True)
         if morph is not None
     }
     if len(set(names)) < len(names):
-        warnings.warn(f"{gltf.file}: {name}: two morph targets have one name", FbaWarning, stacklevel=3)
+        warnings.warn(f"{gltf.file}: {name}: two morph targets have the same name", FbaWarning, stacklevel=3)
     placed = positions.astype(np.float32)
     if not all(np.isfinite(array).all() for array in (placed, *morphs.values())):
         raise gltf.document.error(f"nodes[{number}]: positions overflow in the frame of the scene")
@@ -105,18 +106,18 @@ def _surface(
 
 
 def _frames(gltf: Gltf, node: Node, primitive: Primitive) -> Float64:
-    """Return float64 (4, 4), or (V, 4, 4) if joints carry the vertices: a skin replaces the node's matrix."""
+    """Return the node's matrix, float64 (4, 4), or one for each vertex of a skin, (V, 4, 4)."""
     if node.skin is None or primitive.joints is None or primitive.weights is None:
         return node.world
     skin = gltf.skins[node.skin]
     joints = np.stack([gltf.nodes[joint].world for joint in skin.joints]) @ skin.inverse_bind
     total = primitive.weights.sum(axis=1, dtype=np.float64)
-    held = total > 0
+    carried = total > 0
     matrices = np.zeros((len(primitive.positions), 4, 4))
     for slot in range(primitive.joints.shape[1]):
-        share = primitive.weights[:, slot] / np.where(held, total, 1.0)
+        share = primitive.weights[:, slot] / np.where(carried, total, 1.0)
         matrices += share[:, None, None] * joints[primitive.joints[:, slot]]
-    matrices[~held] = node.world  # carried by no joint
+    matrices[~carried] = node.world
     return matrices
 
 
@@ -126,7 +127,7 @@ def _moved(linear: Float64, vectors: Float32) -> Float64:
 
 
 def _turned(linear: Float64, normals: Float32) -> Float32:
-    """Return normals transformed by the inverse transpose, which keeps them upright under uneven scales."""
+    """Return normals transformed by the inverse transpose, so that uneven scales leave them perpendicular."""
     cofactors = np.stack(
         [np.cross(linear[..., (i + 1) % 3, :], linear[..., (i + 2) % 3, :]) for i in range(3)], axis=-2
     )

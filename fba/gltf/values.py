@@ -1,4 +1,4 @@
-"""Checked access to a JSON document: every value knows the file and the place that it comes from."""
+"""Checked access to a JSON document: every value knows its file and its path in the document."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 from fba.errors import ModelError
 
 MAX_TEXT = 1 << 16
-"""Longest text that is taken from a document, in characters; names and notes are far shorter."""
+"""Most characters of a text; names and notes are far shorter."""
 
 
 class Budget:
-    """Memory that reading one file may still use, so that a small file cannot exhaust it."""
+    """The memory that reading one file may still use, so that a small file cannot exhaust it."""
 
     def __init__(self, left: int) -> None:
         self._left = self._all = left
@@ -30,9 +30,10 @@ class Budget:
 
 
 class Value:
-    """A JSON value. data: as `json.loads` gives it. file: name for messages. path: like "meshes[0].name".
+    """A JSON value and its place.
 
-    Every method that does not find what it expects raises ModelError with file and path.
+    data: as `json.loads` returns it. file: its name, for messages. path: such as "meshes[0].name". Methods
+    that find something unexpected raise ModelError with file and path.
     """
 
     __slots__ = ("data", "file", "path")
@@ -47,12 +48,12 @@ class Value:
         return ModelError(f"{self.file}: {self.path}: {text}" if self.path else f"{self.file}: {text}")
 
     def get(self, key: str) -> Value | None:
-        """Return a member of an object; None if there is none of that name."""
+        """Return a member of an object, or None where there is none."""
         members = self._object()
         return self._member(key, members[key]) if key in members else None
 
     def member(self, key: str) -> Value:
-        """Return a member of an object, which must be there."""
+        """Return a member of an object; ModelError where it is missing."""
         value = self.get(key)
         if value is None:
             raise self.error(f"{key!r} is missing")
@@ -90,7 +91,7 @@ class Value:
         """Return a whole number within low..high."""
         data = self.data
         if isinstance(data, float) and data.is_integer():
-            data = int(data)  # some writers say 3.0
+            data = int(data)  # some writers write 3.0
         if isinstance(data, bool) or not isinstance(data, int):
             raise self._unexpected("a whole number")
         if not low <= data <= high:
@@ -126,7 +127,7 @@ class Value:
     def text(self, most: int = MAX_TEXT) -> str:
         """Return a text of at most `most` characters, all of which can be written as UTF-8."""
         if not isinstance(self.data, str):
-            raise self._unexpected("a text")
+            raise self._unexpected("text")
         if len(self.data) > most:
             raise self.error(f"a text of {len(self.data)} characters, more than the {most} that are read")
         try:
@@ -168,7 +169,7 @@ def locating_errors(value: Value) -> Iterator[None]:
         yield
     except ModelError as error:
         if str(error).startswith(f"{value.file}: "):
-            raise  # it has one already
+            raise  # it has its position already
         raise value.error(str(error)) from error
 
 

@@ -1,4 +1,4 @@
-"""Writes glTF 2.0 files: arrays become accessors, sparse ones where that takes fewer bytes."""
+"""Writer of glTF 2.0 files: arrays become accessors, sparse ones where these take fewer bytes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fba.source import Path
 ATTRIBUTES, ELEMENTS = 34962, 34963
 """Targets of buffer views: vertex attributes, and indices of triangles."""
 RESTART = 65535
-"""An index of 16 bits that has a meaning of its own."""
+"""The index of 16 bits by which a primitive restarts: no vertex can have it."""
 
 _TYPES = {width: word for word, width in WIDTHS.items()}
 _CODES = {np.dtype(kind).newbyteorder("="): code for code, kind in COMPONENTS.items()}
@@ -30,8 +30,9 @@ _CODES = {np.dtype(kind).newbyteorder("="): code for code, kind in COMPONENTS.it
 class Builder:
     """Collects a document and its bytes, then writes them as one .glb.
 
-    root: the JSON object, to which callers add what they like; lists grow by `add`. Arrays are stored as
-    they are, in the fewest bytes that hold integers and in float32. The same calls give the same bytes.
+    root: the JSON object, to which callers may add entries; `add` appends to its lists. Indices are stored in
+    the fewest bytes that hold them, other numbers as integers of their own type or as float32. The same calls
+    give the same bytes.
     """
 
     def __init__(self) -> None:
@@ -41,15 +42,15 @@ class Builder:
         self._pictures: dict[bytes, int] = {}
 
     def add(self, key: str, entry: dict[str, Any]) -> int:
-        """Return append to a list of the document, such as "nodes"; the entry's index."""
+        """Append an entry to a list of the document, such as "nodes"; return its index."""
         entries: list[dict[str, Any]] = self.root.setdefault(key, [])
         entries.append(entry)
         return len(entries) - 1
 
     def attribute(self, values: npt.ArrayLike, *, bounds: bool = False) -> int:
-        """Return accessor of a vertex attribute, (V, width); floats become float32.
+        """Add a vertex attribute, (V, width); return its accessor. Floats become float32.
 
-        bounds: with the smallest and largest of each component, as positions need them.
+        bounds: also write the smallest and largest of each component, as positions need them.
         """
         array = _native(values)
         stride = array.shape[1] * array.dtype.itemsize
@@ -57,15 +58,15 @@ class Builder:
         return self._accessor(array, bounds, view, offset)
 
     def colours(self, colours: npt.ArrayLike) -> int:
-        """Add COLOR_0, (V, 4), in 8 or 16 bits if these are exact, else in floats; return the accessor."""
+        """Add colours (V, 4), in 8 or 16 bits where these are exact, else as floats; return the accessor."""
         array = _native(colours)
         for kind in (np.uint8, np.uint16):
             top = np.float32(np.iinfo(kind).max)
-            whole = np.rint(np.clip(array, 0, 1) * top)
-            if np.array_equal(whole / top, array):  # as the reader scales them
-                shown = self.attribute(whole.astype(kind))
-                self.root["accessors"][shown]["normalized"] = True
-                return shown
+            levels = np.rint(np.clip(array, 0, 1) * top)
+            if np.array_equal(levels / top, array):  # as readers scale them
+                accessor = self.attribute(levels.astype(kind))
+                self.root["accessors"][accessor]["normalized"] = True
+                return accessor
         return self.attribute(array)
 
     def triangles(self, triangles: npt.ArrayLike) -> int:
@@ -75,24 +76,24 @@ class Builder:
         return self._accessor(corners, False, view, offset)
 
     def data(self, values: npt.ArrayLike, *, bounds: bool = False) -> int:
-        """Add keys, matrices or tables, (N, width) or (N,); return the accessor."""
+        """Add keys or tables, (N, width) or (N,); return the accessor."""
         array = _native(values)
         array = array[:, None] if array.ndim == 1 else array
         view, offset = self._append(array, (None, None))
         return self._accessor(array, bounds, view, offset)
 
     def matrices(self, values: npt.ArrayLike) -> int:
-        """Add matrices (N, 4, 4), in a view that no animation shares; return the accessor."""
+        """Add matrices (N, 4, 4), in a buffer view of their own; return the accessor."""
         array = _native(np.swapaxes(np.asarray(values, dtype=np.float64), -1, -2).reshape(-1, 16))
         view = self._blob(array.astype(array.dtype.newbyteorder("<")).tobytes())
         return self._accessor(array, False, view, 0)
 
     def packed(self, array: Array) -> int:
-        """Add 32-bit numbers, compressed, which other viewers do not need; return the buffer view."""
+        """Add compressed 32-bit numbers, for `unpack` alone; return the buffer view."""
         return self._blob(pack(array))
 
     def displacements(self, values: Floating) -> int:
-        """Add a morph target, (V, 3), sparse if most vertices stay; return the accessor."""
+        """Add a morph target, (V, 3), sparse where most vertices do not move; return the accessor."""
         array = np.asarray(values, dtype=np.float32)
         rows = np.flatnonzero(array.any(axis=1))
         index_bytes = 2 if len(array) <= RESTART + 1 else 4
@@ -100,13 +101,13 @@ class Builder:
             return self.attribute(array, bounds=True)
         entry = _entry(array, True)
         if len(rows):
-            places = _unsigned(rows[:, None], 65535)
-            where, start = self._append(places, (None, None))
+            indices = _unsigned(rows[:, None], 65535)
+            view, start = self._append(indices, (None, None))
             values_view, values_start = self._append(array[rows], (None, None))
             entry["sparse"] = {
                 "count": len(rows),
-                "indices": _at({"componentType": _CODES[places.dtype]}, where, start),
-                "values": _at({}, values_view, values_start),
+                "indices": _located({"componentType": _CODES[indices.dtype]}, view, start),
+                "values": _located({}, values_view, values_start),
             }
         return self.add("accessors", entry)
 
@@ -121,16 +122,16 @@ class Builder:
         return self._pictures[data]
 
     def glb(self) -> bytes:
-        """Return the whole file. Raises ModelError where it would be too large, or a text is no Unicode."""
+        """Return the bytes of the file. ModelError where it would be too large, or a text is not Unicode."""
         chunks: list[bytes] = []
-        at = 0
+        offset = 0
         views = self.root.get("bufferViews", [])
         streams = [(number, bytes(content), key) for key, (number, content) in self._views.items()]
         for number, content, (target, stride) in (
             *streams,
             *((number, content, (None, None)) for number, content in self._blobs),
         ):
-            view: dict[str, Any] = {"buffer": 0, "byteOffset": at, "byteLength": len(content)}
+            view: dict[str, Any] = {"buffer": 0, "byteOffset": offset, "byteLength": len(content)}
             if stride is not None:
                 view["byteStride"] = stride
             if target is not None:
@@ -138,9 +139,9 @@ class Builder:
             views[number] = view
             padding = -len(content) % 4
             chunks += [content, b"\0" * padding]
-            at += len(content) + padding
-        if at:
-            self.root["buffers"] = [{"byteLength": at}]
+            offset += len(content) + padding
+        if offset:
+            self.root["buffers"] = [{"byteLength": offset}]
         try:
             text = json.dumps(self.root, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
         except UnicodeEncodeError:
@@ -154,13 +155,13 @@ class Builder:
         return join_container(text, b"".join(chunks))
 
     def save(self, path: Path) -> None:
-        """Write the file, whole or not at all. Raises ModelError as `glb`, FormatError as `atomic`."""
+        """Write the file, completely or not at all. Raises what `glb` and `atomic` raise."""
         data = self.glb()
         with atomic(path) as file:
             file.write(data)
 
     def _append(self, array: Array, key: tuple[int | None, int | None]) -> tuple[int, int]:
-        """Add to the stream of that target and stride; its buffer view, and the offset in it."""
+        """Add to the stream of a target and stride; return its buffer view, and the offset in it."""
         if key not in self._views:
             self._views[key] = (self.add("bufferViews", {}), bytearray())
         view, content = self._views[key]
@@ -177,7 +178,7 @@ class Builder:
         return view
 
     def _accessor(self, array: Array, bounds: bool, view: int, offset: int) -> int:
-        return self.add("accessors", _at(_entry(array, bounds), view, offset))
+        return self.add("accessors", _located(_entry(array, bounds), view, offset))
 
 
 def _entry(array: Array, bounds: bool) -> dict[str, Any]:
@@ -193,7 +194,7 @@ def _entry(array: Array, bounds: bool) -> dict[str, Any]:
     return entry
 
 
-def _at(entry: dict[str, Any], view: int, offset: int) -> dict[str, Any]:
+def _located(entry: dict[str, Any], view: int, offset: int) -> dict[str, Any]:
     return entry | {"bufferView": view} | ({"byteOffset": offset} if offset else {})
 
 

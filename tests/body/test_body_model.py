@@ -272,7 +272,7 @@ BODY = "extensions/FBA_body"
         (f"{BODY}/parts/1/node", 3, "two parts of the body are named 'rod'"),
         (f"{BODY}/eyes", [[0, 0, 0]], "the pupils must be two places"),
         (f"{BODY}/eyes", [[0, 0, 0], [0, 0, 1e9]], r"eyes\[1\]\[2\]: .* is not within"),
-        (f"{BODY}/notes", {"a": 1}, "notes.a: expected a text"),
+        (f"{BODY}/notes", {"a": 1}, "notes.a: expected text"),
         (f"{BODY}/notes", {str(n): "" for n in range(1001)}, "more than the 1000"),
         ("nodes/1/scale", [1, 2, 1], "joint 'middle' .* has a matrix or a scale"),
         ("nodes/1/matrix", np.eye(4).ravel().tolist(), "joint 'middle' .* has a matrix or a scale"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from importlib.resources import as_file, files
@@ -123,6 +124,58 @@ def test_frames_without_a_body_do_not_count_as_jumps() -> None:
     values, mask = animation.body.values.copy(), animation.body.mask.copy()
     values[20:40], mask[20:40] = 0, False
     assert doubt(Animation(30, animation.index, None, BodyTrack(values, mask)), "iso") is None
+
+
+CALM = plausibility.Motion(beyond=0.0, travel=0.0, along=0.0, carried=0.0, jump=0.0, hops=False, height=0.0)
+
+
+def is_doubted(other: plausibility.Motion = CALM, /, **now: float) -> bool:
+    """Whether a motion with these measurements is doubted where the other table reads it as `other`."""
+    return bool(plausibility._new_faults(replace(CALM, **now), other))
+
+
+def test_joints_must_be_beyond_limits_in_three_tenths_of_the_frames_more() -> None:
+    assert is_doubted(beyond=0.31)
+    assert not is_doubted(beyond=0.29)
+    assert not is_doubted(replace(CALM, beyond=0.15), beyond=0.44)
+    assert not is_doubted(replace(CALM, beyond=0.35), height=-3.0)  # the other reading is no better
+
+
+def test_a_joint_counts_twenty_degrees_beyond_its_limits() -> None:
+    """An elbow flexes by 142 degrees at most."""
+    values = np.zeros((40, 296), dtype=np.int64)
+    for degrees, beyond in ((161.0, 0.0), (163.0, 1.0)):
+        values[:, bap_numbers()["l_elbow_flexion"] - 1] = round(np.radians(degrees) * 1e5)
+        assert plausibility.measure(values, np.arange(40), Fraction(25)).beyond == beyond
+
+
+@pytest.mark.parametrize(
+    ("carried", "fastest"),
+    [
+        (0.0, 0.16),  # a body sways by 8 cm a second; twice that is allowed
+        (1.0, 2.16),  # twice as fast as legs and sway
+        (10.0, 8.0),  # nobody is faster
+    ],
+)
+def test_a_root_goes_no_faster_than_the_legs_carry_it(carried: float, fastest: float) -> None:
+    assert is_doubted(travel=1.02 * fastest, carried=carried, hops=True)
+    assert not is_doubted(travel=0.98 * fastest, carried=carried, hops=True)
+    assert is_doubted(travel=1.02 * fastest, carried=carried) == (fastest == 8.0)  # slower: only in jumps
+
+
+def test_legs_that_walk_carry_the_root() -> None:
+    walks = replace(CALM, carried=0.21, along=0.21)
+    assert is_doubted(walks, carried=0.21, along=0.14 * 0.21)
+    assert not is_doubted(walks, carried=0.21, along=0.16 * 0.21)
+    assert not is_doubted(walks, carried=0.19, along=0.0)
+    assert not is_doubted(replace(walks, carried=0.19), carried=0.21)
+    assert not is_doubted(replace(walks, along=0.1), carried=0.21)  # the other reading stands still, too
+
+
+def test_a_body_two_metres_down_is_underground() -> None:
+    assert is_doubted(height=-2.1)
+    assert not is_doubted(height=-1.9)
+    assert not is_doubted(replace(CALM, height=-2.1), height=-60.0)
 
 
 def test_an_unknown_table_is_refused() -> None:

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from fba.body import BapSolver, Skeleton
 from fba.capture import matching, retarget
-from fba.capture.limbs import ground, soles
+from fba.capture.limbs import _leg_ik as leg_ik
+from fba.capture.limbs import ground, hinges, soles
 from fba.capture.limbs.foot_planting import turn_foot
 from fba.capture.limbs.targets import Targets
 from fba.capture.motion import SkeletonMotion
@@ -156,3 +157,39 @@ def test_on_tiptoe_the_tip_of_the_toes_is_lowest(toes: bool, longer: float) -> N
 def test_legs_move_feet_that_are_on_the_ground(height: float, lacking: float, move: float) -> None:
     above = np.full((2, 60), height)
     np.testing.assert_allclose(soles.heights(above, above - lacking, 60.0), move, atol=1e-4)
+
+
+def test_a_clear_bend_shows_which_way_a_knee_bends() -> None:
+    """Most of the time it is a little beyond straight, by noise; 0.35 rad in the end is clear enough."""
+    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    knee = hinges.Hinge(down, down, across, down, 1.0)
+    bends = np.concatenate([np.full(400, -0.05), np.linspace(-0.05, 0.35, 10), np.full(8, 0.35)])
+    turn = Rotation.from_rotvec(2.0 * down)  # of the thigh about itself, in the source
+    local = (turn * Rotation.from_rotvec(np.outer(bends, across))).as_matrix()
+    angles = hinges.solve(knee, local @ down, local, 25.0)
+    np.testing.assert_allclose(angles[:, 0], 2.0, atol=0.03)
+    np.testing.assert_allclose(angles[:, 1], bends, atol=0.03)
+
+
+def test_a_leg_makes_its_share_of_a_change_of_length() -> None:
+    """To a fifth of a millimetre in 5 cm."""
+    bends = np.radians([20.0, 30.0, 60.0, 90.0, 120.0])
+    hip, knee = np.zeros((5, 3)), np.tile([0.0, -0.4, 0.0], (5, 1))
+    shank = 0.4 * np.stack([0.0 * bends, -np.cos(bends), -np.sin(bends)], axis=1)
+    leg = leg_ik.Leg(hip, knee, knee + shank, np.tile([1.0, 0.0, 0.0], (5, 1)))
+    move = np.tile([0.0, 0.05, 0.0], (5, 1))
+    thigh, lower = leg_ik.reach(leg, move)
+    moved = (thigh @ knee[..., None] + lower @ shank[..., None])[..., 0]
+    length, wanted = (np.linalg.norm(end, axis=1) for end in (knee + shank, knee + shank + move))
+    goal = length + leg_ik.pliancy(leg) * (wanted - length)
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), goal, atol=2e-4)
+
+
+def test_feet_far_from_a_slope_count_little() -> None:
+    """Three frames of ten are steps, 10 cm up, in the farther half."""
+    along = np.linspace(0, 4, 400)
+    steps = (np.arange(400) % 10 < 3) & (along > 2)
+    under = ground_under(0.04 * along + 0.1 * steps, along)
+    assert under.slope[1] == pytest.approx(0.04, abs=1e-4)
+    assert under.height == pytest.approx(0.0, abs=4e-4)
+    assert ground_under(0.07 * along, along).slope[1] == pytest.approx(0.07, abs=3e-3)

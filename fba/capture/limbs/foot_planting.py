@@ -14,8 +14,6 @@ STEPS = 4
 """Iterations that find the rotations of ankle and subtalar joint with which a foot points exactly."""
 ROUNDS = 2
 """Iterations that move the legs: turning a foot moves its sole again."""
-STIFFEST = 1.1
-"""Weight of a straight leg in the height of the body; a bent leg, which can adapt, has less."""
 
 
 def turn_foot(targets: Targets, side: str) -> None:
@@ -80,8 +78,8 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
     under = np.zeros_like(level) if floor == "floor" else level
     stiff = np.ones_like(above)
     if plant and all(targets.aims.get(f"{side}_hip") == f"{side}_knee" for side in "lr"):
-        pliant = np.array([leg_ik.pliancy(_leg(targets, side, root)) for side in "lr"])
-        stiff = STIFFEST - pliant
+        # a straight leg counts most in the height of the body: a bent one can adapt
+        stiff = 1.0 - np.array([leg_ik.pliancy(_leg(targets, side, root)) for side in "lr"])
         raised = soles.lift(above, body.lowest - under, stiff, rate)
         common, along = soles.slips(source.points, body.points, level, rate)
         root[:, [0, 2]] += common

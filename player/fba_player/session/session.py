@@ -36,6 +36,8 @@ Hook = Callable[[Float32, Float64], None]
 NOTICE_SECONDS = 4.0
 LEAVING = 6.0
 """Seconds in which closing again discards unsaved work."""
+IDLE_MOUSE = 3.0
+"""Seconds without input after which a full screen hides the mouse cursor while it plays."""
 NOTICE_FADES = 0.5
 """Last seconds of a notice, in which it fades."""
 
@@ -196,6 +198,11 @@ class Session:
     def idle(self) -> float:
         """Seconds since the last input of the user."""
         return self.clock() - self.last_input
+
+    @property
+    def hides_mouse(self) -> bool:
+        """Whether a full screen shows no mouse cursor: it plays, and the user leaves the mouse alone."""
+        return self.transport.playing and self.idle > IDLE_MOUSE
 
     @property
     def restless(self) -> bool:

@@ -5,20 +5,34 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
 from fba.arrays import Int16
 from fba.errors import FbaError
+from fba_player.playback.playhead import Motion
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 
 SECONDS = 0.5
 """Length of a block, in seconds."""
+AHEAD = 2.5
+"""Seconds ahead of now whose samples are decoded in advance."""
 CACHED_BLOCKS = 64
 """Blocks in memory, half a minute: 6 MB at 48 kHz."""
 PAUSE = 0.03
 """Seconds between checks of which samples are wanted."""
+
+
+def samples_ahead(motion: Motion, now: float, origin: float, rate: int) -> Iterator[int]:
+    """Return the numbers of samples that will be heard soon, the next one first, in steps of a block.
+
+    motion: of the transport. now: seconds of its clock. origin: time at which the sound begins, seconds. The
+    last number lies a block behind the present position, for a start after a pause.
+    """
+    for ahead in np.arange(0.0, AHEAD + SECONDS / 2, SECONDS):
+        yield int((motion.time(now + float(ahead)) - origin) * rate)
+    yield int((motion.here - origin + SECONDS) * rate)
 
 
 class SoundBlocks:

@@ -21,7 +21,7 @@ from fba.errors import FbaWarning
 from fba_player.playback.transport import Transport
 from fba_player.sound._device_clock import SoundClock
 from fba_player.sound._mixer import SoundMixer
-from fba_player.sound._read_ahead import SoundBlocks
+from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.soundtrack import find_sound_beside
 
@@ -29,8 +29,6 @@ __all__ = ["Audio", "find_sound_beside", "open_audio"]
 
 PERIOD, PERIODS = 0.04, 3
 """Seconds that a device asks for at a time, and how many such periods it buffers."""
-AHEAD = (0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5)
-"""Seconds ahead of now whose samples are decoded in advance."""
 
 
 class NoDeviceError(Exception):
@@ -126,11 +124,7 @@ class Audio:
             samples = yield self._mixer.fill(first, samples).tobytes()
 
     def _samples_ahead(self) -> Iterator[int]:
-        """Numbers of samples that will be heard soon, the next one first."""
-        motion, now = self.transport.motion, self.clock()
-        for ahead in AHEAD:
-            yield int((motion.time(now + ahead) - self._origin) * self.rate)
-        yield int((motion.here - self._origin) * self.rate + AHEAD[1] * self.rate)
+        return samples_ahead(self.transport.motion, self.clock(), self._origin, self.rate)
 
 
 def open_audio(

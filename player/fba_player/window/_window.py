@@ -43,8 +43,6 @@ FASTEST = 1 / 250
 """Least seconds per picture, for displays that do not limit the rate."""
 WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
-IDLE_MOUSE = 3.0
-"""Seconds after which the mouse cursor is hidden, in full screen while playing."""
 SETTLES = 4
 """Pictures drawn after an input: imgui needs some until the panels have settled."""
 
@@ -276,9 +274,7 @@ class Window:
         elif self._overlay is not None and not session.bare:
             self._overlay.draw(self.controls)
         self._last = now
-        self.input.set_cursor(
-            hidden=self.transport.playing and self._full_screen.active and session.idle > IDLE_MOUSE
-        )
+        self.input.set_cursor(hidden=self._full_screen.active and session.hides_mouse)
         self._show_title()
 
     def _handle_requests(self) -> None:

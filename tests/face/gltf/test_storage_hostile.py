@@ -55,8 +55,8 @@ CASES: list[tuple[str, Any, str]] = [
     (FACE, [], "extensions.FBA_face: expected an object, found a list"),
     (FACE + "/version", 2, "extensions.FBA_face: is version 2; version 1 is read"),
     (FACE + "/version", REMOVED, "extensions.FBA_face: 'version' is missing"),
-    (FACE + "/name", 1, "FBA_face.name: expected a text"),
-    (FACE + "/notes", {"a": []}, "FBA_face.notes.a: expected a text, found a list of 0"),
+    (FACE + "/name", 1, "FBA_face.name: expected text"),
+    (FACE + "/notes", {"a": []}, "FBA_face.notes.a: expected text, found a list of 0"),
     (FACE + "/notes", {str(n): "" for n in range(1001)}, "FBA_face.notes: more than the 1000"),
     (FACE + "/lost", {"viseme": ""}, "FBA_face.lost.viseme: 'viseme' is not the name of a low-level FAP"),
     (FACE + "/parts", [], "FBA_face.parts: a face needs at least one part"),
@@ -196,7 +196,7 @@ def test_files_that_are_no_faces(tmp_path: Path) -> None:
         with pytest.raises(FormatError):
             load(path)
     (tmp_path / "a.glb").write_bytes(b"no face at all")
-    with pytest.raises(ModelError, match=r"^a\.glb: is no glTF 2\.0"):
+    with pytest.raises(ModelError, match=r"^a\.glb: is not glTF 2\.0"):
         load(tmp_path / "a.glb")
 
 

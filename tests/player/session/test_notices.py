@@ -50,3 +50,17 @@ def test_a_notice_stays_four_seconds_and_fades_in_the_last_half(session: Session
     later(session, 0.5)
     assert session.notices() == []
     assert not session.restless
+
+
+def test_the_mouse_cursor_hides_after_three_idle_seconds_of_playing(session: Session) -> None:
+    session.touched()
+    later(session, 3.1)
+    assert not session.hides_mouse
+    session.transport.play()
+    session.touched()
+    later(session, 2.9)
+    assert not session.hides_mouse
+    later(session, 0.2)
+    assert session.hides_mouse
+    session.touched()
+    assert not session.hides_mouse

@@ -14,9 +14,10 @@ import pytest
 
 from fba.animation import Animation
 from fba.errors import FbaWarning, FormatError
+from fba_player.playback.playhead import Motion
 from fba_player.playback.timeline import Timeline
 from fba_player.playback.transport import Transport
-from fba_player.sound._read_ahead import SoundBlocks
+from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
 from fba_player.sound.audio_file import SoundFile
 from fba_player.sound.player import Audio, find_sound_beside, open_audio
 from player_tracks import face_track
@@ -228,3 +229,15 @@ def test_beside_a_stream(tmp_path: Path) -> None:
     write_wav(tmp_path / "talk.wav", tone(10))
     assert find_sound_beside(tmp_path / "talk.fba") == tmp_path / "talk.wav"
     assert find_sound_beside(tmp_path / "walk.fba") is None
+
+
+def test_the_next_two_and_a_half_seconds_are_decoded_in_advance() -> None:
+    rate = 1000
+    playing = Motion(
+        since=0.0, here=0.0, speed=1.0, playing=True, stop=60.0, low=0.0, high=0.0, rest=60.0, loop=False
+    )
+    for now in (0.0, 0.3, 7.9):
+        samples = list(samples_ahead(playing, now, 0.0, rate))
+        assert samples[0] == pytest.approx(now * rate, abs=1)
+        blocks = {sample // (rate // 2) for sample in samples[:-1]}
+        assert blocks == set(range(int(2 * now), int(2 * now) + 6))
