@@ -12,6 +12,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Int32, Int64
 from fba.codec._plane import slots, syntax
+from fba.codec._plane.header_loops import MASK_ALL, MASK_INTERPOLATE, MASK_KEEP, MASK_NONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,16 +72,14 @@ def mask_types(part: int, mask: Bool, interpolated: Bool | None, unsent: str) ->
 @lru_cache(maxsize=64)
 def _mask_types(part: int, mask: bytes, interpolated: bytes, unsent: str) -> tuple[int, ...]:
     """Do the same with bytes, so that results can be cached: a live encoder asks for every frame."""
-    masked = (
-        syntax.MASK_INTERPOLATE if unsent == "interpolate" and part == slots.FACE_BIT else syntax.MASK_KEEP
-    )
+    masked = MASK_INTERPOLATE if unsent == "interpolate" and part == slots.FACE_BIT else MASK_KEEP
     types = []
     for group in syntax.groups(part):
         sent = [mask[number - 1] for number in group]
         if all(sent):
-            types.append(syntax.MASK_ALL)
+            types.append(MASK_ALL)
         elif interpolated and all(mask[number - 1] or interpolated[number - 1] for number in group):
-            types.append(syntax.MASK_INTERPOLATE)
+            types.append(MASK_INTERPOLATE)
         else:
-            types.append(masked if any(sent) else syntax.MASK_NONE)
+            types.append(masked if any(sent) else MASK_NONE)
     return tuple(types)

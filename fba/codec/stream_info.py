@@ -12,7 +12,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
 from fba.codec._decoder import Damage, Decoder
-from fba.codec._plane import syntax
+from fba.codec._plane import header_loops
 from fba.codec.block import Block
 from fba.codec.settings import PartSettings
 from fba.errors import BitstreamError
@@ -20,10 +20,10 @@ from fba.limits import DEFAULT_LIMITS, Limits
 
 _CHUNK = 1 << 16
 _MASK_NAMES = {
-    syntax.MASK_NONE: "none",
-    syntax.MASK_KEEP: "keep",
-    syntax.MASK_INTERPOLATE: "interpolate",
-    syntax.MASK_ALL: "all",
+    header_loops.MASK_NONE: "none",
+    header_loops.MASK_KEEP: "keep",
+    header_loops.MASK_INTERPOLATE: "interpolate",
+    header_loops.MASK_ALL: "all",
 }
 
 

@@ -29,14 +29,6 @@ class BitReader:
         number = int.from_bytes(self.data[first:last].tobytes(), "big")
         return (number >> (8 * last - stop)) & ((1 << count) - 1)
 
-    def peek(self, count: int) -> UInt8 | None:
-        """Return the next `count` bits, one in each element, without moving on; None if there are fewer."""
-        start, stop = self.bit, self.bit + count
-        if stop > self.end:
-            return None
-        first = start >> 3
-        return np.unpackbits(self.data[first : (stop + 7) >> 3])[start - 8 * first : stop - 8 * first]
-
 
 class BitWriter:
     """Writes into `data`, a buffer that grows; `bit` is the position after the last bit written."""

@@ -9,6 +9,7 @@ import numpy as np
 from fba.arrays import Int64
 from fba.codec._plane import quantiser, slots
 from fba.codec._plane.arithmetic import STRIDE, Counts
+from fba.codec._plane.header_loops import begin_models
 from fba.codec._plane.loops import Coding
 from fba.codec.settings import RANGE_UNIT, PartSettings
 from fba.parameters import EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, baps, faps
@@ -59,6 +60,10 @@ class Models:
         self.intra = Coding(self.i_minimum, *value, Counts(self.i_size, *shared))
         self.predicted = Coding(self.minimum, *value, Counts(self.size, *shared))
 
+    def begin_object(self) -> None:
+        """Forget all ranges that were sent; the I planes that must come set the rest."""
+        self.limits[:] = default_limits()
+
     def begin_intra(self, part: int, settings: PartSettings) -> None:
         """Apply the settings of an I plane to a part: set ranges and steps, and reset the models."""
         columns = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
@@ -67,34 +72,21 @@ class Models:
             if codes is not None:
                 sent = codes[2:] if part == slots.FACE_BIT else codes
                 limits[columns][coded] = RANGE_UNIT * sent[coded].astype(np.int64)
-        scale = quantiser.scale(part, settings.quant)
         span = slice(0 if part == slots.FACE_BIT else columns.start, columns.stop)
-        self._reset_counts(span)
         self.step[span] = quantiser.steps(part, settings.quant, self.bap_table)
-        i_max, i_min, p_max, p_min = np.maximum(self.limits[:, columns], 0) // scale
-        self.i_minimum[columns], self.i_size[columns] = -i_min, i_max + i_min + 1
-        self.minimum[columns], self.size[columns] = -p_min, p_max + p_min + 1
-        if part == slots.FACE_BIT:
-            amount = (INTENSITY_MAX + settings.quant // 2) // scale if settings.quant else INTENSITY_MAX
-            limit = _SELECT_LIMITS.copy()
-            limit[slots.AMOUNTS] = amount
-            self.i_size[: columns.start] = limit + 1  # I: 0..limit
-            self.minimum[: columns.start], self.size[: columns.start] = -limit, 2 * limit + 1
-        self.total[span] = self.size[span]
-        self.usual[span] = self.below_usual[span] = -self.minimum[span]
-
-    def _reset_counts(self, span: slice) -> None:
-        """Reset the counts of these slots; only those that were used, which are few."""
-        used = np.flatnonzero(self.total[span] != self.size[span]) + span.start
-        self.added[used] = 0
-        self.tree[used] = 0
+        scale = quantiser.scale(part, settings.quant)
+        high_level = _SELECT_LIMITS.copy()
+        high_level[slots.AMOUNTS] = (
+            (INTENSITY_MAX + settings.quant // 2) // scale if settings.quant else INTENSITY_MAX
+        )
+        begin_models((span.start, span.stop), scale, self.limits, high_level, self.intra, self.predicted)
 
     def undefined(self, settings: PartSettings, part: int) -> int | None:
         """Return a slot that the settings code without a range having been sent for it, or None."""
-        columns = slots.FAPS if part == slots.FACE_BIT else slots.BAPS
-        coded = settings.mask[2:] if part == slots.FACE_BIT else settings.mask
-        missing = np.flatnonzero((self.limits[:, columns] == UNDEFINED).any(axis=0) & coded)
-        return int(missing[0]) + columns.start if len(missing) else None
+        if part == slots.FACE_BIT:
+            return None
+        missing = np.flatnonzero((self.limits[:, slots.BAPS] == UNDEFINED).any(axis=0) & settings.mask)
+        return int(missing[0]) + slots.BAPS.start if len(missing) else None
 
 
 @cache

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from fba.arrays import Int64, Integer
@@ -24,6 +26,7 @@ def scale(part: int, quant: int) -> int:
     return max(quant if part == slots.FACE_BIT else BAP_PREDICTIVE_SCALE[quant], 1)
 
 
+@cache
 def steps(part: int, quant: int, bap_table: str) -> Int64:
     """Return the steps of a part, int64 (73,) or (296,) in slot order; 1 for unquantised values."""
     factor = scale(part, quant)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from fba.arrays import Bool, Int32, Int64, UInt8
-from fba.codec._plane import loops, slots, syntax
+from fba.codec._plane import header_loops, loops, slots, syntax
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, OutOfDataError
 from fba.codec._plane.coder_state import Models
 from fba.codec._plane.loops import Layout, Layouts
-from fba.codec.settings import FrameRate, PartSettings, PlaneSettings
+from fba.codec.settings import FrameRate, PartSettings, PlaneSettings, TimeCode
 from fba.errors import BitstreamError, UnsupportedError
 
 _RUN = 512
@@ -63,6 +63,33 @@ def _columns(order: Int64, face_mask: Bool | None) -> Int64:
     return np.append(order, np.arange(slots.FLAGS.start, slots.FLAGS.stop)) if flags else order
 
 
+@dataclass
+class _BegunIntra:
+    """An I plane of which not all bytes may be there yet.
+
+    bits: how many of its bits were read. mask: fba_object_mask. settings, values: of the parts that were
+    read; values are slots (K,) and values (K,).
+    """
+
+    bits: int
+    mask: int
+    frame_rate: FrameRate | None
+    time_code: TimeCode | None
+    skip: int
+    settings: dict[int, PartSettings] = field(default_factory=dict)
+    values: dict[int, tuple[Int64, Int64]] = field(default_factory=dict)
+    flags: Int64 = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+
+    @classmethod
+    def read(cls, reader: BitReader, start: int) -> _BegunIntra:
+        """Read what comes before the parts; the plane begins at `start`."""
+        mask = _read_object_mask(reader)
+        frame_rate = _read_frame_rate(reader)
+        time_code = syntax.read_time_code(reader) if reader.read(1) else None
+        skip = syntax.read_skip(reader)
+        return cls(reader.bit - start, mask, frame_rate, time_code, skip)
+
+
 class PlaneReader:
     """Reads the planes of an FBA object, and holds the state from one plane to the next.
 
@@ -70,10 +97,9 @@ class PlaneReader:
     """
 
     def __init__(self, bap_table: str = "iso") -> None:
-        self._bap_table = bap_table
         self._models = Models(bap_table)
-        self._models_used = False
         self._settings: dict[int, PartSettings] = {}
+        self._begun: _BegunIntra | None = None  # the plane at which data ran out
         self._run: _Run | None = None  # for P planes with these settings, once there are any
         self._parts = np.zeros(_RUN, dtype=np.uint8)
         self._skips = np.zeros(_RUN, dtype=np.int64)
@@ -81,22 +107,22 @@ class PlaneReader:
 
     def begin_object(self) -> None:
         """Reset all state, including ranges."""
-        if self._models_used:
-            self._models = Models(self._bap_table)
-            self._models_used = False
+        self._models.begin_object()
         self.forget_values()
 
     def forget_values(self) -> None:
         """Reset settings after damage: P planes are errors until the next I plane."""
         self._settings.clear()
+        self._begun = None
         self._run = None
 
     def read(self, data: UInt8, bit: int, end: int, *, after_code: bool) -> Planes | None:
         """Return the plane at `bit` and the P planes that follow it; None if none is complete.
 
-        after_code: a start code ends at `bit`. Raises OutOfDataError if the first plane goes beyond `end`,
-        BitstreamError and UnsupportedError for that plane. After an error, only state that the next I plane
-        sets has changed.
+        after_code: a start code ends at `bit`. Raises OutOfDataError if the first plane goes beyond `end`;
+        the next call must be for that plane with more data, unless `forget_values` comes before. Raises
+        BitstreamError and UnsupportedError for the first plane. After an error, only state that the next I
+        plane sets has changed.
         """
         reader = BitReader(data, bit, end)
         if reader.read(1):
@@ -104,40 +130,42 @@ class PlaneReader:
         return self._read_predicted(reader, after_code)
 
     def _read_intra(self, reader: BitReader, after_code: bool) -> Planes:
-        """Read an I plane, whose first bit has been read."""
+        """Read an I plane, whose first bit has been read; one that was incomplete, from where that ended."""
         start = reader.bit - 1
-        mask = _read_object_mask(reader)
-        frame_rate = _read_frame_rate(reader)
-        time_code = syntax.read_time_code(reader) if reader.read(1) else None
-        skip = syntax.read_skip(reader)
-        settings: dict[int, PartSettings] = {}
-        flags = np.zeros(3, dtype=np.int64)
-        decoded: list[tuple[Int64, Int64]] = []
+        if self._begun is None:
+            self._begun = _BegunIntra.read(reader, start)
+        begun = self._begun
+        reader.bit = start + begun.bits
         for part, name in _PARTS:
-            if mask & part:
-                settings[part] = self._read_part(reader, part, name)
-                decoded.append(self._read_intra_values(reader, part, settings[part], flags))
-        for order, values in decoded:
+            if not begun.mask & part or part in begun.values:
+                continue
+            if part not in begun.settings:
+                begun.settings[part] = self._read_part(reader, part, name)
+                begun.bits = reader.bit - start
+            begun.values[part] = self._read_intra_values(reader, part, begun.settings[part], begun.flags)
+            begun.bits = reader.bit - start
+        self._begun = None
+        for order, values in begun.values.values():
             self._models.last[order] = values
-        face = settings.get(slots.FACE_BIT)
-        order = np.concatenate([order for order, _ in decoded])
+        face = begun.settings.get(slots.FACE_BIT)
+        order = np.concatenate([order for order, _ in begun.values.values()])
         columns = _columns(order, face.mask if face is not None else None)
-        row = np.concatenate([*(values for _, values in decoded), flags])[: len(columns)].astype(np.int32)
-        self._settings.update(settings)
+        row = np.concatenate([*(values for _, values in begun.values.values()), begun.flags])
+        self._settings.update(begun.settings)
         self._run = None
         return Planes(
-            row[None],
+            row[None, : len(columns)].astype(np.int32),
             columns,
-            np.array([mask], dtype=np.uint8),
+            np.array([begun.mask], dtype=np.uint8),
             np.array([start, reader.bit], dtype=np.int64),
-            np.array([skip], dtype=np.int64),
+            np.array([begun.skip], dtype=np.int64),
             PlaneSettings(
                 intra=True,
                 face=face,
-                body=settings.get(slots.BODY_BIT),
-                frame_rate=frame_rate,
-                time_code=time_code,
-                skip=skip,
+                body=begun.settings.get(slots.BODY_BIT),
+                frame_rate=begun.frame_rate,
+                time_code=begun.time_code,
+                skip=begun.skip,
                 start_code=after_code,
             ),
         )
@@ -145,14 +173,13 @@ class PlaneReader:
     def _read_part(self, reader: BitReader, part: int, name: str) -> PartSettings:
         """Read the header of a part in an I plane, and apply it."""
         settings = syntax.read_part(reader, part)
-        if settings.coding_type == syntax.DCT:
+        if settings.coding_type == header_loops.DCT:
             raise UnsupportedError(
                 f"{name} are coded as DCT segments (object_coding_type 1), whose code tables are in no "
                 "public source",
                 what="DCT segments (object_coding_type 1)",
                 bit=reader.bit - 1,
             )
-        self._models_used = True
         self._models.begin_intra(part, settings)
         undefined = self._models.undefined(settings, part)
         if undefined is not None:

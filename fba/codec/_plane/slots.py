@@ -8,7 +8,7 @@ BAPs.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -74,6 +74,17 @@ def coding_order(face_mask: Bool | None, body_mask: Bool | None) -> tuple[Int64,
     and segments, int64 (S, 3): position in order of the segment's first slot, of the slot after its last, and
     number of flag bits that follow it (1 after the viseme, 2 after the expression).
     """
+    return _coding_order(
+        face_mask.tobytes() if face_mask is not None else None,
+        body_mask.tobytes() if body_mask is not None else None,
+    )
+
+
+@lru_cache(maxsize=64)
+def _coding_order(face: bytes | None, body: bytes | None) -> tuple[Int64, Int64]:
+    """Do the same with bytes, so that results can be cached: streams of I planes ask for every plane."""
+    face_mask = np.frombuffer(face, dtype=np.bool_) if face is not None else None
+    body_mask = np.frombuffer(body, dtype=np.bool_) if body is not None else None
     order: list[int] = []
     segments: list[tuple[int, int, int]] = []
 

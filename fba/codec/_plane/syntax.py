@@ -16,21 +16,23 @@ A plane is::
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import NamedTuple, NoReturn
-
 import numpy as np
-import numpy.typing as npt
 
 from fba.arrays import Bool
-from fba.codec._plane import slots
+from fba.codec._plane import header_loops, slots
 from fba.codec._plane.arithmetic import OK, OUT_OF_DATA
 from fba.codec._plane.bits import BitReader, BitWriter, OutOfDataError
+from fba.codec._plane.header_loops import (
+    MARKER_EVERY,
+    MASK_INTERPOLATE,
+    MASK_KEEP,
+    RANGE_BITS,
+)
 from fba.codec._plane.loops import STATUS_TEXT
 from fba.codec._plane.loops import read_skip as read_skip_words
 from fba.codec.settings import FrameRate, PartSettings, RangeLists, TimeCode
 from fba.errors import BitstreamError
-from fba.parameters import BAP_COUNT, FAP_COUNT, bap_groups, fap_groups
+from fba.parameters import bap_groups, fap_groups
 
 START_CODE_PREFIX = b"\x00\x00\x01"
 OBJECT_CODES = (0xBA, 0x01)
@@ -39,13 +41,7 @@ PLANE_CODES = (0xBB, 0x03)
 """Last bytes of fba_object_plane_start_code: likewise."""
 END_CODE = 0xB1
 
-PREDICTIVE, DCT = 0, 1
-MASK_NONE, MASK_KEEP, MASK_INTERPOLATE, MASK_ALL = range(4)
-
 LISTS = ("i_max", "i_min", "p_max", "p_min")
-RANGE_BITS = 5
-_MARKER_EVERY = 4
-_RANGE_WEIGHTS = 1 << np.arange(RANGE_BITS, dtype=np.uint8)[::-1]
 
 
 def interpolated(settings: PartSettings) -> Bool | None:
@@ -115,32 +111,27 @@ def read_part(reader: BitReader, part: int) -> PartSettings:
 
     Raises BitstreamError on a wrong marker bit or a reserved mask type.
     """
+    header = header_loops.empty_header(part)
+    status, bit, place = header_loops.read_part_header(
+        reader.data, reader.bit, reader.end, header_loops.groups(part), header
+    )
+    if status == OUT_OF_DATA:
+        raise OutOfDataError
     name = "fap" if part == slots.FACE_BIT else "bap"
-    mask = np.zeros(FAP_COUNT if part == slots.FACE_BIT else BAP_COUNT, dtype=bool)
-    quant = reader.read(5)
-    types = []
-    for number, group in enumerate(groups(part), 1):
-        bits = reader.read(3)
-        if not bits >> 2:
-            raise _marker_error(reader, f"before {name}_mask_type of group {number}", 3)
-        kind = bits & 3
-        if kind == MASK_INTERPOLATE and part == slots.BODY_BIT:
-            raise BitstreamError(
-                f"bap_mask_type of group {number} is 2 (interpolate), which exists for FAPs only",
-                bit=reader.bit - 2,
-            )
-        types.append(kind)
-        columns = np.array(group) - 1
-        if kind == MASK_ALL:
-            mask[columns] = True
-        elif kind != MASK_NONE:
-            bits = reader.read(len(group))
-            mask[columns] = [(bits >> shift) & 1 for shift in reversed(range(len(group)))]
-    gender = reader.read(1)
-    coding_type = reader.read(1)
-    ranges = RangeLists() if coding_type == DCT else _read_ranges(reader, part, mask)
-    mask.flags.writeable = False
-    return PartSettings(tuple(types), mask, quant, gender, coding_type, ranges)
+    if status == header_loops.BAD_MASK_MARKER:
+        raise _marker_error(f"before {name}_mask_type of group {place}", bit)
+    if status == header_loops.BAD_MASK_TYPE:
+        raise BitstreamError(
+            f"bap_mask_type of group {place} is 2 (interpolate), which exists for FAPs only", bit=bit
+        )
+    if status == header_loops.BAD_RANGE_MARKER:
+        raise _marker_error(f"in the {LISTS[place]} range list", bit)
+    reader.bit = bit
+    quant, gender, coding_type, *present = header.fields.tolist()
+    header.mask.flags.writeable = header.ranges.flags.writeable = False
+    lists = (codes if sent else None for codes, sent in zip(header.ranges, present, strict=True))
+    ranges = RangeLists(*lists) if any(present) else RangeLists()
+    return PartSettings(tuple(header.types.tolist()), header.mask, quant, gender, coding_type, ranges)
 
 
 def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
@@ -165,78 +156,16 @@ def write_part(writer: BitWriter, part: int, settings: PartSettings) -> None:
                 writer.write(bits, 1 + RANGE_BITS * len(chunk))
 
 
-def _read_ranges(reader: BitReader, part: int, mask: Bool) -> RangeLists:
-    """Read the four is_*_new_* flags and the range lists."""
-    flags = [reader.read(1) for _ in LISTS]
-    layout = _range_layout(part, mask.tobytes()) if any(flags) else None
-    lists: list[np.ndarray | None] = []
-    for name, present in zip(LISTS, flags, strict=True):
-        if not present or layout is None:
-            lists.append(None)
-            continue
-        codes = np.zeros(len(mask), dtype=np.uint8)
-        bits = reader.peek(layout.size)
-        if bits is not None and bits[layout.markers].all():
-            codes[layout.columns] = bits[layout.codes] @ _RANGE_WEIGHTS
-            reader.bit += layout.size
-        else:
-            _raise_range_error(reader, name, layout.chunks)
-        codes.flags.writeable = False
-        lists.append(codes)
-    return RangeLists(*lists)
-
-
-def _raise_range_error(reader: BitReader, name: str, chunks: list[list[int]]) -> NoReturn:
-    """Raise the error of a range list with a marker bit of 0, or that goes beyond the end of the data."""
-    for chunk in chunks:
-        bits = reader.read(1 + RANGE_BITS * len(chunk))
-        if not bits >> RANGE_BITS * len(chunk):
-            raise _marker_error(reader, f"in the {name} range list", 1 + RANGE_BITS * len(chunk))
-    raise AssertionError("this range list has no error")
-
-
-class _RangeLayout(NamedTuple):
-    """Where the bits of a range list are, for one mask.
-
-    chunks: parameter numbers after each marker bit. markers: (M,), positions of the marker bits, from the
-    start of the list. columns: (C,), column of each limit. codes: (C, 5), positions of its bits. size: bits.
-    """
-
-    chunks: list[list[int]]
-    markers: npt.NDArray[np.intp]
-    columns: npt.NDArray[np.intp]
-    codes: npt.NDArray[np.intp]
-    size: int
-
-
-@lru_cache(maxsize=64)
-def _range_layout(part: int, mask: bytes) -> _RangeLayout:
-    """Return the layout of a range list. mask: bytes of a bool array."""
-    chunks = _range_chunks(part, np.frombuffer(mask, dtype=bool))
-    markers: list[int] = []
-    codes: list[int] = []
-    bit = 0
-    for chunk in chunks:
-        markers.append(bit)
-        codes += range(bit + 1, bit + 1 + RANGE_BITS * len(chunk), RANGE_BITS)
-        bit += 1 + RANGE_BITS * len(chunk)
-    columns = np.array([number - 1 for chunk in chunks for number in chunk], dtype=np.intp)
-    starts = np.array(codes, dtype=np.intp)[:, None]
-    return _RangeLayout(
-        chunks, np.array(markers, dtype=np.intp), columns, starts + np.arange(RANGE_BITS), bit
-    )
-
-
 def _range_chunks(part: int, mask: Bool) -> list[list[int]]:
     """Return the numbers of the sent parameters whose limits follow each marker bit of a range list."""
     ranged = groups(part)[1:] if part == slots.FACE_BIT else groups(part)  # FAP 1 and 2 have no ranges
     return [
-        [number for number in group[start : start + _MARKER_EVERY] if mask[number - 1]]
+        [number for number in group[start : start + MARKER_EVERY] if mask[number - 1]]
         for group in ranged
-        for start in range(0, len(group), _MARKER_EVERY)
+        for start in range(0, len(group), MARKER_EVERY)
     ]
 
 
-def _marker_error(reader: BitReader, where: str, back: int) -> BitstreamError:
-    """Return the error for a marker bit of 0, `back` bits before the reader."""
-    return BitstreamError(f"marker bit {where} is 0, expected 1", bit=reader.bit - back)
+def _marker_error(where: str, bit: int) -> BitstreamError:
+    """Return the error for a marker bit of 0."""
+    return BitstreamError(f"marker bit {where} is 0, expected 1", bit=bit)
