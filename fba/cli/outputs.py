@@ -115,7 +115,7 @@ class Outputs:
         click.echo(line, err=self.standard)
 
     def print_json(self, value: object) -> None:
-        """Print a report for programs, likewise."""
+        """Print a report for programs, to the same stream as `say`."""
         self.say(json.dumps(value, indent=2))
 
     def write(self, path: Path, data: bytes) -> None:

@@ -18,7 +18,7 @@ HINGES = (
 """Upper joint, bending joint, next joint; direction of the side that folds; metres to both sides of the joint
 over which weights change from one to the other, on the side that folds and on the one that stretches."""
 LIMB = 0.06
-"""Metres from the bone to the skin, about."""
+"""Approximate distance from bone to skin, metres."""
 ARMHOLE = (0.026, 0.060)
 """Metres to both sides of a sleeve's seam over which weights change from trunk to arm: at the armpit and at
 the top."""
@@ -37,7 +37,7 @@ EASING_ROUNDS = 10
 
 
 def ease_limb_weights(person: Person, positions: dict[str, Float64], weights: Float64) -> Float64:
-    """(V, J) weights, with those about the joints of limbs replaced. positions: of the joints, by name."""
+    """Return (V, J) weights, replaced about the joints of limbs. positions: of the joints, by name."""
     weights = weights.copy()
     _ease_shoulders(person, positions, weights)
     number = {name: n for n, name in enumerate(Skeleton.default().names)}
@@ -100,4 +100,5 @@ def _ease_shoulders(person: Person, positions: dict[str, Float64], weights: Floa
 
 
 def _belongs_to_arm(name: str, side: str) -> bool:
+    """Return whether a joint moves the skin of an arm from the shoulder on."""
     return name[:2] == f"{side}_" and name[2:].startswith(("shoulder", "elbow", "wrist"))

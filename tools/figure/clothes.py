@@ -73,13 +73,13 @@ class Body:
 
 
 def depth_below_collar(p: Float64) -> Float64:
-    """(N,) metres by which points (N, 3) are below the collar."""
+    """Return (N,) metres by which points (N, 3) are below the collar."""
     turn = np.degrees(np.arctan2(np.abs(p[:, 0]), p[:, 2] - AXIS))
     return PchipInterpolator(*NECKLINE)(turn) - p[:, 1]
 
 
 def length_inside_sleeve(p: Float64) -> Float64:
-    """(N,) metres from the end of the sleeve to points (N, 3), towards the shoulder."""
+    """Return (N,) metres from the end of the sleeve to points (N, 3), towards the shoulder."""
     folded = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1)
     arm = ELBOW - SHOULDER
     length = np.linalg.norm(arm)
@@ -87,16 +87,16 @@ def length_inside_sleeve(p: Float64) -> Float64:
 
 
 def height_above_hem(p: Float64) -> Float64:
-    """(N,) metres by which points (N, 3) are above the trousers' hem."""
+    """Return (N,) metres by which points (N, 3) are above the trousers' hem."""
     return p[:, 1] - TURN_UP[0] - TURN_UP[1] * np.clip(p[:, 2] - LEG, -0.05, 0.09)
 
 
 def make_shirt(body: Body) -> Garment:
-    """A T-shirt."""
+    """Return a T-shirt."""
     p = body.person.vertices
     arms = body.person.arms > 0.5
 
-    def way(points: Float64, kind: Float64) -> Float64:
+    def edge_distance(points: Float64, kind: Float64) -> Float64:
         ends = length_inside_sleeve(points), depth_below_collar(points), points[:, 1] - HEM
         return np.choose(kind.astype(int), ends)
 
@@ -106,14 +106,14 @@ def make_shirt(body: Body) -> Garment:
     thick = (
         0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
-    return _make_garment(body, way, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
+    return _make_garment(body, edge_distance, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
 
 
 def make_trousers(body: Body) -> Garment:
-    """Plain trousers, a little wide below the knee."""
+    """Return plain trousers, a little wide below the knee."""
     p = body.person.vertices
 
-    def way(points: Float64, kind: Float64) -> Float64:
+    def edge_distance(points: Float64, kind: Float64) -> Float64:
         ends = np.full(len(points), -1.0), WAIST - points[:, 1], height_above_hem(points)
         return np.choose(kind.astype(int), ends)
 
@@ -125,12 +125,12 @@ def make_trousers(body: Body) -> Garment:
         + 0.0105 * below
         + 0.006 * smoothstep((0.35 - p[:, 1]) / 0.25)
     )
-    return _make_garment(body, way, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
+    return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 
 
 def _make_garment(
     body: Body,
-    way: EdgeDistance,
+    edge_distance: EdgeDistance,
     kind: Float64,
     thick: Float64,
     slack: Float64,
@@ -138,14 +138,14 @@ def _make_garment(
     colour: Float64,
     band: float,
 ) -> Garment:
-    """The garment where way(points, kind), the distance to its edge, is positive.
+    """Return the garment where edge_distance(points, kind), the distance to its edge, is positive.
 
     kind (V,): number of the edge that applies. thick (V,): metres off the skin. slack (V,): share by which
     hollows are smoothed over. band: width of a darker band along the edges, metres.
     """
     surface, triangles = body.person, body.person.triangles
     normals = vertex_normals(surface.vertices, triangles).astype(np.float64)
-    value = way(surface.vertices, kind)
+    value = edge_distance(surface.vertices, kind)
     values = np.stack([value, kind, thick, slack], axis=1)
     cloth = Cloth(surface.vertices, normals, body.weights, values, triangles).cut_above(value)
     cloth, _ = cloth.split(cloth.values[:, 0] - band)
@@ -163,7 +163,9 @@ def _make_garment(
     vertices = vertices + outward * (thickness - sunk)[:, None]
     vertices = _even_rim(vertices, cloth.border, rim)
     for rows, level in zip(lines, (0.0, band), strict=True):
-        vertices[rows] = _move_onto_edge(vertices[rows], level, lambda p, rows=rows: way(p, kinds[rows]))
+        vertices[rows] = _move_onto_edge(
+            vertices[rows], level, lambda p, rows=rows: edge_distance(p, kinds[rows])
+        )
     # The edge is folded in below the skin.
     place = {vertex: len(vertices) + k for k, vertex in enumerate(rim.tolist())}
     fold = vertices[rim] - outward[rim] * (thickness[rim] + FOLD)[:, None]
@@ -183,13 +185,13 @@ def _make_garment(
     return Garment(everything, faces, colours, weights, value, tone == INSIDE)
 
 
-def _move_onto_edge(positions: Float64, level: float, way: Callable[[Float64], Float64]) -> Float64:
-    """Points (N, 3) moved to where their distance to the edge, way(points), is exactly `level`."""
+def _move_onto_edge(positions: Float64, level: float, edge_distance: Callable[[Float64], Float64]) -> Float64:
+    """Return points (N, 3) moved to where edge_distance(points) is exactly `level`."""
     step = 1e-4
     for _ in range(4):
-        value = way(positions) - level
+        value = edge_distance(positions) - level
         slope = np.stack(
-            [(way(positions + step * axis) - level - value) / step for axis in np.eye(3)], axis=1
+            [(edge_distance(positions + step * axis) - level - value) / step for axis in np.eye(3)], axis=1
         )
         move = -(value / np.maximum((slope**2).sum(axis=1), 0.25))[:, None] * slope
         length = np.linalg.norm(move, axis=1, keepdims=True)
@@ -198,7 +200,7 @@ def _move_onto_edge(positions: Float64, level: float, way: Callable[[Float64], F
 
 
 def _even_rim(vertices: Float64, border: Int64, rim: Int64) -> Float64:
-    """Vertices with the rim smoothed, alternating inwards and outwards so that it does not shrink."""
+    """Return vertices with the rim smoothed, alternating inwards and outwards so that it does not shrink."""
     vertices = vertices.copy()
     count = np.bincount(border.ravel(), minlength=len(vertices))[:, None]
     for share in (0.5, -0.52) * 14:
@@ -212,7 +214,7 @@ def _even_rim(vertices: Float64, border: Int64, rim: Int64) -> Float64:
 def _mirror(
     vertices: Float64, weights: Float64, faces: Int64, shade: Float64, side: Float64
 ) -> tuple[Float64, Float64, Int64, Float64]:
-    """The left half and its mirror image. side (V,): x of the vertices before smoothing."""
+    """Return the left half and its mirror image. side (V,): x of the vertices before smoothing."""
     half = (side[faces] > -MIDLINE).all(axis=1)
     used, left = np.unique(faces[half], return_inverse=True)
     left = left.reshape(-1, 3)
@@ -234,7 +236,7 @@ def _mirror(
 def _split_by_shade(
     vertices: Float64, weights: Float64, faces: Int64, shade: Float64
 ) -> tuple[Float64, Float64, Int64, Float64]:
-    """The mesh with vertices doubled where shades meet; the last array is each vertex's shade."""
+    """Return the mesh with vertices doubled where shades meet; the last array is each vertex's shade."""
     pairs = np.stack([faces.ravel(), np.repeat(np.unique(shade, return_inverse=True)[1], 3)], axis=1)
     unique, number = np.unique(pairs, axis=0, return_inverse=True)
     rows = unique[:, 0]

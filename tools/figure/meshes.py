@@ -11,7 +11,7 @@ Mesh = tuple[Float64, Int64, Float64]
 
 
 def join(meshes: list[Mesh]) -> Mesh:
-    """Several meshes as one."""
+    """Return several meshes as one."""
     vertices, triangles, colours = zip(*meshes, strict=True)
     starts = np.cumsum([0, *(len(part) for part in vertices)])[:-1]
     numbered = [part + start for part, start in zip(triangles, starts, strict=True)]
@@ -19,13 +19,13 @@ def join(meshes: list[Mesh]) -> Mesh:
 
 
 def mirror(mesh: Mesh) -> Mesh:
-    """The mirror image of a mesh on the other side of the face."""
+    """Return the mirror image of a mesh on the other side of the face."""
     vertices, triangles, colours = mesh
     return vertices * (-1.0, 1.0, 1.0), triangles[:, ::-1].copy(), colours
 
 
 def tube(rings: int, around: int) -> Int64:
-    """Triangles between successive rings of `around` vertices each."""
+    """Return triangles between successive rings of `around` vertices each."""
     grid = np.arange(rings * around).reshape(rings, around)
     after = np.roll(grid, -1, axis=1)
     return np.stack([grid[:-1], grid[1:], after[1:], grid[:-1], after[1:], after[:-1]], axis=-1).reshape(
@@ -34,25 +34,25 @@ def tube(rings: int, around: int) -> Int64:
 
 
 def sides(polygons: Int64) -> Int64:
-    """(F * K, 2) the sides of polygons (F, K), in their direction."""
+    """Return (F * K, 2) the sides of polygons (F, K), in their direction."""
     return np.stack([polygons, np.roll(polygons, -1, axis=1)], axis=-1).reshape(-1, 2)
 
 
 def unique_edges(polygons: Int64) -> Int64:
-    """(E, 2) each edge of polygons (F, K) once, smaller vertex first; doubled corners have no edge."""
+    """Return (E, 2) each edge of polygons (F, K) once, smaller vertex first; doubled corners have no edge."""
     pairs = sides(polygons)
     return np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
 
 
 def open_edges(polygons: Int64) -> Int64:
-    """(E, 2) edges of one polygon only, in its direction."""
+    """Return (E, 2) edges of one polygon only, in its direction."""
     pairs = sides(polygons)
     _, inverse, counts = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True, return_counts=True)
     return pairs[counts[inverse.ravel()] == 1]
 
 
 def average_with_neighbours(rows: Float64, edges: Int64) -> Float64:
-    """Rows (V, N) averaged with those at the other ends of edges (E, 2)."""
+    """Return rows (V, N) averaged with those at the other ends of edges (E, 2)."""
     total, count = rows.copy(), np.ones((len(rows), 1))
     for a, b in (edges.T, edges[:, ::-1].T):
         np.add.at(total, a, rows[b])

@@ -24,7 +24,7 @@ AROUND = 12
 
 
 def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
-    """((vertices, triangles, colours (V, 4)) of a row of teeth and its gum, vertices of feature points).
+    """Return the mesh of a row of teeth and its gum, with colours (V, 4), and vertices of feature points.
 
     front: (3,), point at which the edges of the middle incisors meet those of the other jaw.
     """
@@ -56,7 +56,7 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
 
 
 def _arch(length: float, inset: float) -> tuple[Float64, float]:
-    """(position (3,) relative to the front, turn about y) at a length along the arch from its middle."""
+    """Return position (3,) from the front, and turn about y, at a length along the arch from its middle."""
     angle = np.linspace(0, np.pi / 2, 400)
     x, z = (HALF_WIDTH - inset) * np.sin(angle), -DEPTH * (1 - np.cos(angle)) - inset
     run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
@@ -67,7 +67,7 @@ def _arch(length: float, inset: float) -> tuple[Float64, float]:
 
 
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
-    """The mesh of a crown: outer face at z = 0, edge at y = 0, gum towards sign x y."""
+    """Return the mesh of a crown: outer face at z = 0, edge at y = 0, gum towards sign x y."""
     turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     cx, cz = _rounded_square(turn, 2.8)
     rows = np.array([0.0, 0.06, 0.32, 0.75, 1.12])  # edge to below the gum
@@ -105,13 +105,13 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
 
 
 def _rounded_square(turn: Float64, power: float) -> tuple[Float64, Float64]:
-    """(x, y), each (N,), of a circle bulging towards a square, at angles (N,); power: 2 for a circle."""
+    """Return x and y (N,), at angles (N,), of a circle bulging towards a square; power: 2 for a circle."""
     cos, sin = np.cos(turn), np.sin(turn)
     return np.sign(cos) * np.abs(cos) ** (2 / power), np.sign(sin) * np.abs(sin) ** (2 / power)
 
 
 def _place_tooth(tooth: Mesh, place: Float64, turn: float) -> Mesh:
-    """A tooth of the left side turned about y and moved to its place on the arch."""
+    """Return a tooth of the left side turned about y and moved to its place on the arch."""
     vertices, triangles, colours = tooth
     cos, sin = np.cos(turn), np.sin(turn)
     x = vertices[:, 0] * cos + vertices[:, 2] * sin
@@ -120,7 +120,7 @@ def _place_tooth(tooth: Mesh, place: Float64, turn: float) -> Mesh:
 
 
 def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) -> Mesh:
-    """The mesh of the gum: a band along the arch, scalloped round the necks of the teeth."""
+    """Return the mesh of the gum: a band along the arch, scalloped round the necks of the teeth."""
     widths = np.array([float(row["width"]) for row in rows]) / 1000
     heights = np.array([float(row["height"]) for row in rows]) / 1000
     ends = np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
@@ -156,7 +156,7 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
 
 
 def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
-    """(mesh of a tongue lying flat, vertices of its feature points). tip: (3,), at the teeth."""
+    """Return the mesh of a tongue lying flat, and vertices of its feature points. tip: (3,), at the teeth."""
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
         (-68, -12, 17, 17), (-58, -4, 20, 21), (-48, 0.5, 22, 21), (-38, 2.0, 22.5, 19), (-28, 2.2, 21.5, 16),

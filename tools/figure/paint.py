@@ -55,7 +55,7 @@ class Chart:
 
 
 def chart(vertices: Float64, values: Float64, triangles: Integer, uvs: Float64, size: int = SIZE) -> Chart:
-    """The chart of triangles (F, 3) with uvs (F, 3, 2) at their corners, origin at the bottom left."""
+    """Return the chart of triangles (F, 3) with uvs (F, 3, 2) at their corners, origin at the bottom left."""
     data = np.concatenate([vertices, values], axis=1)
     out = np.zeros((size, size, data.shape[1]))
     known = np.zeros((size, size), dtype=bool)
@@ -82,7 +82,7 @@ def chart(vertices: Float64, values: Float64, triangles: Integer, uvs: Float64, 
 
 
 def scalp(positions: Float64, soft: float = 0.004) -> Float64:
-    """(N,) density of hair at points (N, 3): 0 on the face, 1 on the scalp.
+    """Return (N,) density of hair at points (N, 3): 0 on the face, 1 on the scalp.
 
     soft: width of the edge, metres.
     """
@@ -98,7 +98,7 @@ def scalp(positions: Float64, soft: float = 0.004) -> Float64:
 
 
 def brow(positions: Float64) -> tuple[Float64, Float64]:
-    """(position along the brow (N,): 0 inner, 1 outer end; density of its hair (N,), 0..1)."""
+    """Return position along the brow (N,), 0 inner end to 1 outer end, and density of its hair (N,), 0..1."""
     x = np.abs(positions[:, 0])
     middle, low, high = (np.interp(x, BROW[:, 0], BROW[:, column]) for column in (1, 2, 3))
     offset = positions[:, 1] - middle
@@ -111,7 +111,7 @@ def brow(positions: Float64) -> tuple[Float64, Float64]:
 
 
 def noise(positions: Float64, scale: float, seed: int) -> Float64:
-    """(N,) smooth noise in -1..1 at points (N, 3); scale: size of its grains, metres."""
+    """Return (N,) smooth noise in -1..1 at points (N, 3); scale: size of its grains, metres."""
     from scipy.ndimage import map_coordinates
 
     lattice = np.random.default_rng(seed).uniform(-1, 1, (48, 48, 48))
@@ -119,7 +119,7 @@ def noise(positions: Float64, scale: float, seed: int) -> Float64:
 
 
 def paint(lay: Chart) -> Image.Image:
-    """The texture of a chart. Its values: rings about mouth and eyes, upper lip or not."""
+    """Return the texture of a chart. Its values: rings about mouth and eyes, upper lip or not."""
     p = lay.place[lay.known]
     ring_mouth, ring_eye, lip_side = (lay.value[lay.known][:, k] for k in range(3))
     colour = _complexion(p)
@@ -144,7 +144,7 @@ def paint(lay: Chart) -> Image.Image:
 
 
 def encode_jpeg(picture: Image.Image, quality: int = 88) -> bytes:
-    """The picture as a JPEG file."""
+    """Return the picture as a JPEG file."""
     buffer = io.BytesIO()
     picture.save(buffer, "JPEG", quality=quality, optimize=True, subsampling=0)
     return buffer.getvalue()
@@ -155,7 +155,7 @@ def _blend(colour: Float64, other: Float64, share: Float64) -> Float64:
 
 
 def _spot(p: Float64, centre: tuple[float, float, float], radius: float) -> Float64:
-    """(N,) 1 in the middle of a spot on both sides of the face, 0 at its edge; centre, radius: mm."""
+    """Return (N,) 1 in the middle of a spot on both sides of the face, 0 at its edge; centre, radius: mm."""
     folded = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1) * 1000
     return 1 - smoothstep(np.linalg.norm(folded - centre, axis=1) / radius)
 
@@ -216,7 +216,7 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64) -> Float64
 
 
 def _fill_unknown(image: Float64, known: Bool) -> Float64:
-    """The image with the nearest colour on texels that no triangle covers, so that seams do not show."""
+    """Return the image with the nearest colour on texels outside all triangles, so that seams do not show."""
     from scipy.ndimage import distance_transform_edt
 
     _, (row, column) = distance_transform_edt(~known, return_indices=True)
@@ -262,7 +262,7 @@ def _strokes(picture: Image.Image, lay: Chart) -> None:
 
 
 def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:
-    """(N, 3) hairs of the brow, metres: upwards at its inner end, outwards along it, down at its tail."""
+    """Return (N, 3) hairs of the brow, metres: up at its inner end, outwards along it, down at its tail."""
     lean = np.interp(along, [0.0, 0.2, 0.6, 1.0], [78.0, 42.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
     middle = np.interp(np.abs(p[:, 0]), [0.012, 0.035, 0.06], [0.0148, 0.0232, 0.0135])
     lean = np.radians(lean - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
@@ -271,7 +271,7 @@ def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Floa
 
 
 def _in_texels(step_x: Float64, step_y: Float64, direction: Float64) -> Float64:
-    """(N, 2) texels of directions (N, 3) on the surface."""
+    """Return (N, 2) texels of directions (N, 3) on the surface."""
     xx, yy, xy = ((a * b).sum(axis=1) for a, b in ((step_x, step_x), (step_y, step_y), (step_x, step_y)))
     dx, dy = ((step * direction).sum(axis=1) for step in (step_x, step_y))
     det = np.maximum(xx * yy - xy**2, 1e-24)

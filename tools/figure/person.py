@@ -52,14 +52,14 @@ class Person:
     arms: Float64
 
     def vertices_of(self, faces: Bool) -> Bool:
-        """(V,) mask of the vertices that any of the faces uses."""
+        """Return (V,) mask of the vertices that any of the faces uses."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.triangles[faces]] = True
         return used
 
 
 def make_person(surface: figure.Surface, positions: dict[str, Float64], arms: Float64) -> Person:
-    """The person made from a figure. positions: of joints, by name. arms (V,): weight of the arms."""
+    """Return the person made from a figure. positions: of joints, by name. arms (V,): weight of the arms."""
     middle = surface.vertices[surface.quads].mean(axis=1)
     chosen = np.zeros(len(middle), dtype=bool)
     for joint, side, reach in BENDS:
@@ -83,7 +83,7 @@ def make_person(surface: figure.Surface, positions: dict[str, Float64], arms: Fl
 
 
 def reproportion(positions: Float64, arms: Float64) -> Float64:
-    """Points (N, 3) of the figure in the person's proportions. arms (N,): weight of the arms."""
+    """Return points (N, 3) of the figure in the person's proportions. arms (N,): weight of the arms."""
     x, height = np.abs(positions[:, 0]), positions[:, 1]
     chest = CHEST_LEAST + (1 - CHEST_LEAST) * smoothstep((height - CHEST[0]) / (CHEST[1] - CHEST[0]))
     chest *= smoothstep((height - 0.95) / 0.15)

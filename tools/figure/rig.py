@@ -59,7 +59,7 @@ class Rig:
 
 
 def make_rig() -> tuple[Person, Rig]:
-    """The person, and its rig."""
+    """Return the person, and its rig."""
     surface, data = figure.load()
     default = Skeleton.default()
     given = _joint_positions(data, default)
@@ -75,7 +75,7 @@ def make_rig() -> tuple[Person, Rig]:
 
 
 def _joint_positions(data: dict[str, np.ndarray], default: Skeleton) -> Float64:
-    """(J, 3) positions of the joints in the figure as modelled, metres."""
+    """Return (J, 3) positions of the joints in the figure as modelled, metres."""
     source = dict(zip(data["joint_names"].tolist(), data["joint_centres"].astype(np.float64), strict=True))
     positions = np.full((len(default), 3), np.nan)
     with (HERE / "rig.csv").open(encoding="utf-8") as file:
@@ -148,7 +148,7 @@ def _share_forward(
 
 
 def slope_shoulders(person: Person, bones: Rig) -> Person:
-    """The person with the caps of both shoulders moved in, for hanging arms.
+    """Return the person with the caps of both shoulders moved in, for hanging arms.
 
     With the arms down, the cap of the figure's shoulder would stick out as a corner beside the joint; a
     person's slopes from the neck into the arm. The cap is moved in there, and the correction transformed back

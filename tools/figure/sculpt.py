@@ -53,20 +53,20 @@ ORIGIN = np.array([0.0, EYE_CENTRE[1], EYE_CENTRE[2] + EYE_RADIUS])
 
 
 def _interpolate_rings(refined: Refined, ring: Int64) -> Float64:
-    """Ring numbers of the coarse vertices interpolated to the fine ones."""
+    """Return ring numbers of the coarse vertices interpolated to the fine ones."""
     value = refined.blend @ ring.astype(np.float64)
     far = refined.blend @ (ring == FAR).astype(np.float64)
     return np.where(far > 0, FAR, value)
 
 
 def refine_marks(refined: Refined, coarse: Marks) -> Marks:
-    """The marks of the coarse vertices interpolated to the fine ones."""
+    """Return the marks of the coarse vertices interpolated to the fine ones."""
     eye, mouth = (_interpolate_rings(refined, rings) for rings in (coarse.eye, coarse.mouth))
     return Marks(eye, mouth, refined.blend @ coarse.lip.astype(np.float64))
 
 
 def find_marks(head: Surface) -> Marks:
-    """The marks of the base head."""
+    """Return the marks of the base head."""
     inside, outside = head.vertices_of(head.tile == 1), head.vertices_of(head.tile == 0)
     border = inside & outside
     low = head.vertices[:, 1] < -0.03
@@ -80,7 +80,7 @@ def _signed_rings(head: Surface, border: Bool, inside: Bool) -> Int64:
 
 
 def sculpt_head(head: Surface, marks: Marks) -> Surface:
-    """The base head with its eyes, mouth and nose in proportion; symmetric as the base is."""
+    """Return the base head with its eyes, mouth and nose in proportion; symmetric as the base is."""
     vertices = _wider_eyes(head.vertices, marks)
     for _ in range(4):  # laying the lids on the eyeballs moves them a little each time
         vertices = _open_lids(vertices, marks)
@@ -90,7 +90,7 @@ def sculpt_head(head: Surface, marks: Marks) -> Surface:
 
 
 def _both_sides(vertices: Float64) -> tuple[Float64, Float64]:
-    """(vertices mirrored onto the left side, sign of x of each vertex)."""
+    """Return vertices mirrored onto the left side, and the sign of x of each vertex."""
     sign = np.where(vertices[:, 0] < 0, -1.0, 1.0)
     left = vertices.copy()
     left[:, 0] *= sign
@@ -113,7 +113,7 @@ def _wider_eyes(vertices: Float64, marks: Marks) -> Float64:
 
 
 def eye_corners() -> tuple[Float64, Float64]:
-    """Inner and outer corner of the left eye after `_wider_eyes`, x and y."""
+    """Return inner and outer corner of the left eye after `_wider_eyes`, x and y."""
     inner, outer = INNER_CORNER.copy(), OUTER_CORNER.copy()
     inner[0] += (inner[0] - EYE_CENTRE[0]) * 0.25
     outer[0] += (outer[0] - EYE_CENTRE[0]) * 0.10
@@ -121,7 +121,7 @@ def eye_corners() -> tuple[Float64, Float64]:
 
 
 def opening_profile(x: Float64) -> Float64:
-    """(N,) height of the lid opening at each x: 0 at the corners of the left eye, 1 in the middle."""
+    """Return (N,) height of the lid opening at each x: 0 at the corners of the left eye, 1 in the middle."""
     inner, outer = eye_corners()
     t = np.clip((x - inner[0]) / (outer[0] - inner[0]), 0, 1)
     middle = (EYE_CENTRE[0] - inner[0]) / (outer[0] - inner[0])
@@ -130,7 +130,7 @@ def opening_profile(x: Float64) -> Float64:
 
 
 def upper_side(x: Float64, y: Float64) -> Bool:
-    """(N,) mask of points near the left eye above the line through its corners."""
+    """Return (N,) mask of points near the left eye above the line through its corners."""
     inner, outer = eye_corners()
     return y > np.interp(x, [inner[0], outer[0]], [inner[1], outer[1]])
 
@@ -161,7 +161,7 @@ def _open_lids(vertices: Float64, marks: Marks) -> Float64:
 
 
 def _onto_eyeball(left: Float64, ring: Int64, region: Bool) -> Float64:
-    """Vertices with the lids and their surroundings laid on the eyeball, and the socket clear of it."""
+    """Return vertices with the lids and the skin about them on the eyeball, and the socket clear of it."""
     offset = left - EYE_CENTRE
     away = np.linalg.norm(offset, axis=1)
     edge = region & (ring == MARGIN_RING)
@@ -185,7 +185,7 @@ def _onto_eyeball(left: Float64, ring: Int64, region: Bool) -> Float64:
 
 
 def lay_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
-    """Vertices of the refined head with lid margins and sockets clear of the eyeballs again."""
+    """Return vertices of the refined head with lid margins and sockets clear of the eyeballs again."""
     left, sign = _both_sides(vertices)
     offset = left - EYE_CENTRE
     away = np.linalg.norm(offset, axis=1)
@@ -199,7 +199,7 @@ def lay_on_eyeballs(vertices: Float64, ring: Float64) -> Float64:
 
 
 def _mouth(vertices: Float64, marks: Marks) -> Float64:
-    """Vertices with a wider mouth, whose lips touch along a level line."""
+    """Return vertices with a wider mouth, whose lips touch along a level line."""
     ring, lip = marks.mouth, marks.lip
     away = np.hypot(vertices[:, 0] / 1.25, vertices[:, 1] - MOUTH[1])
     weight = np.where(vertices[:, 2] > 0.02, 1 - smoothstep((away - 0.016) / 0.022), 0.0)
@@ -228,7 +228,7 @@ def _mouth(vertices: Float64, marks: Marks) -> Float64:
 
 
 def _fuller_lips(vertices: Float64, marks: Marks) -> Float64:
-    """Vertices with the red of the lips a little higher and rounder; the line of contact stays."""
+    """Return vertices with the red of the lips a little higher and rounder; the line of contact stays."""
     out = np.where(marks.mouth == FAR, 0, np.maximum(marks.mouth - CONTACT_RING, 0)).astype(np.float64)
     fade = np.where(out > 0, np.exp(-(((out - 3.0) / 2.2) ** 2)), 0.0)
     middle = 1 - smoothstep((np.abs(vertices[:, 0]) - 0.006) / 0.018)
@@ -240,7 +240,7 @@ def _fuller_lips(vertices: Float64, marks: Marks) -> Float64:
 
 
 def _nose(vertices: Float64) -> Float64:
-    """Vertices with the tip of the nose a little lower, so that the nostrils face down, not ahead."""
+    """Return vertices with the tip of the nose a little lower, so that the nostrils face down, not ahead."""
     tip = np.array([0.0, -0.0385, 0.106])
     away = np.linalg.norm((vertices - tip) * (0.75, 1.0, 0.8), axis=1)
     weight = 1 - smoothstep((away - 0.004) / 0.020)
@@ -250,7 +250,7 @@ def _nose(vertices: Float64) -> Float64:
 
 
 def _lips(head: Surface, ring: Int64) -> Int64:
-    """(V,) 1 on the upper lip and above, -1 on the lower, 0 elsewhere, from the texture's two halves."""
+    """Return (V,) 1 on the upper lip and above, -1 on the lower, 0 elsewhere, by halves of the texture."""
     inside = head.tile == 1
     heights = head.uvs[head.corners][:, :, 1].mean(axis=1)
     faces = inside & (head.vertices[head.quads][:, :, 1] < -0.03).all(axis=1)

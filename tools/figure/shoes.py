@@ -27,7 +27,7 @@ UPPER = (0.0, 0.10, 0.22, 0.36, 0.50, 0.64, 0.76, 0.86, 0.94, 1.0)
 
 
 def make_shoes(body: Float64, weights: Float64) -> Garment:
-    """Both shoes, for vertices (V, 3) of the person as modelled. weights (V, J)."""
+    """Return both shoes, for vertices (V, 3) of the person as modelled. weights (V, J)."""
     left = body[:, 0] > 0
     foot = np.flatnonzero(left & (body[:, 1] < TOP + 0.01))
     vertices, triangles, colours = _shoe(body[foot])
@@ -44,7 +44,7 @@ def make_shoes(body: Float64, weights: Float64) -> Garment:
 
 
 def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
-    """(vertices, triangles, colours) of the left shoe about the vertices of a foot."""
+    """Return vertices, triangles and colours of the left shoe about the vertices of a foot."""
     low = foot[foot[:, 1] < 0.05]
     ahead, origin = _direction(low)
     aside = np.array([ahead[2], 0.0, -ahead[0]])
@@ -100,13 +100,13 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
 
 
 def vertices_out(vertices: Float64, triangles: Int64) -> Float64:
-    """(V,) component of normals away from the middle of a mesh; positive where they point outwards."""
+    """Return (V,) component of normals away from the middle of a mesh; positive where they point outwards."""
     normals = vertex_normals(vertices, triangles)
     return (normals * (vertices - vertices.mean(axis=0))).sum(axis=1)
 
 
 def _direction(low: Float64) -> tuple[Float64, Float64]:
-    """(level unit vector ahead along the foot, middle of the foot on the ground)."""
+    """Return a level unit vector ahead along the foot, and the middle of the foot on the ground."""
     flat = low[:, [0, 2]] - low[:, [0, 2]].mean(axis=0)
     _, _, axes = np.linalg.svd(flat, full_matrices=False)
     ahead = np.array([axes[0, 0], 0.0, axes[0, 1]])
@@ -116,7 +116,7 @@ def _direction(low: Float64) -> tuple[Float64, Float64]:
 
 
 def _outline(flat: Float64) -> Float64:
-    """(AROUND, 2) the sole's outline about points (N, 2), evenly spaced, counter-clockwise from above."""
+    """Return the sole's outline (AROUND, 2) about points (N, 2), evenly spaced, counter-clockwise."""
     from scipy.spatial import ConvexHull
 
     hull = flat[ConvexHull(flat).vertices]
@@ -140,7 +140,7 @@ def _outline(flat: Float64) -> Float64:
 
 
 def _spine(positions: Float64) -> tuple[Float64, Float64]:
-    """(positions along the foot, middles between both sides there)."""
+    """Return positions along the foot, and the middles between both sides there."""
     levels = np.linspace(positions[:, 1].min(), positions[:, 1].max(), 12)
     middles = []
     for level in levels:
@@ -150,7 +150,7 @@ def _spine(positions: Float64) -> tuple[Float64, Float64]:
 
 
 def _outward(outline: Float64) -> Float64:
-    """(N, 2) unit normals of a closed outline, away from its middle."""
+    """Return (N, 2) unit normals of a closed outline, away from its middle."""
     tangent = np.roll(outline, -1, axis=0) - np.roll(outline, 1, axis=0)
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
@@ -163,7 +163,7 @@ def _level(outline: Float64, lift: Float64, height: float) -> Float64:
 
 
 def _nearest_weights(positions: Float64, foot: Float64, weights: Float64) -> Float64:
-    """(N, J) weights averaged over the nearest vertices of the foot."""
+    """Return (N, J) weights averaged over the nearest vertices of the foot."""
     from scipy.spatial import cKDTree
 
     away, rows = cKDTree(foot).query(positions, k=12)

@@ -33,7 +33,7 @@ class Refined:
 
 
 def refine(surface: Surface, chosen: Bool, fit: int = 4) -> Refined:
-    """The surface with the chosen quads (mask (F,)) subdivided once.
+    """Return the surface with the chosen quads (mask (F,)) subdivided once.
 
     fit: rounds of adjusting the cage so that the result passes through the surface's vertices.
     """
@@ -97,7 +97,7 @@ class _Scheme:
 
 
 def _sum_at(rows: Int64, values: Float64, count: int) -> tuple[Float64, Float64]:
-    """((count, 3) sums of values (N, 3) over their rows (N, K), (count, 1) how many each sums)."""
+    """Return sums (count, 3) of values (N, 3) over their rows (N, K), and how many each sums (count, 1)."""
     total, number = np.zeros((count, 3)), np.zeros((count, 1))
     for k in range(rows.shape[1]):
         np.add.at(total, rows[:, k], values)
@@ -121,7 +121,7 @@ def _cut(
     face_row: Int64,
     vertices: Float64,
 ) -> tuple[Int64, Int64, Float64, Int64]:
-    """(triangles of all faces, their texture corners, uvs, the quad that each came from)."""
+    """Return triangles of all faces, their texture corners, uvs, and the quad that each came from."""
     triangles: list[list[int]] = []
     corners: list[list[int]] = []
     owner: list[int] = []
@@ -159,7 +159,7 @@ def _cut(
 
 
 def _triangulate(ring: list[int], vertices: Float64, straight: list[bool]) -> list[tuple[int, int, int]]:
-    """Triangles of a polygon, cut along its shortest diagonals; ties are broken symmetrically.
+    """Return triangles of a polygon, cut along its shortest diagonals; ties are broken symmetrically.
 
     straight: corners in the middle of a side; cutting these off would leave slivers.
     """

@@ -53,19 +53,19 @@ _FOLDER_OR_FILE = OutputType(folders=True)
     metavar="OUT.fap",
     help="File for the FAPs; a folder if there are several inputs.",
 )
-@click.option("--bap", type=_FOLDER_OR_FILE, metavar="OUT.bap", help="File for the BAPs; likewise.")
+@click.option("--bap", type=_FOLDER_OR_FILE, metavar="OUT.bap", help="File for the BAPs, or a folder.")
 @click.option(
     "--epf",
     type=_FOLDER_OR_FILE,
     metavar="OUT.epf",
-    help="Settings of the planes, for fba encode --epf; likewise.",
+    help="File for the settings of the planes, for fba encode --epf, or a folder.",
 )
 @click.option(
     "-o",
     "--output",
     type=_FOLDER_OR_FILE,
     metavar="OUT.bvh|OUT.glb",
-    help="File for other programs; its suffix is the format; likewise.",
+    help="File for other programs, in the format of its suffix, or a folder with --to.",
 )
 @options.to_option
 @options.no_clobber_option

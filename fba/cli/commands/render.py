@@ -108,7 +108,7 @@ class SheetType(click.ParamType[str | int]):
 @click.option("--transparent", is_flag=True, help="PNG without a background.")
 @click.option("--replace", is_flag=True, help="Overwrite numbered pictures that exist.")
 @scene_options.scene_options(
-    fps="Frame rate of the film; default: the input's own, or a part of it.",
+    fps="Frame rate of the film; default: the input's own, or a whole fraction of it.",
     arrange="Several files: side by side (default), or the others as drawings over the first.",
 )
 def command(
