@@ -62,7 +62,6 @@ GLTF_READER = "fba/formats/gltf/reader.py"
 REPORT = "fba/capture/_report.py"
 STANDARD = "fba/capture/_standard_skeleton.py"
 FAP_JOINTS = "fba/formats/gltf/_fap_joints.py"
-DECODER = "fba/codec/_decoder.py"
 HINGES = "fba/capture/limbs/hinges.py"
 LEG_IK = "fba/capture/limbs/_leg_ik.py"
 READ_AHEAD = "player/fba_player/sound/_read_ahead.py"
@@ -70,7 +69,9 @@ PLAUSIBILITY = "fba/body/plausibility.py"
 GAIT_CURVES = "fba/body/gait/_signals.py"
 GAIT_DETECTION = "fba/body/gait/_detection.py"
 GAIT_MEASURE = "fba/body/gait/_measure.py"
+DAMAGE = "fba/codec/_damage.py"
 
+LOSS_TEST = "tests/codec/test_loss.py"
 TIMES_TEST = "tests/codec/test_codec_rules.py"
 RANGES_TEST = "tests/codec/test_codec_rules.py tests/codec/test_limits.py"
 BVH_TEST = "tests/formats/bvh/test_bvh_rates.py"
@@ -113,7 +114,7 @@ MUTANTS = (
     Mutant(SETTINGS, "RANGE_UNIT = 60", "RANGE_UNIT = 59", RANGES_TEST),
     Mutant(HEADERS, "_HOURS = 32", "_HOURS = 24", TIMES_TEST),
     Mutant(HEADERS, "index / rate + Fraction(1, 2))", "index / rate)", TIMES_TEST),
-    Mutant(HEADERS, "seconds * rate + Fraction(1, 2))", "seconds * rate)", TIMES_TEST),
+    Mutant(CLOCK, "seconds * rate + Fraction(1, 2))", "seconds * rate)", TIMES_TEST),
     Mutant(RUNS, "if all(sent):", "if any(sent):", RANGES_TEST),
     Mutant(RUNS, "syntax.MASK_KEEP", "syntax.MASK_INTERPOLATE", RANGES_TEST),
     Mutant(RUNS, "else syntax.MASK_NONE", "else syntax.MASK_KEEP", RANGES_TEST),
@@ -210,7 +211,6 @@ MUTANTS = (
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.0", RENDER_TEST),
     Mutant(RENDER, "SLACK = 0.001", "SLACK = 0.1", RENDER_TEST),
     Mutant(FAP_JOINTS, "SQUARE = 1e-6", "SQUARE = 1.0", "tests/formats/gltf/test_gltf_faces.py"),
-    Mutant(DECODER, "_DOUBTFUL = 8", "_DOUBTFUL = 0", "tests/codec/test_damage.py"),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.0", CAPTURE_RULES_TEST),
     Mutant(HINGES, "CLEAR_BEND = 0.3", "CLEAR_BEND = 0.4", CAPTURE_RULES_TEST),
     Mutant(LEG_IK, "ROUNDS = 3", "ROUNDS = 1", CAPTURE_RULES_TEST),
@@ -260,6 +260,12 @@ MUTANTS = (
     Mutant(GAIT_DETECTION, "UNEVEN = 2.2", "UNEVEN = 3.1", GAIT_TEST),
     Mutant(GAIT_MEASURE, "ON_GROUND = 0.002", "ON_GROUND = 0.0018", GAIT_TEST),
     Mutant(GAIT_MEASURE, "ON_GROUND = 0.002", "ON_GROUND = 0.0022", GAIT_TEST),
+    Mutant(DAMAGE, "DOUBTFUL = 8", "DOUBTFUL = 0", "tests/codec/test_damage.py"),
+    Mutant(CLOCK, "_BELIEVED_JUMP = 60", "_BELIEVED_JUMP = 10**6", LOSS_TEST),
+    Mutant(CLOCK, "return index > self._coded_index", "return index < self._coded_index", LOSS_TEST),
+    Mutant(CLOCK, "and nearest == self.index:", "and False:", LOSS_TEST),
+    Mutant(DAMAGE, "self._frames / self._bits", "0 / self._bits", LOSS_TEST),
+    Mutant(ENCODER, "- self._origin, rate)\n        plane", ", rate)\n        plane", LOSS_TEST),
 )
 
 

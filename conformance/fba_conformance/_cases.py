@@ -125,7 +125,7 @@ def _planes() -> Iterator[Case]:
     yield Case("intra_period", "an I plane every 10 frames", _encoding(long, intra_period=Fraction(10, 25)))
     yield Case(
         "start_codes", "a plane start code and range lists with every I plane",
-        _encoding(long, intra_period=Fraction(10, 25), start_codes=True), encodes=True,
+        _encoding(long, intra_period=Fraction(10, 25), start_codes=True, time_codes=False), encodes=True,
     )  # fmt: skip
     resting = np.zeros((600, 68), dtype=np.int32)
     mask = np.zeros((600, 68), dtype=bool)

@@ -3,7 +3,8 @@
 May use: parameters and the data model.
 """
 
-from fba.codec._decoder import Damage, Decoder, decode
+from fba.codec._damage import Damage
+from fba.codec._decoder import Decoder, decode
 from fba.codec._encoder import Encoder, EncoderStatistics, encode, encode_with_statistics
 from fba.codec._options import EncoderOptions
 from fba.codec._script import encode_planes

@@ -10,6 +10,8 @@ import numpy as np
 from fba.arrays import Int64
 from fba.codec.settings import FrameRate, TimeCode
 
+_BELIEVED_JUMP = 60
+"""Seconds of frames that may be lost without a trace of damage, but for the time code that tells."""
 DEFAULT_RATE = Fraction(25)
 """Frames per second, assumed with a warning if the first I plane states no rate."""
 
@@ -18,14 +20,24 @@ class StreamClock:
     """Computes the times of planes: `index`, `rate` and exact `time` of the next one.
 
     A plane follows the one before it after one frame period, and as many more as that one skips. A time code
-    sets the clock; between two frames, the index is that of the nearer one.
+    sets the clock; between two frames, the index is that of the nearer one. A code that names the very frame
+    that comes next anyway leaves the clock alone: codes are whole seconds, and at a rate such as 30000/1001
+    hardly a frame lies on one.
     """
 
     def __init__(self) -> None:
         self.index = 0
         self.rate: Fraction | None = None
+        self.jump: int | None = None
+        """Frames by which the last I plane's time code goes beyond the count of planes; None without one."""
+        self.agreements = 0
+        """Time codes that named the frame that the count of planes had come to."""
         self._anchor = Fraction(0)  # time of the plane that had index `_anchor_index`
         self._anchor_index = 0
+        self._disbelieved = 0  # frames by which the last time code went too far ahead to be believed
+        self._last_jump = 0
+        self._coded_index = -1  # index of the last plane whose time code was used
+        self._started = False
 
     @property
     def time(self) -> Fraction:
@@ -34,8 +46,15 @@ class StreamClock:
             return self._anchor
         return self._anchor + Fraction(self.index - self._anchor_index) / self.rate
 
-    def begin_intra(self, frame_rate: FrameRate | None, time_code: TimeCode | None) -> list[str]:
-        """Apply the frame rate and time code of an I plane; return warnings about them."""
+    def begin_intra(
+        self, frame_rate: FrameRate | None, time_code: TimeCode | None, *, repair: bool = False
+    ) -> list[str]:
+        """Apply the frame rate and time code of an I plane; return warnings about them.
+
+        repair: believe time codes more than the count of planes, which damage may have falsified: also one
+        that lies before the previous plane, as long as it lies behind the last code. But where all codes have
+        agreed with the count, one that goes more than a minute ahead of it needs another that confirms it.
+        """
         problems = []
         rate = frame_rate.fraction if frame_rate is not None else self.rate
         if rate is None:
@@ -47,17 +66,41 @@ class StreamClock:
                 problems.append(f"the frame rate changes from {self.rate} to {rate}")
             self._anchor, self.rate = now, rate
             self.index = self._anchor_index = math.ceil(now * rate)
+        self.jump = None
         if time_code is not None:
-            text = f"time code {time_code.hours}:{time_code.minutes:02}:{time_code.seconds:02}"
+            nearest = nearest_frame(time_code.total_seconds, rate)
             if not time_code.marker:
-                problems.append(f"the marker bit of {text} is 0; that time code was not used")
-            elif time_code.total_seconds < now:
-                problems.append(f"{text} lies before the previous plane; it was not used")
+                problems.append(f"the marker bit of time code {time_code} is 0; that time code was not used")
+            elif self._started and nearest == self.index:
+                self.jump = self._last_jump = 0
+                self.agreements += 1
+                self._coded_index = self.index
+            elif time_code.total_seconds < now and not (repair and self._can_go_back(nearest)):
+                problems.append(f"time code {time_code} lies before the previous plane; it was not used")
+            elif repair and self._goes_too_far(nearest, rate):
+                problems.append(f"time code {time_code} is far ahead of the count of planes; it was not used")
             else:
+                if time_code.total_seconds >= now:
+                    nearest = max(nearest, self.index)
+                self.jump = self._last_jump = nearest - self.index
                 self._anchor = Fraction(time_code.total_seconds)
-                nearest = math.floor(self._anchor * rate + Fraction(1, 2))
-                self.index = self._anchor_index = max(nearest, self.index)
+                self.index = self._anchor_index = self._coded_index = nearest
+        self._started = True
         return problems
+
+    def skip_lost(self, frames: int) -> None:
+        """Leave out frames that were lost."""
+        self.index += frames
+
+    def _goes_too_far(self, index: int, rate: Fraction) -> bool:
+        """Whether a time code goes ahead as no other did before; remember it."""
+        ahead, before = index - self.index, self._disbelieved
+        self._disbelieved = ahead
+        return self.agreements > 0 and ahead > _BELIEVED_JUMP * rate and ahead != before
+
+    def _can_go_back(self, index: int) -> bool:
+        """Whether a time code that names an earlier frame corrects the count, or the last time code."""
+        return index > self._coded_index or (self._last_jump > 0 and index == self.index - self._last_jump)
 
     def advance(self, skips: Int64) -> Int64:
         """Return the indices of planes with these skips, int64 (T,), and advance the clock past them."""
@@ -65,3 +108,8 @@ class StreamClock:
         index = self.index + np.concatenate([[0], steps[:-1]])
         self.index += int(steps[-1])
         return index
+
+
+def nearest_frame(seconds: int, rate: Fraction) -> int:
+    """Return the index of the frame that a time code of so many seconds names; halves are rounded up."""
+    return math.floor(seconds * rate + Fraction(1, 2))

@@ -58,10 +58,18 @@ class CompactBuffer:
         self.frames += count
 
     def animation(self) -> Animation:
-        """Return all frames. ValueError without frames."""
+        """Return all frames. ValueError without frames.
+
+        Frames that were decoded before damage, and whose index the frames behind it fall back to, are left
+        out: they were misread.
+        """
         if not self.frames:
             raise ValueError("there is no frame to make an animation of")
-        rows, kinds = self._rows.view(), self._kinds.view()
+        rows, kinds, index = self._rows.view(), self._kinds.view(), self._times.index()
+        if not (np.diff(index) > 0).all():
+            later = np.minimum.accumulate(index[::-1])[::-1]
+            kept = np.append(index[:-1] < later[1:], True)
+            rows, kinds, index = rows[kept], kinds[kept], index[kept]
         face = body = None
         if self._parts & slots.FACE_BIT:
             mask = _masks([face for face, _, _ in self._masks], kinds)
@@ -72,7 +80,7 @@ class CompactBuffer:
         if self._parts & slots.BODY_BIT:
             mask = _masks([body for _, _, body in self._masks], kinds)
             body = CodedFrames(slots.BODY_BIT, rows, self._places, mask).body()
-        return Animation(self._times.rate, self._times.index(), face, body)
+        return Animation(self._times.rate, index, face, body)
 
     def _columns(self, wanted: Int64) -> Int64 | slice:
         """Return the columns of rows in which the values of these slots are stored; make those that lack."""

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
 
 from fba.animation import Animation, Frame
 from fba.codec._buffer import Buffer
 from fba.codec._clock import StreamClock
 from fba.codec._compact_buffer import CompactBuffer
+from fba.codec._damage import Damage, DamageLog
 from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec.block import Block
+from fba.codec.settings import PlaneSettings
 from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEP_TABLES
@@ -23,24 +25,10 @@ from fba.recognition import HEAD_BYTES, recognition_hint
 
 _CHUNK = 1 << 16
 """Bytes that `decode` passes to the decoder at once, so that few blocks are in memory."""
-_DOUBTFUL = 8
-"""Number of planes before damage that may have been misread: a start code in them counts as one."""
+_END = bytes([*syntax.START_CODE_PREFIX, syntax.END_CODE])
+_NO_END = "the stream ends without the end code 00 00 01 b1: it may have been cut off behind this plane"
 _LARGE_PLANE = 4096
 """Bytes beyond which an incomplete plane is not tried again with every byte that comes."""
-
-
-@dataclass(frozen=True)
-class Damage:
-    """Damage that a salvaging decoder skipped.
-
-    error: what was wrong. start, stop: bytes of the stream that were lost, from the first byte of the damaged
-    plane to where decoding continued (or the end). If decoding continues at a start code in an earlier plane,
-    which had been returned already, start equals stop.
-    """
-
-    error: FbaError
-    start: int
-    stop: int
 
 
 class Decoder:
@@ -48,7 +36,8 @@ class Decoder:
 
     bap_steps: "iso" or "visage", the table of BAP quantiser steps that the stream was made with; the stream
     itself does not say. on_error: "raise", or "salvage" to continue after damage at the next start code
-    before an I plane; `damage` then lists what was lost.
+    before an I plane; `damage` then lists what was lost. Frame numbers increase in any case: where a time
+    code shows that misread planes took too many frames, those behind it follow them at once.
 
     `push` and `finish` return frames as soon as their planes are complete. `push` first returns the frames
     before damage; the next call raises the error. `finish` raises at once; frames that it still decoded are
@@ -69,9 +58,12 @@ class Decoder:
             raise ValueError(f"bap_steps must be one of {', '.join(BAP_STEP_TABLES)}, not {bap_steps!r}")
         if on_error not in ("raise", "salvage"):
             raise ValueError(f'on_error must be "raise" or "salvage", not {on_error!r}')
-        self.damage: list[Damage] = []
+        self._log = DamageLog()
+        self.damage: list[Damage] = self._log.damage
         self.planes = 0
         """Planes decoded so far."""
+        self.ended = False
+        """Whether an end code closed the last object. A stream without may have been cut off."""
         self._salvage = on_error == "salvage"
         self._limits = limits
         self._buffer = Buffer()
@@ -87,9 +79,9 @@ class Decoder:
         self._start_error: BitstreamError | None = None  # why the stream does not begin with an object
         self._clock = StreamClock()
         self._lost_from = 0
-        self._doubtful: deque[int] = deque(
-            maxlen=_DOUBTFUL
-        )  # bits of the stream at which the last planes begin
+        self._may_step_back = False  # whether frames may have lower indices than misread ones before
+        self._following = 0  # index after that of the last frame
+        self._catching_up = False  # whether the clock stepped back behind `_following`
         self._reader = PlaneReader(bap_steps)
         self._code_bit: int | None = None  # where the start code before the next plane begins
 
@@ -112,7 +104,8 @@ class Decoder:
         blocks = self._advance(final=False)
         if not blocks:
             self._raise_pending()
-        needed = (self._doubtful[0] >> 3) - self._buffer.offset if self._doubtful else self._bit >> 3
+        doubtful = self._log.first_doubtful_bit
+        needed = (doubtful >> 3) - self._buffer.offset if doubtful is not None else self._bit >> 3
         dropped = self._buffer.drop(min(needed, self._bit >> 3, self._scanned or self._bit >> 3))
         self._bit -= 8 * dropped
         self._scanned = max(self._scanned - dropped, 0)
@@ -205,6 +198,7 @@ class Decoder:
             "the object start code 00 00 01 ba is missing", plane=0, bit=0
         )
         self._begin_object()
+        self._reader.forget_values()
         self.damage.append(Damage(error, 0, self._buffer.offset + position))
         self._bit = 8 * position
         self._scanned = 0
@@ -219,16 +213,16 @@ class Decoder:
             return None
         code, after = loops.find_start_code(buffer.data, self._bit, end, self._code_bit is not None)
         if code == loops.UNDECIDED:
-            if final and end - self._bit >= 32:
-                self._warn("the stream ends inside a start code; no plane is lost")
             if final:
+                if self.planes and self._salvage:
+                    self._report_missing_end()
                 self._bit = end
                 self._object_end = buffer.offset + buffer.length
                 self._step = self._find_object
             return None
         if code != loops.NO_START_CODE:
             start, self._bit = self._bit, after
-            self._doubtful.clear()
+            self._log.confirm_planes()
             if code not in syntax.PLANE_CODES:
                 self._code_bit = None
             elif self._code_bit is None:
@@ -267,7 +261,7 @@ class Decoder:
                 continue
             if code in syntax.PLANE_CODES and not buffer.data[position + 4] & 0x80:
                 continue  # a P plane: the planes that it depends on are lost
-            self._close_damage(position)
+            self._log.end(self._buffer.offset + position)
             self._bit = 8 * position
             self._scanned = 0
             self._step = self._decode_planes
@@ -275,24 +269,32 @@ class Decoder:
         self._scanned = max(self._scanned, buffer.length - 3)
         self._bit = 8 * self._scanned
         if final:
-            self._close_damage(buffer.length)
+            self._log.end(buffer.offset + buffer.length)
+            ended = buffer.data[max(buffer.length - 4, 0) : buffer.length].tobytes() == _END
+            self._log.resume(*(self._log.estimate() or (None, None)) if ended else (None, None))
         return None
 
     def _block(self, planes: Planes) -> Block:
         """Return planes with their times, and move on past them."""
         settings, clock = planes.settings, self._clock
         if settings.intra:
-            for problem in clock.begin_intra(settings.frame_rate, settings.time_code):
-                self._warn(f"plane {self.planes}, bit {self._absolute(int(planes.borders[0]))}: {problem}")
+            self._set_clock(settings, int(planes.borders[0]))
         assert clock.rate is not None
         borders = planes.borders + 8 * self._buffer.offset
         if self._salvage:
-            self._doubtful.extend(borders[-1 - _DOUBTFUL : -1].tolist())  # after start codes
+            self._log.add_planes(borders, planes.skips)
         if self._code_bit is not None:
             borders[0] = self._code_bit
-        start = clock.time
+        start, index = clock.time, clock.advance(planes.skips)
+        if self._catching_up:
+            late = max(self._following - int(index[0]), 0)
+            self._catching_up = late > 0
+            start += late / clock.rate
+            steps = np.arange(len(index))
+            index = np.maximum(index - steps, self._following) + steps
+        self._following = int(index[-1]) + 1
         block = Block(
-            index=clock.advance(planes.skips),
+            index=index,
             start=start,
             rate=clock.rate,
             number=self.planes,
@@ -302,16 +304,39 @@ class Decoder:
             parts=planes.parts,
             rows=planes.rows,
             columns=planes.columns,
+            doubtful=planes.doubtful,
         )
         self.planes += len(planes.skips)
         self._bit = int(planes.borders[-1])
         self._code_bit = None
         return block
 
+    def _set_clock(self, settings: PlaneSettings, bit: int) -> None:
+        """Set the clock to an I plane that begins at a bit of the buffer; list frames lost before it."""
+        clock, log = self._clock, self._log
+        code = settings.time_code
+        lost = log.estimate() if log.resuming else None
+        if lost is not None and (code is None or not code.marker):
+            # In a stream with time codes, the next one will set the clock; until then it must not be ahead.
+            clock.skip_lost(max(lost[0] - lost[1], 0) if clock.agreements else lost[0])
+        agreed, rate = clock.agreements, clock.rate
+        for problem in clock.begin_intra(settings.frame_rate, code, repair=self._salvage):
+            self._warn(f"plane {self.planes}, bit {self._absolute(bit)}: {problem}")
+        jump = clock.jump or 0
+        if clock.rate != rate:
+            self._catching_up = False  # indices of another rate
+        elif jump < 0:
+            self._catching_up = not self._may_step_back
+        if log.resuming:
+            log.resume(*((max(jump, 0), 0) if clock.jump is not None else lost or (None, None)))
+        elif self._salvage and agreed and jump:
+            self._report_jump(settings, bit, jump)
+
     def _begin_object(self) -> None:
         """Reset the reader for a new object."""
         self._reader.begin_object()
         self._objects += 1
+        self.ended = False
         self._code_bit = None
 
     def _end_object(self, code: int) -> None:
@@ -323,6 +348,7 @@ class Decoder:
                 plane=self.planes,
                 bit=self._absolute(self._bit - 32),
             )
+        self.ended = code == syntax.END_CODE
         self._scanned = self._bit >> 3
         self._object_end = self._buffer.offset + self._scanned
         self._step = self._find_object
@@ -348,20 +374,36 @@ class Decoder:
         for listed in (error, error.__cause__):  # there may be millions: tracebacks would fill the memory
             if listed is not None:
                 listed.__traceback__ = listed.__context__ = None
-        self.damage.append(Damage(error, self._buffer.offset + start, self._buffer.offset + start))
+        doubtful = self._log.first_doubtful_bit
+        self._log.begin(error, self._buffer.offset + start, self.planes)
         self._reader.forget_values()
         self._code_bit = None
-        if self._doubtful:
-            self._scanned = (self._doubtful[0] >> 3) - self._buffer.offset
-            self._doubtful.clear()
+        if doubtful is not None:
+            self._scanned = (doubtful >> 3) - self._buffer.offset
         else:
             self._scanned = (self._lost_from >> 3) + 1 if self._objects else self._bit >> 3
         self._step = self._resynchronise
 
-    def _close_damage(self, position: int) -> None:
-        """Set the end of the last damage, a byte of the buffer."""
-        last, stop = self.damage[-1], self._buffer.offset + position
-        self.damage[-1] = Damage(last.error, min(last.start, stop), stop)
+    def _report_missing_end(self) -> None:
+        """List as damage that the data ends without an end code."""
+        buffer = self._buffer
+        length = buffer.offset + buffer.length
+        error = BitstreamError(_NO_END, plane=self.planes - 1, bit=8 * length)
+        self.damage.append(Damage(error, min(self._absolute(self._bit) + 7 >> 3, length), length))
+
+    def _report_jump(self, settings: PlaneSettings, bit: int, jump: int) -> None:
+        """List as damage that a time code contradicts the count of planes, with which codes agreed before."""
+        frames = f"{abs(jump)} frame{'s' if abs(jump) != 1 else ''}"
+        found = (
+            f"{frames} are missing before this plane"
+            if jump > 0
+            else f"the planes before it are {frames} late"
+        )
+        bit = self._absolute(bit)
+        error = BitstreamError(
+            f"the time code {settings.time_code} says that {found}", plane=self.planes, bit=bit
+        )
+        self.damage.append(Damage(error, bit >> 3, bit >> 3, max(jump, 0), 0))
 
     def _raise_pending(self) -> None:
         """Raise the error that an earlier call left."""
@@ -385,20 +427,21 @@ def decode(
 
     bap_steps, on_error: see `Decoder`; with "salvage", FbaWarnings say what was lost. Times come from frame
     rate, skips and time codes. A stream that changes its rate is returned at the lowest rate at which all its
-    times are exact. Raises BitstreamError, UnsupportedError.
+    times are exact. An FbaWarning says if the end code is missing. Raises BitstreamError, UnsupportedError.
     """
     view = memoryview(data)
     decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
+    decoder._may_step_back = True
     frames = CompactBuffer(limits, len(view))
     for start in range(0, len(view), _CHUNK):
         for block in decoder.push_blocks(view[start : start + _CHUNK]):
             frames.add(block)
     for block in decoder.finish_blocks():
         frames.add(block)
+    if on_error == "raise" and decoder.planes and not decoder.ended:
+        warnings.warn(f"plane {decoder.planes - 1}: {_NO_END}", FbaWarning, stacklevel=2)
     for damage in decoder.damage:
-        warnings.warn(
-            f"bytes {damage.start}..{damage.stop} were lost: {damage.error}", FbaWarning, stacklevel=2
-        )
+        warnings.warn(str(damage), FbaWarning, stacklevel=2)
     if not frames.frames:
         error = decoder.damage[0].error if decoder.damage else None
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error

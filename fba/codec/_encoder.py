@@ -62,7 +62,8 @@ class Encoder:
         self._resumable: set[int] = set()  # parts that a decoder can show from the last start code on
         self._pending: Animation | None = None  # the last frame pushed
         self._frame_rate: FrameRate | None = None
-        self._time_code: TimeCode | None = None
+        self._time_code: TimeCode | None = None  # of the first plane
+        self._origin = 0  # index of the frame that is at 0 seconds in the stream
         self._last_intra = 0  # index of the last I plane
         self._finished = False
 
@@ -108,7 +109,9 @@ class Encoder:
     def _encode(self, frames: Animation, following: int) -> None:
         """Encode frames. following: index of the frame after them, which determines the last skip."""
         if not self._writer.planes:
-            self._time_code = headers.time_code(int(frames.index[0]), frames.rate)
+            first = int(frames.index[0])
+            self._time_code = headers.first_time_code(first, frames.rate)
+            self._origin = 0 if self._time_code is not None else first
         for run in find_runs(frames, following, self.options.unsent):
             self._check_skips(run.skips)
             self._clip_amounts(run.rows)
@@ -150,12 +153,13 @@ class Encoder:
         position = 0
         if not all(self._in_force(run, part) for part in run.parts):
             # The first plane carries every track, even one that sends nothing yet.
-            self._encode_intra(run, 0, run.parts if self._writer.planes else list(run.masks))
+            self._encode_intra(run, 0, run.parts if self._writer.planes else list(run.masks), rate)
             position = 1
         while position < len(run.rows):
             due = position + self._frames_before_intra(run.index[position:], rate)
             while due < len(run.rows) and not self._can_be_intra(run, run.rows[due]):
                 due += 1  # put off: P planes reach values that I planes do not
+                due += self._frames_before_intra(run.index[due:], rate)
             try:
                 self._writer.predicted(sum(run.parts), run.rows[position:due], run.skips[position:due])
                 position = due
@@ -164,7 +168,7 @@ class Encoder:
                 if self._clamp_difference(run, run.rows[position], error):
                     continue
             if position < len(run.rows):
-                self._encode_intra(run, position, run.parts)
+                self._encode_intra(run, position, run.parts, rate)
                 position += 1
 
     def _in_force(self, run: Run, part: int) -> bool:
@@ -178,11 +182,25 @@ class Encoder:
         )
 
     def _frames_before_intra(self, index: Int64, rate: Fraction) -> int:
-        """Return how many of the next frames, with index (T,), come before the intra period is over."""
+        """Return how many of the next frames, with index (T,), come before the next I plane is due.
+
+        It is due when the intra period is over, or before that at the last frame that a time code names.
+        """
         if self.options.intra_period is None:
             return len(index)
         due = self._last_intra + float(self.options.intra_period * rate)
-        return int(np.searchsorted(index, due - 1e-9))
+        before = int(np.searchsorted(index, due - 1e-9))
+        if self._times_restarts:
+            named = headers.last_named_frame(due + 1e-9 - self._origin, rate) + self._origin
+            position = int(np.searchsorted(index, named))
+            if named > self._last_intra and position < before and index[position] == named:
+                return position
+        return before
+
+    @property
+    def _times_restarts(self) -> bool:
+        """Whether I planes after the first carry time codes."""
+        return self.options.start_codes and self.options.time_codes
 
     def _can_be_intra(self, run: Run, row: Int32) -> bool:
         """Whether an I plane can carry the values of row (columns,), with the widest ranges."""
@@ -207,19 +225,22 @@ class Encoder:
         ranges.widen(np.array([error.slot]), np.array([[0], [0], [error.level], [-error.level]]))
         return False
 
-    def _encode_intra(self, run: Run, position: int, parts: list[int]) -> None:
+    def _encode_intra(self, run: Run, position: int, parts: list[int], rate: Fraction) -> None:
         """Encode the frame at a position of a run as an I plane with these parts."""
         row = run.rows[position]
         first = self._writer.planes == 0
         if first:
             self._writer.begin_object()
         settings = {part: self._part_settings(run, part, row) for part in parts}
+        time_code = self._time_code if first else None
+        if not first and self._times_restarts:
+            time_code = headers.time_code(int(run.index[position]) - self._origin, rate)
         plane = PlaneSettings(
             intra=True,
             face=settings.get(slots.FACE_BIT),
             body=settings.get(slots.BODY_BIT),
             frame_rate=self._frame_rate if first or self.options.start_codes else None,
-            time_code=self._time_code if first else None,
+            time_code=time_code,
             skip=int(run.skips[position]),
             start_code=self.options.start_codes and not first,
         )

@@ -6,6 +6,7 @@ import math
 import warnings
 from fractions import Fraction
 
+from fba.codec._clock import nearest_frame
 from fba.codec.settings import FrameRate, TimeCode
 from fba.errors import FbaWarning, RangeError, Remedy
 
@@ -28,19 +29,38 @@ def frame_rate(rate: Fraction) -> FrameRate:
     return fields
 
 
-def time_code(index: int, rate: Fraction) -> TimeCode | None:
+def first_time_code(index: int, rate: Fraction) -> TimeCode | None:
     """Return the time code with which a decoder shows the first plane at this index; None for index 0.
 
-    Time codes are whole seconds below 32 hours. If none gives the index, returns None with an FbaWarning.
+    If none gives the index, returns None with an FbaWarning.
     """
     if index == 0:
         return None
+    code = time_code(index, rate)
+    if code is None:
+        warnings.warn(
+            f"the animation starts at {float(index / rate):g} s, which no time code says; the stream starts "
+            "at 0",
+            FbaWarning,
+            stacklevel=3,
+        )
+    return code
+
+
+def time_code(index: int, rate: Fraction) -> TimeCode | None:
+    """Return the time code that names the frame of an index; None if none does.
+
+    Time codes are whole seconds below 32 hours, and name the nearest frame.
+    """
     seconds = math.floor(index / rate + Fraction(1, 2))
-    if 0 <= seconds < _HOURS * 3600 and math.floor(seconds * rate + Fraction(1, 2)) == index:
+    if 0 <= seconds < _HOURS * 3600 and nearest_frame(seconds, rate) == index:
         return TimeCode(seconds // 3600, seconds // 60 % 60, seconds % 60)
-    warnings.warn(
-        f"the animation starts at {float(index / rate):g} s, which no time code says; the stream starts at 0",
-        FbaWarning,
-        stacklevel=3,
-    )
     return None
+
+
+def last_named_frame(index: float, rate: Fraction) -> int:
+    """Return the last frame up to an index that a time code names."""
+    seconds = math.floor(index / rate) + 1
+    while nearest_frame(seconds, rate) > index:
+        seconds -= 1
+    return nearest_frame(seconds, rate)

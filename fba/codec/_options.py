@@ -25,6 +25,8 @@ class EncoderOptions:
         plane that cannot carry the values of its frame is put off.
     start_codes: write a plane start code before every I plane after the first, and all ranges with each, so
         that a decoder can start there or resume after damage.
+    time_codes: with start codes, also the time at which decoding goes on after damage: I planes come at
+        whole seconds where the intra period allows it, and carry a time code there. Takes 18 bits each.
     bap_steps: "iso" or "visage", the table of BAP steps; the decoder must be given the same.
     preset: "reference", ranges that fit the data.
     unsent: what a decoder does with an unsent FAP, unless the animation says so itself
@@ -41,6 +43,7 @@ class EncoderOptions:
     bap_quant: int = 1
     intra_period: Fraction | float | None = None
     start_codes: bool = False
+    time_codes: bool = True
     bap_steps: str = "iso"
     preset: str = "reference"
     unsent: str = "keep"

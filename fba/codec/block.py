@@ -22,7 +22,7 @@ class Block:
 
     index: int64 (T,); frame t is shown at start + (index[t] - index[0]) / rate seconds. number: that of the
     first plane. borders: int64 (T + 1,), absolute bit positions of the planes, and the end of the last.
-    skips: int64 (T,).
+    skips: int64 (T,). doubtful: see `fba.codec.PlaneInfo`.
 
     parts: uint8 (T,), fba_object_mask of each plane. settings: those of a plane with all parts that planes
     of the block carry. rows: int32 (T, K), the values of columns (K,), which are numbers of slots; 0 where a
@@ -40,6 +40,7 @@ class Block:
     parts: UInt8
     rows: Int32
     columns: Int64
+    doubtful: bool = False
 
     @cached_property
     def face(self) -> FaceTrack | None:
@@ -108,5 +109,5 @@ class Block:
                 self.rate,
                 face[frame] if face is not None else None,
                 body[frame] if body is not None else None,
-                PlaneInfo(self.number + position, bit, after - bit, settings),
+                PlaneInfo(self.number + position, bit, after - bit, settings, self.doubtful),
             )

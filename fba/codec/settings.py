@@ -56,6 +56,9 @@ class TimeCode:
         """Seconds since midnight."""
         return (self.hours * 60 + self.minutes) * 60 + self.seconds
 
+    def __str__(self) -> str:
+        return f"{self.hours}:{self.minutes:02}:{self.seconds:02}"
+
 
 @dataclass(frozen=True)
 class RangeLists:
@@ -123,10 +126,13 @@ class PlaneInfo:
     """Position and settings of one plane in a stream.
 
     number: 0-based, in stream order. bit: where it starts, from the start of the stream. bits: its length.
-    Both include the alignment and start code before it.
+    Both include the alignment and start code before it. doubtful: it was decoded after damage, with ranges
+    that a lost plane may have replaced, so that its values may be wrong. For planes before damage, see
+    `Damage.doubtful`.
     """
 
     number: int
     bit: int
     bits: int
     settings: PlaneSettings
+    doubtful: bool = False

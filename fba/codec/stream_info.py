@@ -11,7 +11,8 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
-from fba.codec._decoder import Damage, Decoder
+from fba.codec._damage import Damage
+from fba.codec._decoder import Decoder
 from fba.codec._plane import header_loops
 from fba.codec.block import Block
 from fba.codec.settings import PartSettings
@@ -98,7 +99,7 @@ class StreamInfo:
             "body": part(self.body),
             "intra_planes": self.intra_planes,
             "start_codes": self.start_codes,
-            "damage": [{"start": d.start, "stop": d.stop, "error": str(d.error)} for d in self.damage],
+            "damage": [d.to_dict() for d in self.damage],
         }
 
     @classmethod

@@ -249,7 +249,7 @@ def test_sections_in_any_order_and_number() -> None:
     for _ in range(30):
         chosen = [(number, random.random() < 0.3) for number in random.integers(0, len(parts), 8).tolist()]
         pieces = [parts[n][:4] + (b"\x80" if bad else parts[n][4:5]) + parts[n][5:] for n, bad in chosen]
-        got, error, decoder = decoded(first + b"".join(pieces), mode="salvage")
+        got, error, decoder = decoded(first + b"".join(pieces) + rest[-1], mode="salvage")
         assert error is None
         assert [content(f) for f in got[1:]] == [values[n + 1] for n, bad in chosen if not bad]
         assert len(decoder.damage) == sum(bad for _, bad in chosen)

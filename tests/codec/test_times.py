@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from codec_streams import OBJECT, RATES, decoded, jaw_intra, packed
+from codec_streams import END, OBJECT, RATES, decoded, jaw_intra, packed
 from fba import Animation, Decoder, EncoderOptions, FbaWarning, RangeError, decode, encode
 from fba.codec import Block, FrameBuffer, FrameRate, PlaneSettings, TimeCode, encode_planes
 from fba.codec._compact_buffer import CompactBuffer
@@ -265,7 +265,7 @@ def test_time_codes_that_are_not_followed(code: TimeCode, message: str) -> None:
 
 
 def test_no_rate_at_all() -> None:
-    data = OBJECT + packed(jaw_intra(5, time="000"))
+    data = OBJECT + packed(jaw_intra(5, time="000")) + END
     with pytest.warns(FbaWarning, match="the first I plane says no frame rate; 25 frames/s assumed"):
         assert decode(data).rate == 25
 

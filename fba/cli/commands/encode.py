@@ -71,6 +71,12 @@ CAPTURE = ("spine", "ground", "plant", "origin")
     is_flag=True,
     help="Write start codes before I planes, where a decoder can seek to or resume.",
 )
+@click.option(
+    "--time-codes/--no-time-codes",
+    default=True,
+    show_default=True,
+    help="With --start-codes: I planes at whole seconds with a time code: damage shifts nothing behind it.",
+)
 @options.bap_steps_option
 @options.choice_option(
     "--preset", "Ranges of the arithmetic coder: the reference encoder's, which fit the data.", "reference"
@@ -206,7 +212,17 @@ def _encode_as_epf(epf: Path, animation: Animation, bap_steps: str) -> _Encoded:
 def _refuse_beside_epf() -> None:
     """Raise click.UsageError for an option that the EPF file replaces."""
     context = click.get_current_context()
-    own = ("fap_quant", "bap_quant", "intra_period", "start_codes", "preset", "unsent", "gender", "clamp")
+    own = (
+        "fap_quant",
+        "bap_quant",
+        "intra_period",
+        "start_codes",
+        "time_codes",
+        "preset",
+        "unsent",
+        "gender",
+        "clamp",
+    )
     for parameter in context.command.params:
         origin = context.get_parameter_source(parameter.name or "")
         if parameter.name in own and origin is click.core.ParameterSource.COMMANDLINE:

@@ -106,7 +106,7 @@ def _print(path: Path, info: StreamInfo) -> None:
         if part is not None:
             click.echo(f"  {name}     {_part_text(part, 'FAP' if name == 'face' else 'BAP', info.frames)}")
     for damage in info.damage:
-        click.echo(f"  damage   bytes {damage.start}..{damage.stop}: {damage.error}")
+        click.echo(f"  damage   {damage}")
 
 
 def _part_text(part: PartInfo, kind: str, frames: int) -> str:

@@ -24,7 +24,8 @@ _PARTS = ((slots.FACE_BIT, "FAPs"), (slots.BODY_BIT, "BAPs"))
 class Planes:
     """An I plane, or P planes behind one; see `fba.codec.Block` for rows, columns, parts and settings.
 
-    borders: int64 (T + 1,), first bit of each plane, and the bit after the last. skips: int64 (T,).
+    borders: int64 (T + 1,), first bit of each plane, and the bit after the last. skips: int64 (T,). doubtful:
+    they depend on ranges that may have been replaced in a lost plane.
     """
 
     rows: Int32
@@ -33,6 +34,7 @@ class Planes:
     borders: Int64
     skips: Int64
     settings: PlaneSettings
+    doubtful: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ class PlaneReader:
     def __init__(self, bap_table: str = "iso") -> None:
         self._models = Models(bap_table)
         self._settings: dict[int, PartSettings] = {}
+        self._doubtful_ranges = 0  # parts, added up, whose ranges may have been replaced in a lost plane
         self._begun: _BegunIntra | None = None  # the plane at which data ran out
         self._run: _Run | None = None  # for P planes with these settings, once there are any
         self._parts = np.zeros(_RUN, dtype=np.uint8)
@@ -109,12 +112,17 @@ class PlaneReader:
         """Reset all state, including ranges."""
         self._models.begin_object()
         self.forget_values()
+        self._doubtful_ranges = 0
 
     def forget_values(self) -> None:
-        """Reset settings after damage: P planes are errors until the next I plane."""
+        """Reset settings after damage: P planes are errors until the next I plane.
+
+        Ranges stay, as the best guess for I planes that do not send them.
+        """
         self._settings.clear()
         self._begun = None
         self._run = None
+        self._doubtful_ranges = slots.FACE_BIT | slots.BODY_BIT
 
     def read(self, data: UInt8, bit: int, end: int, *, after_code: bool) -> Planes | None:
         """Return the plane at `bit` and the P planes that follow it; None if none is complete.
@@ -168,6 +176,7 @@ class PlaneReader:
                 skip=begun.skip,
                 start_code=after_code,
             ),
+            bool(begun.mask & self._doubtful_ranges),
         )
 
     def _read_part(self, reader: BitReader, part: int, name: str) -> PartSettings:
@@ -180,6 +189,8 @@ class PlaneReader:
                 what="DCT segments (object_coding_type 1)",
                 bit=reader.bit - 1,
             )
+        if all(codes is not None for codes in settings.ranges):
+            self._doubtful_ranges &= ~part
         self._models.begin_intra(part, settings)
         undefined = self._models.undefined(settings, part)
         if undefined is not None:
@@ -242,6 +253,7 @@ class PlaneReader:
             self._borders[: count + 1].copy(),
             self._skips[:count].copy(),
             settings,
+            bool(carried & self._doubtful_ranges),
         )
 
     def _check(self, status: int, place: int, start: int) -> None:

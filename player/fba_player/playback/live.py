@@ -197,7 +197,8 @@ class LiveAnimation:
                 closed = damage[-1]
                 self._losses += len(damage) - 1
                 del damage[:-1]  # an endless stream may have any number
-                lost = f"{closed.stop - closed.start} bytes lost at byte {closed.start}"
+                amount = f"{closed.stop - closed.start} bytes" if closed.stop > closed.start else "frames"
+                lost = f"{amount} lost at byte {closed.start}"
                 before = f" ({self._losses} losses before)" if self._losses else ""
                 self.message = lost + before
                 self.details = f"{lost}{before}: {closed.error}"

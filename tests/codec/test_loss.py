@@ -1,0 +1,249 @@
+"""What was lost, and when it goes on: time codes at restart points, lost frames counted, planes in doubt."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from codec_streams import END, OBJECT, PLANE, content, decoded, jaw_intra, jaw_predicted, packed
+from fba import Animation, Decoder, Encoder, EncoderOptions, FbaWarning, decode, encode
+from fba.codec import Damage, RangeLists, encode_planes
+from fba_conformance import _motion as motion
+
+EVERY_SECOND = EncoderOptions(intra_period=1, start_codes=True)
+
+
+def performance(count: int, rate: Fraction | int = 25, *, start: int = 0) -> Animation:
+    face = motion.face(count, faps_sent=(3, 4, 48, 49, 50))
+    return motion.animation(face, rate=rate, index=list(range(start, start + count)))
+
+
+def restarts(data: bytes) -> list[int]:
+    """Bytes at which plane start codes begin."""
+    return [at for at in range(len(data) - 3) if data[at : at + 4] == b"\0\0\1\xbb"]
+
+
+def intra_planes(data: bytes) -> list[tuple[int, str]]:
+    """Index and time code of every I plane."""
+    frames, error, _ = decoded(data)
+    assert error is None
+    planes = [(frame.index, frame.plane.settings) for frame in frames]
+    return [(index, str(settings.time_code or "")) for index, settings in planes if settings.intra]
+
+
+def destroyed(data: bytes, section: int) -> bytes:
+    """The stream with the I plane of a section made unreadable: fba_object_mask 0."""
+    at = restarts(data)[section] + 4
+    return data[:at] + b"\x80" + data[at + 1 :]
+
+
+@pytest.mark.parametrize(
+    ("rate", "period", "planes"),
+    [
+        (25, 1, [(0, ""), (25, "0:00:01"), (50, "0:00:02"), (75, "0:00:03")]),
+        (25, Fraction(5, 2), [(0, ""), (50, "0:00:02")]),  # not 62, which no time code names
+        (25, Fraction(3, 5), [(0, ""), (15, ""), (25, "0:00:01"), (40, ""), (50, "0:00:02"), (65, ""),
+                              (75, "0:00:03"), (90, "")]),
+        (Fraction(30000, 1001), 1, [(0, ""), (30, "0:00:01"), (60, "0:00:02"), (90, "0:00:03")]),
+        (Fraction(30000, 1001), 2, [(0, ""), (30, "0:00:01"), (60, "0:00:02"), (90, "0:00:03")]),
+        (Fraction(25, 2), 2, [(0, ""), (25, "0:00:02"), (50, "0:00:04"), (75, "0:00:06")]),
+    ],
+)  # fmt: skip
+def test_i_planes_come_where_a_time_code_says_their_time(
+    rate: Fraction, period: Fraction, planes: list[tuple[int, str]]
+) -> None:
+    animation = performance(100, rate)
+    options = EncoderOptions(intra_period=period, start_codes=True)
+    data = encode(animation, options)
+    assert intra_planes(data) == planes
+    assert np.array_equal(decode(data).index, animation.index)
+    one_by_one = Encoder(options)
+    pieces = [one_by_one.push(frame) for frame in animation]
+    assert intra_planes(b"".join([*pieces, one_by_one.finish()])) == planes
+
+
+def test_time_codes_can_be_left_out_and_take_18_bits() -> None:
+    animation = performance(100)
+    without = encode(animation, replace(EVERY_SECOND, time_codes=False))
+    assert intra_planes(without) == [(0, ""), (25, ""), (50, ""), (75, "")]
+    assert 0 <= len(encode(animation, EVERY_SECOND)) - len(without) - 3 * 18 // 8 <= 3
+    assert encode(animation) == encode(
+        animation, EncoderOptions(time_codes=False)
+    )  # nothing without start codes
+
+
+def test_time_codes_count_from_the_start_of_the_stream() -> None:
+    """An animation that starts at 13/25 s, which no time code says, is coded as if it started at 0."""
+    with pytest.warns(FbaWarning, match="the stream starts at 0"):
+        data = encode(performance(60, start=13), EVERY_SECOND)
+    assert intra_planes(data) == [(0, ""), (25, "0:00:01"), (50, "0:00:02")]
+    later = encode(performance(60, start=75), EVERY_SECOND)
+    assert intra_planes(later) == [(75, "0:00:03"), (100, "0:00:04"), (125, "0:00:05")]
+
+
+@pytest.mark.parametrize("rate", [Fraction(25), Fraction(30000, 1001)])
+def test_frames_behind_damage_keep_their_time(rate: Fraction) -> None:
+    animation = performance(130, rate)
+    data = encode(animation, EncoderOptions(intra_period=2, start_codes=True))
+    codes = [index for index, _ in intra_planes(data)]
+    for section in range(len(codes) - 1):
+        frames, error, decoder = decoded(destroyed(data, section), mode="salvage")
+        assert error is None
+        lost = range(codes[section + 1], codes[section + 2] if section + 2 < len(codes) else 130)
+        assert [frame.index for frame in frames] == [i for i in range(130) if i not in lost]
+        (damage,) = decoder.damage
+        if section + 2 < len(codes):
+            assert (damage.frames_lost, damage.uncertainty) == (len(lost), 0)
+        else:  # up to the end code: an estimate
+            assert damage.frames_lost is not None
+            assert damage.uncertainty is not None
+            assert abs(damage.frames_lost - len(lost)) <= damage.uncertainty
+
+
+def test_without_time_codes_lost_frames_are_estimated() -> None:
+    animation = performance(400)
+    data = encode(animation, replace(EVERY_SECOND, time_codes=False))
+    misses = []
+    for section in range(2, 14):
+        frames, _, decoder = decoded(destroyed(data, section), mode="salvage")
+        (damage,) = decoder.damage
+        assert damage.frames_lost is not None
+        assert damage.uncertainty is not None
+        behind = next(f for f in frames if f.plane.number == 25 * (section + 1))
+        assert behind.index == 25 * (section + 1) + damage.frames_lost
+        misses.append(abs(damage.frames_lost - 25) <= damage.uncertainty)
+    assert all(misses)
+
+
+@pytest.mark.parametrize("section", [0, 1, 2])
+def test_a_join_in_mid_stream_starts_at_the_right_time(section: int) -> None:
+    animation = performance(100)
+    data = encode(animation, EVERY_SECOND)
+    frames, error, decoder = decoded(data[restarts(data)[section] :], mode="salvage")
+    assert error is None
+    assert [frame.index for frame in frames] == list(range(25 * (section + 1), 100))
+    assert not any(frame.plane.doubtful for frame in frames)  # all ranges come with the restart point
+    (damage,) = decoder.damage
+    assert (damage.frames_lost, damage.uncertainty) == (None, None)
+
+
+def test_every_bit_flipped_leaves_the_times_behind_it_alone() -> None:
+    """But for bits of time codes and rates. Frames stay in order, however much was misread."""
+    animation = motion.animation(motion.face(9, faps_sent=(3,)), rate=3)
+    data = encode(animation, EVERY_SECOND)
+    true, _, _ = decoded(data)
+    codes = restarts(data)
+    ends = {f.plane.bit + f.plane.bits: f for f in true}
+    in_code = {8 * at + 32 + bit for at in codes for bit in range(4 + 13, 4 + 13 + 1 + 18)}
+    shifted, misread = 0, 0
+    for bit in range(8 * codes[0] - 8 * 12, 8 * codes[1], 2):
+        bad = bytearray(data)
+        bad[bit >> 3] ^= 128 >> (bit & 7)
+        frames, _, decoder = decoded(bytes(bad), mode="salvage")
+        if all(frame.rate == 3 for frame in frames):
+            assert all(a.index < b.index for a, b in pairwise(frames))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)
+            whole = decode(bytes(bad), on_error="salvage")
+        section = next((at for at in codes if 8 * at > bit), codes[-1])
+        behind = {f.index for f in true if f.plane.bit >= 8 * section - 8}
+        if bit not in in_code and all(frame.rate == 3 for frame in frames):
+            shifted += not behind <= set(whole.index.tolist())
+        doubtful = {number for damage in decoder.damage for number in damage.doubtful}
+        for number, frame in enumerate(frames):
+            same = ends.get(frame.plane.bit + frame.plane.bits)
+            if decoder.damage and (same is None or content(same) != content(frame)):
+                misread += number not in doubtful
+    assert shifted == 0
+    assert misread == 0
+
+
+def test_a_misread_skip_does_not_push_the_rest_away() -> None:
+    """`decode` leaves out frames that the time code behind them overtakes; a `Decoder` closes up to them."""
+    rate = "1" + f"{25:08b}" + "00000"
+    skipping = jaw_intra(5, time=rate + "0" + "1" + "1111" * 20 + "0000")  # 300 frames
+    second = jaw_intra(5, time=rate + "1" + f"{0:05b}{0:06b}1{1:06b}" + "0")
+    data = OBJECT + packed(skipping + jaw_predicted(-2) + "000") + PLANE + packed(second) + END
+    with pytest.warns(FbaWarning, match=r"fba_object_mask is 0.*; planes 0\.\.1 before it may be wrong"):
+        assert decode(data, on_error="salvage").index.tolist() == [0, 25]
+    frames, _, decoder = decoded(data, mode="salvage")
+    assert [frame.index for frame in frames] == [0, 301, 302]
+    assert [d.frames_lost for d in decoder.damage] == [0]
+
+
+def test_a_time_code_that_jumps_where_none_did_before_is_reported() -> None:
+    data = encode(performance(100), EVERY_SECOND)
+    _, second, third = restarts(data)
+    frames, error, decoder = decoded(data[:second] + data[third:], mode="salvage")
+    assert error is None
+    assert [frame.index for frame in frames] == [*range(50), *range(75, 100)]
+    (damage,) = decoder.damage
+    assert (damage.start, damage.stop, damage.frames_lost, damage.uncertainty) == (
+        second + 4,
+        second + 4,
+        25,
+        0,
+    )
+    assert "time code 0:00:03 says that 25 frames are missing" in str(damage)
+
+
+def test_a_damaged_time_code_is_not_followed_for_hours() -> None:
+    data = encode(performance(100), EVERY_SECOND)
+    at = 8 * restarts(data)[1] + 32 + 4 + 13 + 1  # the first bit of the hours: 16 more
+    bad = bytearray(data)
+    bad[at >> 3] ^= 128 >> (at & 7)
+    with pytest.warns(FbaWarning, match="time code 16:00:02 is far ahead of the count of planes"):
+        animation = decode(bytes(bad), on_error="salvage")
+    assert animation.index.tolist() == list(range(100))
+
+
+def test_a_cut_between_planes_is_noticed() -> None:
+    data = encode(performance(30))
+    frames, _, _ = decoded(data)
+    borders = [f.plane.bit + f.plane.bits for f in frames]
+    aligned = [bit >> 3 for bit in borders[:-1] if bit % 8 == 0]
+    assert aligned
+    for length in [*aligned, *range(len(data) - 4, len(data))]:
+        part = data[:length]
+        with pytest.warns(FbaWarning, match="ends without the end code 00 00 01 b1"):
+            decode(part)
+        salvaged, error, decoder = decoded(part, mode="salvage")
+        assert error is None
+        assert not decoder.ended
+        (damage,) = decoder.damage
+        assert (damage.stop, damage.frames_lost, damage.uncertainty) == (length, None, None)
+        assert len(salvaged) == sum(bit <= 8 * length for bit in borders)
+    decoder = Decoder()
+    decoder.push(data)
+    assert decoder.finish() == []
+    assert decoder.ended
+
+
+def test_ranges_that_may_have_been_replaced_are_in_doubt() -> None:
+    """A reader that joins at an I plane without range lists takes those of the standard's tables."""
+    animation = performance(6)
+    frames, _, _ = decoded(encode(animation, EncoderOptions(intra_period=Fraction(3, 25), start_codes=True)))
+    planes = [frame.plane.settings for frame in frames]
+    part = planes[3].face
+    assert part is not None
+    planes[3] = replace(planes[3], face=replace(part, ranges=RangeLists()))
+    planes[4:] = [replace(plane, face=planes[3].face) for plane in planes[4:]]
+    data = encode_planes(animation, planes)
+    assert not any(frame.plane.doubtful for frame in decoded(data)[0])
+    joined, _, _ = decoded(data[restarts(data)[0] :], mode="salvage")
+    assert all(frame.plane.doubtful for frame in joined)
+
+
+def test_damage_as_a_line_of_text() -> None:
+    error = ValueError("it broke")
+    assert str(Damage(error, 4, 9)) == "bytes 4..9 were lost: it broke"  # type: ignore[arg-type]
+    assert str(Damage(error, 9, 9)) == "it broke"  # type: ignore[arg-type]
+    known = Damage(error, 4, 9, 25, 0, range(3, 6))  # type: ignore[arg-type]
+    assert str(known) == "bytes 4..9 were lost: it broke; 25 frames lost; planes 3..5 before it may be wrong"
+    guessed = Damage(error, 4, 9, 1, 2)  # type: ignore[arg-type]
+    assert str(guessed) == "bytes 4..9 were lost: it broke; about 1 frame (give or take 2) lost"
