@@ -27,6 +27,7 @@ _COMMANDS = {
     "convert": "Convert a file into another format.",
     "play": "Play a file in a window.",
     "render": "Render a file to a picture or a video, without a window.",
+    "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",
     "conformance": "Check this codec against test vectors.",
     "bench": "Measure the speed of this codec on a stream.",

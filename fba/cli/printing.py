@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
 import click
+
+LONGEST_ROW = 1 << 16
+"""Characters of a row: names of files are shorter."""
 
 
 def print_json(value: object) -> None:
@@ -23,6 +27,25 @@ def seconds_text(value: Fraction | float) -> str:
 def rate_text(rate: Fraction) -> str:
     """Return a frame rate as "25", "30.5", or "29.97" for 30000/1001."""
     return f"{float(rate):.3f}".rstrip("0").rstrip(".")
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print rows of a file and cells, under the names of the columns behind that of the file."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("file", overflow="fold")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for row in rows:
+        table.add_row(*row)
+    wide = Console(width=LONGEST_ROW)
+    # On a terminal, long names are folded; a program that reads it finds every row on one line.
+    console = Console(width=None if wide.is_terminal else max(160, wide.measure(table).maximum))
+    with console.capture() as text:  # rich, as it prints, would exit with 1 where a pipe is closed
+        console.print(table)
+    click.echo(text.get(), nl=False)
 
 
 class Progress:

@@ -12,6 +12,7 @@ from fba.codec.block import Block
 from fba.codec.frame_buffer import DecodedFrames, FrameBuffer
 from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings, RangeLists, TimeCode
 from fba.codec.stream_info import PartInfo, StreamInfo, probe_stream
+from fba.codec.verification import Verification, digest, verify_stream
 
 __all__ = [
     "Block",
@@ -30,9 +31,12 @@ __all__ = [
     "RangeLists",
     "StreamInfo",
     "TimeCode",
+    "Verification",
     "decode",
+    "digest",
     "encode",
     "encode_planes",
     "encode_with_statistics",
     "probe_stream",
+    "verify_stream",
 ]

@@ -44,6 +44,7 @@ class Damage:
             "start": self.start,
             "stop": self.stop,
             "error": str(self.error),
+            "text": str(self),
             "frames_lost": self.frames_lost,
             "uncertainty": self.uncertainty,
             "doubtful": [self.doubtful[0], self.doubtful[-1]] if self.doubtful else None,

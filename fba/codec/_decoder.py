@@ -238,6 +238,7 @@ class Decoder:
             raise self._in_stream(error) from None
         except OutOfDataError:
             if final:
+                self._log.confirm_planes()  # a cut leaves the planes before it alone
                 raise BitstreamError(
                     "the stream ends inside this plane: it is cut off, or its last bytes are missing",
                     plane=self.planes,

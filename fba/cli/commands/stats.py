@@ -11,12 +11,9 @@ import numpy as np
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
 from fba.cli.inputs import EXISTING, input_file
-from fba.cli.printing import print_json
+from fba.cli.printing import print_json, print_table
 from fba.codec.stream_info import StreamInfo
 from fba.limits import Limits
-
-LONGEST = 1 << 16
-"""Characters of a row: names of files are shorter."""
 
 
 @click.command(cls=Command, epilog=examples("fba stats talk.fba", "fba stats --json *.fba"))
@@ -47,10 +44,6 @@ def command(files: tuple[Path, ...], bap_steps: str, as_json: bool, limit: Limit
 
 
 def _print(rows: list[dict[str, Any]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
     columns = (
         "bytes",
         "frames",
@@ -63,29 +56,23 @@ def _print(rows: list[dict[str, Any]]) -> None:
         "P 95 %",
         "I share",
     )
-    table.add_column("file", overflow="fold")
-    for column in columns:
-        table.add_column(column, justify="right")
-    for row in rows:
-        table.add_row(
-            row["file"],
-            str(row["size"]),
-            str(row["frames"]),
-            f"{row['duration']:.2f}",
-            f"{row['bits_per_second'] / 1000:.2f}",
-            f"{row['peak_bits_per_second'] / 1000:.2f}",
-            str(row["intra_planes"]),
-            f"{row['intra_bits_mean']:.0f}",
-            f"{row['predicted_bits_median']:.0f}",
-            f"{row['predicted_bits_95']:.0f}",
-            f"{100 * row['intra_share']:.0f} %",
-        )
-    wide = Console(width=LONGEST)
-    # On a terminal, long names are folded; a program that reads it finds every row on one line.
-    console = Console(width=None if wide.is_terminal else max(160, wide.measure(table).maximum))
-    with console.capture() as text:  # rich, as it prints, would exit with 1 where a pipe is closed
-        console.print(table)
-    click.echo(text.get(), nl=False)
+    print_table(columns, [_cells(row) for row in rows])
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    return [
+        row["file"],
+        str(row["size"]),
+        str(row["frames"]),
+        f"{row['duration']:.2f}",
+        f"{row['bits_per_second'] / 1000:.2f}",
+        f"{row['peak_bits_per_second'] / 1000:.2f}",
+        str(row["intra_planes"]),
+        f"{row['intra_bits_mean']:.0f}",
+        f"{row['predicted_bits_median']:.0f}",
+        f"{row['predicted_bits_95']:.0f}",
+        f"{100 * row['intra_share']:.0f} %",
+    ]
 
 
 def statistics(info: StreamInfo) -> dict[str, Any]:

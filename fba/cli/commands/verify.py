@@ -1,0 +1,107 @@
+"""`fba verify`: are streams complete and undamaged, and have they still the same values?"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fba.cli import options
+from fba.cli.command import Command, EachFile, examples
+from fba.cli.inputs import EXISTING, input_file
+from fba.cli.printing import Progress, print_json, print_table
+from fba.errors import FormatError
+from fba.limits import Limits
+
+_SHOWN = 16
+"""Digits of a digest in the table; --json has all 64."""
+
+
+@click.command(
+    cls=Command,
+    epilog=examples(
+        "fba verify archive/*.fba",
+        "fba verify --json archive/*.fba > archive.json     # to be kept with the archive",
+        "fba verify archive/*.fba --against archive.json    # a year later",
+    ),
+)
+@click.argument("files", metavar="FILE.fba...", nargs=-1, required=True, type=EXISTING)
+@click.option(
+    "--against",
+    type=EXISTING,
+    metavar="REPORT.json",
+    help="Also compare the digests with those of an earlier --json report.",
+)
+@options.bap_steps_option
+@options.json_option
+@options.limit_option
+def command(
+    files: tuple[Path, ...], against: Path | None, bap_steps: str, as_json: bool, limit: Limits
+) -> None:
+    """Check FBA streams: end code, damage, frames lost and in doubt, and a digest of the decoded values.
+
+    The digest depends on frame rate, times and values alone, not on how they are coded. It also finds
+    changes that leave the syntax of a stream intact. Exits with 1 if a stream is damaged, cut off or changed.
+    """
+    from fba.codec.verification import verify_stream
+
+    known = _known_digests(against) if against is not None else {}
+    reports: list[dict[str, Any]] = []
+    each = EachFile(files)
+    with Progress("checking", len(files)) as step:
+        for path in files:
+            with each.file(path), input_file(path) as file:
+                found = verify_stream(file.read_bytes(), bap_steps=bap_steps, limits=limit)
+                report = {"file": str(path), **found.to_dict()}
+                if against is not None:
+                    earlier = known.get(str(path))
+                    report["unchanged"] = None if earlier is None else earlier == found.digest
+                reports.append(report)
+            step.advance()
+    if as_json:
+        print_json(reports if len(files) > 1 else reports[0])
+    elif reports:
+        columns = ("frames", "seconds", "end code", "damage", "lost", "in doubt", "result", "digest")
+        print_table(columns, [_row(report) for report in reports])
+        for report in reports:
+            for damage in report["damage"]:
+                click.echo(f"{report['file']}: {damage['text']}")
+            for warning in report["warnings"]:
+                click.echo(f"{report['file']}: warning: {warning}")
+    each.finish()
+    if not all(report["intact"] and report.get("unchanged") is not False for report in reports):
+        raise click.exceptions.Exit(1)
+
+
+def _known_digests(report: Path) -> dict[str, str]:
+    """Return the digests of an earlier report by file. FormatError if it is none."""
+    with input_file(report) as file:
+        try:
+            entries = json.loads(file.read_bytes())
+            entries = entries if isinstance(entries, list) else [entries]
+            return {str(entry["file"]): str(entry["digest"]) for entry in entries}
+        except (ValueError, TypeError, KeyError) as error:
+            raise FormatError(f"this is no report of fba verify --json: {error}", path=report) from error
+
+
+def _row(report: dict[str, Any]) -> list[str]:
+    """Return the cells of a report."""
+    result = "intact" if report["intact"] else "DAMAGED"
+    if report.get("unchanged") is False:
+        result = f"{result}, CHANGED"
+    elif "unchanged" in report:
+        result = f"{result}, {'unchanged' if report['unchanged'] else 'not in the report'}"
+    lost = "?" if report["frames_lost"] is None else str(report["frames_lost"])
+    return [
+        report["file"],
+        str(report["frames"]),
+        f"{report['duration']:.2f}",
+        "yes" if report["ended"] else "NO",
+        str(len(report["damage"])),
+        lost,
+        str(report["doubtful"]),
+        result,
+        report["digest"][:_SHOWN],
+    ]
