@@ -80,7 +80,7 @@ def test_finds_steps(run: Run, tmp_path: Path) -> None:
         (["--character", "cheerful", "-o", "x.bap"], 1, "normal, bored, proud"),
         (["--cycles", 0, "-o", "x.bap"], 2, "positive"),
         (["--cycles", 1, "--seconds", 1, "-o", "x.bap"], 2, "not both"),
-        (["--fps", 2, "-o", "x.bap"], 2, "at least 8"),
+        (["--fps", 2, "-o", "x.bap"], 2, "it needs 8 to 100000"),
         (["-o", "x.unknown"], 1, "suffix"),
         ([], 2, "give one of"),
         (["--list", "-o", "x.bap"], 2, "give one of"),

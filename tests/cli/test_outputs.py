@@ -148,16 +148,20 @@ def test_a_face_model_is_named_as_what_it_is(run: Run, here: Path) -> None:
     assert "name it head.glb" in " ".join(err.split())
 
 
-def test_standard_input_is_an_input_as_well(here: Path) -> None:
+def test_standard_input_is_an_input_as_well(here: Path, programs: Path) -> None:
     before = (here / "face.fap").read_bytes()
     with (here / "face.fap").open("rb") as source:
         done = subprocess.run(
-            [*FBA, "convert", "-", "face.fap"], stdin=source, capture_output=True, text=True, check=False
+            [programs / "fba", "convert", "-", "face.fap"],
+            stdin=source,
+            capture_output=True,
+            text=True,
+            check=False,
         )
     assert done.returncode == 2
     assert "would overwrite standard input" in " ".join(done.stderr.split())
     with (here / "face.fap").open("ab") as target:
-        command = [*FBA, "convert", "face.fap", "-", "--to", "fap"]
+        command = [programs / "fba", "convert", "face.fap", "-", "--to", "fap"]
         done = subprocess.run(command, stdout=target, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2
     assert "would overwrite the input face.fap" in " ".join(done.stderr.split())
@@ -282,10 +286,10 @@ def test_a_file_whose_name_is_a_dash(run: Run) -> None:
     assert fba.read("back.fap") == fba.read("face.fap")
 
 
-def test_a_stream_on_standard_input_has_a_name_in_a_folder(here: Path) -> None:
+def test_a_stream_on_standard_input_has_a_name_in_a_folder(here: Path, programs: Path) -> None:
     (here / "out").mkdir()
     with (here / "both.fba").open("rb") as source:
-        subprocess.run([*FBA, "decode", "-", "--fap", "out"], stdin=source, check=True)
+        subprocess.run([programs / "fba", "decode", "-", "--fap", "out"], stdin=source, check=True)
     assert os.listdir("out") == ["stdin.fap"]
 
 
@@ -330,7 +334,7 @@ def test_what_cannot_be_written_to_standard_output(here: Path) -> None:
 
 
 @POSIX
-def test_devices_and_open_files_are_written_to(run: Run, here: Path) -> None:
+def test_devices_and_open_files_are_written_to(run: Run, here: Path, programs: Path) -> None:
     for line in ("encode face.fap -o /dev/null", "decode both.fba --fap /dev/null --bap /dev/null"):
         assert run(*line.split())[0] == 0
     assert Path("/dev/null").is_char_device()
@@ -338,7 +342,8 @@ def test_devices_and_open_files_are_written_to(run: Run, here: Path) -> None:
     kept.write_bytes(b"before\n")
     for name in ("/dev/stdout", "/dev/fd/1", "-"):
         with kept.open("ab") as target:
-            subprocess.run([*FBA, "decode", "both.fba", "--fap", name], stdout=target, check=True)
+            command = [programs / "fba", "decode", "both.fba", "--fap", name]
+            subprocess.run(command, stdout=target, check=True)
     run("decode", "both.fba", "--fap", "alone")
     assert kept.read_bytes() == b"before\n" + 3 * (here / "alone").read_bytes()
     with kept.open("ab") as target:
