@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
 from fba.atomic import atomic
-from fba.errors import BitstreamError, LimitError, OptionError, RangeError
+from fba.errors import BitstreamError, LimitError, OptionError, RangeError, UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_whole
 
@@ -93,6 +93,6 @@ def naming_file(path: Path) -> Iterator[None]:
     """Put the file's name in front of the codec's errors; their type and attributes stay."""
     try:
         yield
-    except (BitstreamError, LimitError, RangeError) as error:
+    except (BitstreamError, LimitError, RangeError, UnsupportedError) as error:
         error.args = (f"{os.fspath(path)}: {error.finding}",)
         raise

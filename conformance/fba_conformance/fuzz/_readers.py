@@ -1,0 +1,186 @@
+"""One check for each reader of files: any bytes give an `FbaError` that names the file, or a result.
+
+What was read must also stand what is done with it next: writing, reading again, retargeting.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+
+import fba
+from fba.body.model import BodyModel
+from fba.cache import load_or_make
+from fba.errors import FbaError, FbaWarning
+from fba.face.importers import import_model
+from fba.face.importers.points.points_file import read_points
+from fba.face.model import FaceModel
+from fba.formats.bvh import reader as bvh
+from fba.formats.epf.epf import read_epf, write_epf
+from fba.formats.gltf import reader as gltf
+from fba.formats.text.bap import read_bap, write_bap
+from fba.formats.text.fap import read_fap, write_fap
+from fba.gltf.reader import read_gltf
+from fba.mesh.mtl import read_mtl
+from fba.mesh.obj import read_obj
+from fba.mesh.ply import read_ply
+from fba.mesh.vrml import read_vrml
+from fba.mesh.wfm import read_wfm
+from fba_conformance.fuzz._outcome import ContractError, Outcome
+
+_WORLD = b"""#VRML V2.0 utf8
+Shape { geometry IndexedFaceSet { coord Coordinate { point [ 0 0 0, 10 0 0, 0 10 5 ] } coordIndex [ 0 1 2 -1 ] } }
+Shape { geometry IndexedFaceSet { coord Coordinate { point [ 3 1 2, 4 1 2, 3 2 2 ] } coordIndex [ 0 1 2 ] } }
+"""
+"""The mesh that an Xface file of the corpus names."""
+_CACHED = np.arange(24, dtype=np.float32).reshape(4, 6), np.arange(5, dtype=np.float32)
+
+
+def check_fap(data: bytes, folder: Path) -> Outcome:
+    """Read ASCII FAPs, strictly or with what can be saved of them, write them, and read them again."""
+
+    def read(path: Path) -> None:
+        animation = read_fap(path, salvage=bool(crc32(data) & 1))
+        again = folder / "again.fap"
+        write_fap(again, animation)
+        if read_fap(again).face != animation.face:
+            raise ContractError("other FAPs after writing and reading again")
+
+    return _check_file(data, folder / "input.fap", read)
+
+
+def check_bap(data: bytes, folder: Path) -> Outcome:
+    """Read ASCII BAPs, strictly or with what can be saved of them, write them, and read them again."""
+
+    def read(path: Path) -> None:
+        animation = read_bap(path, salvage=bool(crc32(data) & 1))
+        again = folder / "again.bap"
+        write_bap(again, animation)
+        if read_bap(again).body != animation.body:
+            raise ContractError("other BAPs after writing and reading again")
+
+    return _check_file(data, folder / "input.bap", read)
+
+
+def check_epf(data: bytes, folder: Path) -> Outcome:
+    """Read encoder parameters, write them, and read them again."""
+
+    def read(path: Path) -> None:
+        planes = read_epf(path)
+        again = folder / "again.epf"
+        write_epf(again, planes)
+        if len(read_epf(again)) != len(planes):
+            raise ContractError("another number of planes after writing and reading again")
+
+    return _check_file(data, folder / "input.epf", read)
+
+
+def check_bvh(data: bytes, folder: Path) -> Outcome:
+    """Read the motion of a BVH file; of every fourth one, make BAPs."""
+    retarget = crc32(data) % 4 == 0
+    return _check_file(data, folder / "input.bvh", fba.read if retarget else bvh.read_motion)
+
+
+def check_gltf(data: bytes, folder: Path) -> Outcome:
+    """Read a glTF file; of every second one the motion, and of every fourth make BAPs."""
+    way = crc32(data) % 4
+    read = read_gltf if way < 2 else gltf.read_motion if way == 2 else fba.read  # noqa: PLR2004
+    return _check_file(data, folder / ("input.glb" if data[:4] == b"glTF" else "input.gltf"), read)
+
+
+def check_face(data: bytes, folder: Path) -> Outcome:
+    """Load a face model."""
+    return _check_file(data, folder / "input.glb", FaceModel.load)
+
+
+def check_body(data: bytes, folder: Path) -> Outcome:
+    """Load a body model."""
+    return _check_file(data, folder / "input.glb", BodyModel.load)
+
+
+def check_obj(data: bytes, folder: Path) -> Outcome:
+    """Read an OBJ mesh."""
+    return _check_file(data, folder / "input.obj", read_obj)
+
+
+def check_mtl(data: bytes, folder: Path) -> Outcome:
+    """Read the materials of an OBJ mesh."""
+    return _check_file(data, folder / "input.mtl", lambda path: read_mtl(folder / "input.obj", path.name))
+
+
+def check_ply(data: bytes, folder: Path) -> Outcome:
+    """Read a PLY mesh."""
+    return _check_file(data, folder / "input.ply", read_ply)
+
+
+def check_vrml(data: bytes, folder: Path) -> Outcome:
+    """Read the meshes of a VRML scene."""
+    return _check_file(data, folder / "input.wrl", read_vrml)
+
+
+def check_wfm(data: bytes, folder: Path) -> Outcome:
+    """Read a wire frame."""
+    return _check_file(data, folder / "input.wfm", read_wfm)
+
+
+def check_points(data: bytes, folder: Path) -> Outcome:
+    """Read feature points from CSV, JSON, FDP or Xface, after the first bytes."""
+    start = data.lstrip()[:4]
+    (folder / "head.wrl").write_bytes(_WORLD)
+    suffix = ".json" if start[:1] == b"{" else ".fdp" if start[:1] == b"<" or start[:2] == b"1." else ".csv"
+    return _check_file(data, folder / f"input{suffix}", read_points)
+
+
+def check_import(data: bytes, folder: Path) -> Outcome:
+    """Import a face from any kind of file that is recognised by its content."""
+    return _check_file(data, folder / "input", import_model)
+
+
+def check_any(data: bytes, folder: Path) -> Outcome:
+    """Recognise a file by its content, and read it; of every second one, print its summary."""
+    read: Callable[[Path], object] = fba.probe if crc32(data) & 1 else fba.read
+    return _check_file(data, folder / "input", read)
+
+
+def check_cache(data: bytes, folder: Path) -> Outcome:
+    """Load arrays where the data stand in place of the cache's file: they are those that were made, always."""
+    before = os.environ.get("FBA_CACHE")
+    os.environ["FBA_CACHE"] = str(folder)
+    path = folder / "fba" / "fuzz.fbk"
+    try:
+        load_or_make("fuzz", tuple(one.shape for one in _CACHED), _arrays, np.float32)
+        path.write_bytes(data)
+        loaded = load_or_make("fuzz", tuple(one.shape for one in _CACHED), _arrays, np.float32)
+        written = path.read_bytes()
+    finally:
+        if before is None:
+            del os.environ["FBA_CACHE"]
+        else:
+            os.environ["FBA_CACHE"] = before
+    if not all(np.array_equal(one, other) for one, other in zip(loaded, _CACHED, strict=True)):
+        raise ContractError("a damaged file of the cache was believed")
+    return Outcome(written == data)
+
+
+def _arrays() -> list[np.ndarray]:
+    return [one.copy() for one in _CACHED]
+
+
+def _check_file(data: bytes, path: Path, read: Callable[[Path], object]) -> Outcome:
+    """Read a file with this content. Every warning of others is an error; an FbaError must name the file."""
+    path.write_bytes(data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", FbaWarning)
+        try:
+            read(path)
+        except FbaError as error:
+            if path.name not in str(error):
+                raise ContractError(f"the error names no file: {error}") from error
+            return Outcome(False)
+    return Outcome(True)

@@ -1,0 +1,170 @@
+"""What the decoder promises for any bytes at all: the contract that fuzzing checks.
+
+- It raises an `FbaError` or returns an animation that is valid; it never raises another exception.
+- Frames and errors do not depend on the chunks in which the stream comes.
+- In salvage mode it returns all frames before the damage, and lists damage in order, within the stream.
+- Sometimes: its values are those of the independent reader (`fba_conformance.trace`).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from random import Random
+from typing import NamedTuple
+from zlib import crc32
+
+from fba.animation import Animation, FaceTrack
+from fba.codec import Block, Decoder, probe_stream
+from fba.errors import FbaError, FbaWarning
+from fba_conformance.fuzz._outcome import ContractError, Outcome
+from fba_conformance.runner import plane_records
+from fba_conformance.trace import planes as independent_planes
+
+COMPARED_BYTES = 600
+"""Largest stream that is compared: the independent reader takes a second for a few kilobytes."""
+COMPARED_SHARE = 0.01
+
+
+def check_stream(data: bytes, _folder: Path | None = None) -> Outcome:
+    """Check the decoder's contract on one stream; raise ContractError.
+
+    Where the stream is divided into chunks depends on its content.
+    """
+    random = Random(crc32(data))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        blocks, error, _ = _decode(data, [len(data)], "raise")
+        ours = _frames(blocks)
+        cuts = sorted(random.randrange(len(data) + 1) for _ in range(random.choice((1, 2, 8))))
+        if random.random() < 0.5:  # the salvaging decoder always gets chunks
+            chunked, chunked_error, _ = _decode(data, [*cuts, len(data)], "raise")
+            if _error_position(error) != _error_position(chunked_error):
+                raise ContractError(f"in chunks {cuts}: {chunked_error}; at once: {error}")
+            if ours != _frames(chunked):
+                raise ContractError(f"other frames in chunks {cuts} than at once")
+        salvaged, fatal, decoder = _decode(data, [*cuts, len(data)], "salvage")
+        if fatal is not None and (salvaged or not decoder.damage):
+            raise ContractError(f"a salvaging decoder raised {fatal!r}")
+        rest = _frames(salvaged)
+        earlier = rest and ours and rest[0].bit < ours[0].bit  # began without an object start code
+        if rest[: len(ours)] != ours and not earlier:
+            raise ContractError(
+                f"{len(rest)} frames salvaged that do not begin with the {len(ours)} good ones"
+            )
+        lost_to = 0
+        for damage in decoder.damage:
+            if not lost_to <= damage.start <= damage.stop <= len(data):
+                raise ContractError(f"damage {damage} out of order or out of the stream ({len(data)} bytes)")
+            lost_to = damage.stop
+        if error is not None and not decoder.damage:
+            raise ContractError(f"{error} went unmentioned by the salvaging decoder")
+        if salvaged:
+            _check_tracks(salvaged)
+        if random.random() < 0.2:
+            _check_probe(data, len(rest))
+        if random.random() < COMPARED_SHARE and len(data) <= COMPARED_BYTES:
+            compare(data)
+        borders = tuple(int(border) for block in salvaged for border in block.borders[1:])
+        stops = tuple(8 * damage.stop for damage in decoder.damage)
+        return Outcome(error is None, bool(rest) and error is not None, borders + stops)
+
+
+def _check_probe(data: bytes, expected: int) -> None:
+    """Raise ContractError if `probe_stream` counts another number of frames."""
+    try:
+        frames = probe_stream(data).frames
+    except FbaError:
+        frames = 0
+    if frames != expected:
+        raise ContractError(f"probe counts {frames} frames, the decoder {expected}")
+
+
+def compare(data: bytes) -> None:
+    """Compare the decoder's planes with those of the independent reader, as far as both read.
+
+    Raises ContractError.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        blocks, _, _ = _decode(data, [len(data)], "raise")
+        ours = plane_records([frame for block in blocks for frame in block.frames()])
+        reader = independent_planes(data)
+        for number, record in enumerate(ours):
+            try:
+                other = next(reader, None)
+            except FbaError as error:
+                if "object_mask" in str(error) and number:  # a second object, which it does not read
+                    return
+                raise ContractError(f"the independent reader stops at plane {number}: {error}") from error
+            if other is None:
+                return  # it reads only one object, and checks alignment more strictly
+            expected = {
+                "intra": other["intra"],
+                "skip": other["skip"],
+                "bits": other["bits"],
+                "fap": {str(number): value for number, value in other["fap"].items()},
+                "viseme": other["viseme"],
+                "expression": other["expression"],
+                "bap": {str(number): value for number, value in other["bap"].items()},
+            }
+            mine = {name: record[name] for name in expected}
+            if mine != expected:
+                wrong = [name for name in expected if mine[name] != expected[name]]
+                raise ContractError(f"plane {number}: {wrong} differ from the independent reader's")
+
+
+def _error_position(error: FbaError | None) -> tuple[object, ...]:
+    """Return type, plane and bit of an error."""
+    return type(error), getattr(error, "plane", None), getattr(error, "bit", None)
+
+
+def _decode(data: bytes, stops: Sequence[int], mode: str) -> tuple[list[Block], FbaError | None, Decoder]:
+    """Decode data in chunks that end at `stops`; return blocks, error and decoder."""
+    decoder = Decoder(on_error=mode)  # type: ignore[arg-type]
+    blocks: list[Block] = []
+    start = 0
+    try:
+        for stop in stops:
+            blocks += decoder.push_blocks(data[start:stop])
+            start = stop
+        blocks += decoder.finish_blocks()
+    except FbaError as error:
+        blocks += getattr(error, "blocks", None) or []
+        return blocks, error, decoder
+    return blocks, None, decoder
+
+
+class _DecodedFrame(NamedTuple):
+    """A decoded frame: its first bit in the stream, and everything else about it."""
+
+    bit: int
+    content: tuple[object, ...]
+
+
+def _frames(blocks: list[Block]) -> list[_DecodedFrame]:
+    """Return the frames, independent of their division into blocks."""
+    frames: list[_DecodedFrame] = []
+    for block in blocks:
+        tracks = []
+        if block.face is not None:
+            tracks += [block.face.values, block.face.mask, block.face.viseme, block.face.expression]
+        if block.body is not None:
+            tracks += [block.body.values, block.body.mask]
+        for position, index in enumerate(block.index.tolist()):
+            after = int(block.borders[position + 1])
+            values = tuple(track[position].tobytes() for track in tracks)
+            frames.append(_DecodedFrame(int(block.borders[position]), (index, block.rate, after, *values)))
+    return frames
+
+
+def _check_tracks(blocks: list[Block]) -> None:
+    """Construct the data model from copies of the blocks' frames, which checks them."""
+    for block in blocks:
+        face, body = block.face, block.body
+        if face is not None:
+            FaceTrack(face.values.copy(), face.mask.copy(), face.viseme.copy(), face.expression.copy())
+        if body is not None:
+            type(body)(body.values.copy(), body.mask.copy())
+        Animation(block.rate, block.index, face, body)

@@ -1,0 +1,76 @@
+"""A process that checks inputs of one target: `fba_conformance.fuzz` starts and watches it.
+
+It writes the number of the input that it is at into a small file, so that the watcher knows which one made it
+crash or hang, and prints its report as a line of JSON.
+"""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import json
+import mmap
+import struct
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from fba_conformance.fuzz._engine import Report, run, run_files
+from fba_conformance.fuzz.corpus import read_corpus
+from fba_conformance.fuzz.targets import find_target
+
+NUMBER = struct.Struct("<q")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return 1 if there were findings."""
+    parser = argparse.ArgumentParser(prog="python -m fba_conformance.fuzz.worker")
+    parser.add_argument("target")
+    parser.add_argument("--corpus", type=Path)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--progress", type=Path, help="file for the number of the input")
+    parser.add_argument("--findings", type=Path, help="folder for inputs that fail")
+    parser.add_argument("files", nargs="*", type=Path)
+    options = parser.parse_args(arguments)
+    faulthandler.enable()
+    target = find_target(options.target)
+    if options.files:
+        report = run_files(target, [path.read_bytes() for path in options.files])
+    else:
+        report = run(
+            target,
+            read_corpus(target, options.corpus),
+            count=options.count,
+            seconds=options.seconds,
+            seed=options.seed,
+            first=options.first,
+            progress=_progress(options.progress),
+        )
+    if options.findings:
+        _save(report, options.findings)
+    sys.stdout.write(json.dumps(report.to_dict()) + "\n")
+    return 1 if report.findings else 0
+
+
+def _progress(path: Path | None) -> Callable[[int], None]:
+    """Return the function that writes a number into the file, which must be there."""
+    if path is None:
+        return lambda number: None
+    with path.open("r+b") as file:
+        shared = mmap.mmap(file.fileno(), NUMBER.size)
+    return lambda number: NUMBER.pack_into(shared, 0, number)
+
+
+def _save(report: Report, folder: Path) -> None:
+    """Write the inputs of all findings."""
+    for finding in report.findings:
+        name = f"{finding.target}-seed{finding.seed}-{finding.number}"
+        (folder / f"{name}.whole").write_bytes(finding.data)
+        (folder / name).write_bytes(finding.minimised)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

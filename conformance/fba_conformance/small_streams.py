@@ -1,0 +1,64 @@
+"""Small streams, tens to hundreds of bytes, that together have every element of the syntax: seeds for fuzzing."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from fba.animation import Animation, FaceTrack
+from fba.codec import EncoderOptions, encode
+from fba_conformance import _motion as motion
+
+_END_CODE = b"\0\0\1\xb1"
+
+
+def small_streams() -> dict[str, bytes]:
+    """Return streams by a name that says what is special about them."""
+    few_faps = (3, 5, 19, 20, 48)
+    face = motion.face(5, faps_sent=few_faps)
+    talking = motion.face(4, faps_sent=(3, 4), high_level=True)
+    body = motion.body(5, baps_sent=(1, 19, 124, 181, 186))
+    mask = face.mask.copy()
+    mask[2:4] = False
+    gaps = FaceTrack(face.values, mask)
+    make = motion.animation
+    both = motion.face(5, faps_sent=few_faps, high_level=True)
+    every_other: dict[str, object] = {"intra_period": Fraction(2, 25), "start_codes": True}
+    made: dict[str, tuple[Animation, dict[str, object]]] = {
+        "face": (make(face), {}),
+        "talking": (make(talking), {"fap_quant": 9}),
+        "body": (make(None, body), {"bap_quant": 3}),
+        "both": (make(both, body), every_other),
+        "gaps_start_codes": (make(gaps, body), every_other),
+        "gaps": (make(gaps, body), {}),
+        "one_fap": (make(motion.face(6, faps_sent=(3,))), every_other),
+        "nothing_sent": (make(motion.face(4, faps_sent=())), {"intra_period": Fraction(1, 25)}),
+        "interpolated_ntsc": (
+            make(face, rate=Fraction(30000, 1001), index=[0, 1, 16, 17, 300]),
+            {"unsent": "interpolate"},
+        ),
+        "time_code": (make(face, index=[75, 76, 77, 80, 81]), {"gender": 1, "fap_quant": 31}),
+        "extension_baps": (make(None, motion.body(3, baps_sent=(187, 208, 296))), {"bap_quant": 0}),
+        "zeros": (make(FaceTrack(np.zeros_like(face.values), face.mask)), every_other),
+    }
+    streams = {
+        name: encode(animation, EncoderOptions(**options))  # type: ignore[arg-type]
+        for name, (animation, options) in made.items()
+    }
+    streams["two_objects"] = streams["face"] + streams["body"]
+    streams["no_end_code"] = streams["face"].removesuffix(_END_CODE)
+    streams["old_start_codes"] = b"\0\0\1\x01\0\0\1\x03" + streams["talking"][4:]
+    return streams
+
+
+def long_streams() -> dict[str, bytes]:
+    """Return streams of 400 planes and 1 to 2 kB, with a start code every 2 seconds: many planes at once."""
+    face = motion.face(400, faps_sent=(3, 48))
+    body = motion.body(400, baps_sent=(1, 181))
+    options = EncoderOptions(intra_period=Fraction(2), start_codes=True)
+    return {
+        "long_face": encode(motion.animation(face), options),
+        "long_body": encode(motion.animation(None, body), options),
+        "long_both": encode(motion.animation(face, body), options),
+    }

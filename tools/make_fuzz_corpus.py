@@ -1,0 +1,265 @@
+"""Make the corpus of the fuzzer: small files of every kind that is read, from nothing but what stands here.
+
+python tools/make_fuzz_corpus.py [FOLDER]
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+CORPUS = ROOT / "tests" / "fuzz" / "corpus"
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
+
+from gltf_documents import Sheet  # noqa: E402
+from mesh_files import ply  # noqa: E402
+from small_bodies import rod  # noqa: E402
+from stored_models import face  # noqa: E402
+
+from fba.cache import load_or_make  # noqa: E402
+from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
+
+
+def mask(*numbers: int, width: int = 68) -> str:
+    """Return a mask line with these parameters (from 1) sent."""
+    return " ".join("1" if column + 1 in numbers else "0" for column in range(width))
+
+
+BODY = {
+    "Hips": ("", 0, 97, -5), "Spine": ("Hips", 0, 11, 0), "Spine1": ("Spine", 0, 13, 0),
+    "Neck": ("Spine1", 0, 33, 5), "Head": ("Neck", 0, 11, 2),
+    "LeftArm": ("Spine1", 19, 25, 0), "LeftForeArm": ("LeftArm", 30, 0, 0), "LeftHand": ("LeftForeArm", 27, 0, 0),
+    "RightArm": ("Spine1", -19, 25, 0), "RightForeArm": ("RightArm", -30, 0, 0),
+    "RightHand": ("RightForeArm", -27, 0, 0),
+    "LeftUpLeg": ("Hips", 9, -4, 0), "LeftLeg": ("LeftUpLeg", 0, -43, 0), "LeftFoot": ("LeftLeg", 0, -43, -2),
+    "LeftToeBase": ("LeftFoot", 0, -7, 13),
+    "RightUpLeg": ("Hips", -9, -4, 0), "RightLeg": ("RightUpLeg", 0, -43, 0), "RightFoot": ("RightLeg", 0, -43, -2),
+    "RightToeBase": ("RightFoot", 0, -7, 13),
+}  # fmt: skip
+"""Joints of a plain body: the joint above, and the way from it in centimetres."""
+
+
+def bvh(names: dict[str, tuple[str, float, float, float]], frames: int, rotation: str = "Zrotation Xrotation Yrotation") -> bytes:
+    """Return a BVH file of these joints."""
+    lines = ["HIERARCHY"]
+    channels = 0
+
+    def add(name: str) -> None:
+        nonlocal channels
+        parent, *offset = names[name]
+        moved = "" if parent else "Xposition Yposition Zposition "
+        count = len((moved + rotation).split())
+        channels += count
+        lines.append(f"{'JOINT' if parent else 'ROOT'} {name}\n{{\nOFFSET {' '.join(map(str, offset))}")
+        lines.append(f"CHANNELS {count} {moved}{rotation}")
+        below = [one for one, (above, *_) in names.items() if above == name]
+        for one in below:
+            add(one)
+        if not below:
+            lines.append("End Site\n{\nOFFSET 0 5 0\n}")
+        lines.append("}")
+
+    add(next(iter(names)))
+    lines.append(f"MOTION\nFrames: {frames}\nFrame Time: 0.0333333")
+    for frame in range(frames):
+        lines.append(" ".join(str((7 * frame + 3 * channel) % 40 - 20) for channel in range(channels)))
+    return "\n".join([*lines, ""]).encode()
+
+
+def skeleton(**changes: object) -> Sheet:
+    """Return a glTF document with the body's joints, a skin and an animation of three joints."""
+    sheet = Sheet()
+    names = list(BODY)
+    nodes: list[dict[str, object]] = [
+        {"name": name, "translation": [value / 100 for value in BODY[name][1:]]} for name in names
+    ]
+    for name in names:
+        below = [names.index(one) for one in names if BODY[one][0] == name]
+        if below:
+            nodes[names.index(name)]["children"] = below
+    times = sheet.array([0.0, 0.04, 0.08])
+    turned = [(0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.6, 0.8), (0.0, 0.0, 1.0, 0.0)]
+    rotations = sheet.array(turned)
+    moves = sheet.array([(0.0, 1.0, 0.0), (0.1, 1.0, 0.0), (0.2, 1.0, 0.1)])
+    spline = sheet.array([row for one in turned for row in ((0.0,) * 4, one, (0.0,) * 4)])
+    samplers = [
+        {"input": times, "output": rotations, "interpolation": "LINEAR"},
+        {"input": times, "output": moves, "interpolation": "STEP"},
+        {"input": times, "output": spline, "interpolation": "CUBICSPLINE"},
+    ]
+    channels = [
+        {"sampler": 0, "target": {"node": names.index("LeftArm"), "path": "rotation"}},
+        {"sampler": 1, "target": {"node": 0, "path": "translation"}},
+        {"sampler": 2, "target": {"node": names.index("RightLeg"), "path": "rotation"}},
+    ]
+    sheet.json |= {
+        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes, "skins": [{"joints": list(range(len(names)))}],
+        "animations": [{"name": "wave", "samplers": samplers, "channels": channels}],
+    }  # fmt: skip
+    sheet.json |= changes
+    return sheet
+
+
+def as_text(sheet: Sheet) -> bytes:
+    """Return a document as .gltf, its bytes in it as base64."""
+    uri = "data:application/octet-stream;base64," + base64.b64encode(sheet.data).decode()
+    buffers = [{"byteLength": len(sheet.data), "uri": uri}]
+    return json.dumps(sheet.json | {"buffers": buffers}, indent=0).encode()
+
+
+def textured() -> Sheet:
+    """Return a document with a mesh, a sparse accessor, a material and a morph target."""
+    sheet = Sheet()
+    primitive = sheet.triangle(material=0)
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": sheet.bytes(b"\1\0"), "componentType": 5123},
+        "values": {"bufferView": sheet.bytes(np.array([0, 0, 1], "<f4").tobytes())},
+    }
+    sheet.json["accessors"].append({"componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse})
+    primitive["targets"] = [{"POSITION": len(sheet.json["accessors"]) - 1}]
+    primitive["attributes"]["TEXCOORD_0"] = sheet.array([(0, 0), (255, 0), (0, 255)], "u1", normalized=True)
+    sheet.json["materials"] = [{"name": "red", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}]
+    return sheet.show(primitive, matrix=[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 1])
+
+
+FAPS = {
+    "numbers": ["# c", "2.1 a b 25 3", mask(1, 2, 3, 50), "0 1 2 3 1 1 2 3 4 1 0 77 -5", mask(3), "1 5.5", mask(3, 68), "3 5 6", ""],
+    "short": ["2.2 a 29.97 1", mask(48), "0 -1024", ""],
+}  # fmt: skip
+BAPS = {
+    "bits186": ["3.1 a 25 2", mask(1, 186, width=186), "0 1 -2", mask(7, width=296), "4 5", ""],
+    "bits296": ["3.2 a 30000/1001 1", mask(181, 200, width=296), "0 100000 7", ""],
+}
+EPFS = {
+    "all_tags": [
+        "FBM 3", "FFR 0", "BFR 0", "ISI 1", "FRR 25 0 0", "TC 0 0 1 0", "SKN 3", "FMT 0 3 0 0 1 1 0 0 0 0 0 0 2 1 0 0 0 0",
+        "FQU 1", "FIX " + "60 " * 66, "BMT 0 0 0 0 0 1 1 1 0 0 1" + " 0" * 18, "BQU 2", "BIN " + "-61 " * 296, "GDR 1",
+        "FBM 1", "FFR 1", "ISI 0", "",
+    ],
+    "one_plane": ["FBM 1", "FFR 0", "ISI 1", "FMT 3 0" + " 0" * 16, "FQU 3", ""],
+}  # fmt: skip
+OBJ = """# c
+mtllib a.mtl
+o one
+g skin
+usemtl flesh
+v 0 0 0 1 0 0
+v 1 0 0 0 1 0
+v 0 1 0 0 0 1
+v 1 1 0.5
+vt 0 0
+vt 1 0
+vt 0 1
+vn 0 0 1
+f 1/1/1 2/2/1 3/3/1
+f -1//1 -2//1 \\
+  -3//1
+f 1 2 4 3
+"""
+MTL = "newmtl flesh\nKd 0.7 0.4 0.3\nNs 20\nd 0.9\nmap_Kd -s 1 1 1 skin.png\nnewmtl eye\nKd 1 1 1\nTr 0.5\n"
+VRML = """#VRML V2.0 utf8
+DEF one Shape { geometry IndexedFaceSet {
+  coord Coordinate { point [ 0 0 0, 10 0 0, # a comment
+    0 10 5 ] } coordIndex [ 0, 1, 2, -1 ]
+  texCoord TextureCoordinate { point [ 0 0, 1 1 ] } } }
+Transform { translation 1 2 3 children [ USE one Shape { appearance Appearance { material Material { diffuseColor 1 0 0 }
+  texture ImageTexture { url "a#b\\".png" } }
+  geometry IndexedFaceSet { coord Coordinate { point [ 3 1 2, 4 1 2, 3 2 2, 4 2 2 ] }
+  coordIndex [ 0 1 3 2 ] } } ] }
+"""
+WFM = "# VERTEX LIST:\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n# FACE LIST:\n2\n0 1 2\n1 2 3\n# ANIMATION UNITS LIST:\n0\n# END OF FILE\n"
+XFACE = """<?xml version="1.0"?><xfdp><head><file version="0.2"/>
+<fapu ENS0="51" ES0="69" IRISD0="16" MNS0="30" MW0="50"/></head>
+<source><entity alias="Rest" category="Expression"><mesh file="head.wrl" format="wrl"/>
+<bind item="LeftEye" submesh="head.wrl_1"/></entity></source>
+<fdp affects="head.wrl_0" index="2" name="9.3"><indices>0 1 2</indices>
+<influence fap="62" type="RaisedCosInfluenceSph" weight="0.3"/></fdp>
+<fdp affects="head.wrl_1" index="0" name="3.5"><indices/></fdp></xfdp>
+"""
+FDP = "1.0 a\n2.1 0 -0.08 0.03 0.5\n3.5 0.03 0.03 0.02 1.2\n3.6 -0.03 0.03 0.02 2.2\nNUL 3\n9.3 0 0 0.1\n"
+CSV = 'point,x,y,z\n# c\n"9.3",0,-0.5,1e1\n\n2.1,17\n'
+JSON = '{"points": {"9.3": [0, -0.5, 10.0], "2.1": 17, "3.5": [1, 2, 3]}}\n'
+
+
+def lines(files: dict[str, list[str]]) -> dict[str, bytes]:
+    """Return files of these lines."""
+    return {name: "\n".join(content).encode() for name, content in files.items()}
+
+
+def meshes() -> dict[str, bytes]:
+    """Return one PLY file of each form."""
+    places, faces = np.eye(4, 3), [(0, 1, 2), (0, 1, 2, 3)]
+    return {
+        "ascii": ply(places, faces, "ascii", extra=True),
+        "little": ply(places, faces, "<"),
+        "big": ply(places, faces, ">", extra=True),
+    }
+
+
+def saved(folder: Path) -> dict[str, dict[str, bytes]]:
+    """Return models and cached arrays as the program saves them."""
+    face().save(folder / "face.glb")
+    rod().save(folder / "body.glb")
+    import os
+
+    os.environ["FBA_CACHE"] = str(folder)
+    arrays = [np.arange(24, dtype=np.float32).reshape(4, 6), np.arange(5, dtype=np.float32)]
+    load_or_make("fuzz", ((4, 6), (5,)), lambda: arrays, np.float32)
+    return {
+        "face": {"face": (folder / "face.glb").read_bytes()},
+        "body": {"body": (folder / "body.glb").read_bytes()},
+        "cache": {"arrays": (folder / "fba" / "fuzz.fbk").read_bytes()},
+    }
+
+
+def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
+    """Return all files: content by name, by target. folder: for files that are read again at once."""
+    limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
+    files: dict[str, dict[str, bytes]] = {
+        "stream": {**small_streams(), **long_streams()},
+        "fap": lines(FAPS),
+        "bap": lines(BAPS),
+        "epf": lines(EPFS),
+        "bvh": {"body": bvh(BODY, 3), "limb": bvh(limb, 2), "turned": bvh(limb, 1, "Yrotation")},
+        "gltf": {
+            "skeleton_text": as_text(skeleton()), "skeleton_binary": skeleton().glb(), "mesh_text": as_text(textured()),
+            "mesh_binary": textured().glb(),
+        },
+        "obj": {"triangles": OBJ.encode()},
+        "mtl": {"two": MTL.encode()},
+        "ply": meshes(),
+        "vrml": {"two": VRML.encode()},
+        "wfm": {"four": WFM.encode()},
+        "points": {"csv": CSV.encode(), "json": JSON.encode(), "fdp": FDP.encode(), "xface": XFACE.encode()},
+    }  # fmt: skip
+    files |= saved(folder)
+    files["import"] = {"obj": OBJ.encode(), **{f"ply_{name}": data for name, data in meshes().items()}}
+    files["import"] |= {"head": files["face"]["face"], "gltf": textured().glb(), "xface": XFACE.encode(), "fdp": FDP.encode()}
+    return files
+
+
+def main() -> None:
+    """Write the files, instead of those that are there."""
+    import shutil
+    import tempfile
+
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else CORPUS
+    with tempfile.TemporaryDirectory() as folder:
+        files = corpus(Path(folder))
+    for name, contents in files.items():
+        shutil.rmtree(target / name, ignore_errors=True)
+        (target / name).mkdir(parents=True)
+        for file, data in contents.items():
+            (target / name / file).write_bytes(data)
+    total = sum(len(data) for contents in files.values() for data in contents.values())
+    print(f"{target}: {sum(map(len, files.values()))} files, {total / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()
