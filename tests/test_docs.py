@@ -55,6 +55,11 @@ ILLUSTRATIONS = {
     ("README.md", "pip install ."): "makes an environment; .ci/run installs the wheel and runs the demo",
     ("CONTRIBUTING.md", "./dev setup"): CHECKOUT,
     ("docs/develop.md", "./dev test"): CHECKOUT,
+    ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",
+    (
+        "docs/develop.md",
+        "./dev fuzz --target bvh fuzz-findings/bvh-seed7-1234",
+    ): "a file that was found there",
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",
     ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",

@@ -16,13 +16,12 @@ ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
+from fba.cache import load_or_make  # noqa: E402
+from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from mesh_files import ply  # noqa: E402
 from small_bodies import rod  # noqa: E402
 from stored_models import face  # noqa: E402
-
-from fba.cache import load_or_make  # noqa: E402
-from fba_conformance.small_streams import long_streams, small_streams  # noqa: E402
 
 
 def mask(*numbers: int, width: int = 68) -> str:
@@ -33,18 +32,24 @@ def mask(*numbers: int, width: int = 68) -> str:
 BODY = {
     "Hips": ("", 0, 97, -5), "Spine": ("Hips", 0, 11, 0), "Spine1": ("Spine", 0, 13, 0),
     "Neck": ("Spine1", 0, 33, 5), "Head": ("Neck", 0, 11, 2),
-    "LeftArm": ("Spine1", 19, 25, 0), "LeftForeArm": ("LeftArm", 30, 0, 0), "LeftHand": ("LeftForeArm", 27, 0, 0),
+    "LeftArm": ("Spine1", 19, 25, 0), "LeftForeArm": ("LeftArm", 30, 0, 0), "LeftHand": ("LeftForeArm", 27,
+    0, 0),
     "RightArm": ("Spine1", -19, 25, 0), "RightForeArm": ("RightArm", -30, 0, 0),
     "RightHand": ("RightForeArm", -27, 0, 0),
     "LeftUpLeg": ("Hips", 9, -4, 0), "LeftLeg": ("LeftUpLeg", 0, -43, 0), "LeftFoot": ("LeftLeg", 0, -43, -2),
     "LeftToeBase": ("LeftFoot", 0, -7, 13),
-    "RightUpLeg": ("Hips", -9, -4, 0), "RightLeg": ("RightUpLeg", 0, -43, 0), "RightFoot": ("RightLeg", 0, -43, -2),
+    "RightUpLeg": ("Hips", -9, -4, 0), "RightLeg": ("RightUpLeg", 0, -43, 0), "RightFoot": ("RightLeg", 0,
+    -43, -2),
     "RightToeBase": ("RightFoot", 0, -7, 13),
 }  # fmt: skip
 """Joints of a plain body: the joint above, and the way from it in centimetres."""
 
 
-def bvh(names: dict[str, tuple[str, float, float, float]], frames: int, rotation: str = "Zrotation Xrotation Yrotation") -> bytes:
+def bvh(
+    names: dict[str, tuple[str, float, float, float]],
+    frames: int,
+    rotation: str = "Zrotation Xrotation Yrotation",
+) -> bytes:
     """Return a BVH file of these joints."""
     lines = ["HIERARCHY"]
     channels = 0
@@ -66,8 +71,10 @@ def bvh(names: dict[str, tuple[str, float, float, float]], frames: int, rotation
 
     add(next(iter(names)))
     lines.append(f"MOTION\nFrames: {frames}\nFrame Time: 0.0333333")
-    for frame in range(frames):
-        lines.append(" ".join(str((7 * frame + 3 * channel) % 40 - 20) for channel in range(channels)))
+    lines += [
+        " ".join(str((7 * frame + 3 * channel) % 40 - 20) for channel in range(channels))
+        for frame in range(frames)
+    ]
     return "\n".join([*lines, ""]).encode()
 
 
@@ -98,7 +105,8 @@ def skeleton(**changes: object) -> Sheet:
         {"sampler": 2, "target": {"node": names.index("RightLeg"), "path": "rotation"}},
     ]
     sheet.json |= {
-        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes, "skins": [{"joints": list(range(len(names)))}],
+        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes,
+        "skins": [{"joints": list(range(len(names)))}],
         "animations": [{"name": "wave", "samplers": samplers, "channels": channels}],
     }  # fmt: skip
     sheet.json |= changes
@@ -129,7 +137,8 @@ def textured() -> Sheet:
 
 
 FAPS = {
-    "numbers": ["# c", "2.1 a b 25 3", mask(1, 2, 3, 50), "0 1 2 3 1 1 2 3 4 1 0 77 -5", mask(3), "1 5.5", mask(3, 68), "3 5 6", ""],
+    "numbers": ["# c", "2.1 a b 25 3", mask(1, 2, 3, 50), "0 1 2 3 1 1 2 3 4 1 0 77 -5", mask(3), "1 5.5",
+    mask(3, 68), "3 5 6", ""],
     "short": ["2.2 a 29.97 1", mask(48), "0 -1024", ""],
 }  # fmt: skip
 BAPS = {
@@ -138,8 +147,10 @@ BAPS = {
 }
 EPFS = {
     "all_tags": [
-        "FBM 3", "FFR 0", "BFR 0", "ISI 1", "FRR 25 0 0", "TC 0 0 1 0", "SKN 3", "FMT 0 3 0 0 1 1 0 0 0 0 0 0 2 1 0 0 0 0",
-        "FQU 1", "FIX " + "60 " * 66, "BMT 0 0 0 0 0 1 1 1 0 0 1" + " 0" * 18, "BQU 2", "BIN " + "-61 " * 296, "GDR 1",
+        "FBM 3", "FFR 0", "BFR 0", "ISI 1", "FRR 25 0 0", "TC 0 0 1 0", "SKN 3",
+        "FMT 0 3 0 0 1 1 0 0 0 0 0 0 2 1 0 0 0 0",
+        "FQU 1", "FIX " + "60 " * 66, "BMT 0 0 0 0 0 1 1 1 0 0 1" + " 0" * 18, "BQU 2",
+        "BIN " + "-61 " * 296, "GDR 1",
         "FBM 1", "FFR 1", "ISI 0", "",
     ],
     "one_plane": ["FBM 1", "FFR 0", "ISI 1", "FMT 3 0" + " 0" * 16, "FQU 3", ""],
@@ -168,12 +179,26 @@ DEF one Shape { geometry IndexedFaceSet {
   coord Coordinate { point [ 0 0 0, 10 0 0, # a comment
     0 10 5 ] } coordIndex [ 0, 1, 2, -1 ]
   texCoord TextureCoordinate { point [ 0 0, 1 1 ] } } }
-Transform { translation 1 2 3 children [ USE one Shape { appearance Appearance { material Material { diffuseColor 1 0 0 }
+Transform { translation 1 2 3 children [ USE one
+  Shape { appearance Appearance { material Material { diffuseColor 1 0 0 }
   texture ImageTexture { url "a#b\\".png" } }
   geometry IndexedFaceSet { coord Coordinate { point [ 3 1 2, 4 1 2, 3 2 2, 4 2 2 ] }
   coordIndex [ 0 1 3 2 ] } } ] }
 """
-WFM = "# VERTEX LIST:\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n# FACE LIST:\n2\n0 1 2\n1 2 3\n# ANIMATION UNITS LIST:\n0\n# END OF FILE\n"
+WFM = """# VERTEX LIST:
+4
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+# FACE LIST:
+2
+0 1 2
+1 2 3
+# ANIMATION UNITS LIST:
+0
+# END OF FILE
+"""
 XFACE = """<?xml version="1.0"?><xfdp><head><file version="0.2"/>
 <fapu ENS0="51" ES0="69" IRISD0="16" MNS0="30" MW0="50"/></head>
 <source><entity alias="Rest" category="Expression"><mesh file="head.wrl" format="wrl"/>
@@ -228,7 +253,8 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         "epf": lines(EPFS),
         "bvh": {"body": bvh(BODY, 3), "limb": bvh(limb, 2), "turned": bvh(limb, 1, "Yrotation")},
         "gltf": {
-            "skeleton_text": as_text(skeleton()), "skeleton_binary": skeleton().glb(), "mesh_text": as_text(textured()),
+            "skeleton_text": as_text(skeleton()), "skeleton_binary": skeleton().glb(),
+            "mesh_text": as_text(textured()),
             "mesh_binary": textured().glb(),
         },
         "obj": {"triangles": OBJ.encode()},
@@ -240,7 +266,12 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     }  # fmt: skip
     files |= saved(folder)
     files["import"] = {"obj": OBJ.encode(), **{f"ply_{name}": data for name, data in meshes().items()}}
-    files["import"] |= {"head": files["face"]["face"], "gltf": textured().glb(), "xface": XFACE.encode(), "fdp": FDP.encode()}
+    files["import"] |= {
+        "head": files["face"]["face"],
+        "gltf": textured().glb(),
+        "xface": XFACE.encode(),
+        "fdp": FDP.encode(),
+    }
     return files
 
 

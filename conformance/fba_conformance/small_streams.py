@@ -1,4 +1,4 @@
-"""Small streams, tens to hundreds of bytes, that together have every element of the syntax: seeds for fuzzing."""
+"""Small streams that together have every element of the syntax: fuzzing begins with them."""
 
 from __future__ import annotations
 

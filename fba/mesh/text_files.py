@@ -113,4 +113,7 @@ def find_beside(path: str | os.PathLike[str], name: str) -> Path | None:
     if not plain or plain in (".", "..") or "\0" in plain:
         return None
     candidate = Path(path).parent / plain
-    return candidate if candidate.is_file() else None
+    try:
+        return candidate if candidate.is_file() else None
+    except (OSError, ValueError):  # too long a name, or half of a character
+        return None

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fba import compiled
-from fba_conformance import fuzz
+from fba_conformance.small_streams import small_streams
 
 SCRIPT = """
 import sys
@@ -21,11 +21,14 @@ if "no-numba" in sys.argv:
 import hashlib, json
 import fba
 from fba import compiled
-from fba_conformance import _motion as motion, fuzz
+from fba_conformance import _motion as motion
+from fba_conformance.fuzz import _engine as fuzz
+from fba_conformance.fuzz.targets import find_target
+from fba_conformance.small_streams import small_streams
 from fractions import Fraction
 
 result = {"compiled": compiled.is_compiled(), "numba": sys.modules.get("numba") is not None}
-streams = fuzz.base_streams()
+streams = list(small_streams().values())
 result["bytes"] = hashlib.sha256(b"|".join(streams)).hexdigest()
 long = fba.encode(motion.animation(motion.face(30, high_level=True), motion.body(30)))
 result["long"] = hashlib.sha256(long).hexdigest()
@@ -39,8 +42,8 @@ for stream in [*streams, long]:
         if frame.face is not None:
             values.update(frame.face.viseme.tobytes() + frame.face.expression.tobytes())
 result["values"] = values.hexdigest()
-report = fuzz.fuzz(60, 3, streams=streams[:3], compare_every=0)
-result["fuzz"] = [report.decoded, report.refused, report.salvaged]
+report = fuzz.run(find_target("stream"), streams[:3], count=60, seed=3)
+result["fuzz"] = [report.accepted, report.refused, report.salvaged, report.planes]
 result["findings"] = [finding.reason for finding in report.findings]
 print(json.dumps(result))
 """
@@ -68,7 +71,7 @@ def usual() -> dict[str, object]:
     result = run()
     assert result["compiled"] == compiled.is_compiled()
     assert result["findings"] == []
-    assert result["bytes"] == hashlib.sha256(b"|".join(fuzz.base_streams())).hexdigest()
+    assert result["bytes"] == hashlib.sha256(b"|".join(small_streams().values())).hexdigest()
     return result
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fba.errors import ModelError
+from fba.errors import FbaWarning, ModelError
 from fba.face.importers.assembly.polygon_parts import make_piece
 from fba.mesh import obj, text_files
+from fba.mesh.mtl import read_mtl
 from fba.mesh.obj import read_obj
 from fba.mesh.polygons import triangulate
 
@@ -100,6 +101,15 @@ def test_damage_is_named(tmp_path: Path, text: str | bytes, place: str, words: s
         read_obj(file)
     assert f"mesh.obj{place}" in str(caught.value)
     assert words in str(caught.value)
+
+
+def test_names_of_files_that_no_system_takes(tmp_path: Path) -> None:
+    long = "m" * 5000
+    with pytest.warns(FbaWarning, match="do not lie beside it"):
+        assert read_mtl(tmp_path / "mesh.obj", long) == {}
+    (tmp_path / "a.mtl").write_text(f"newmtl a\nmap_Kd {long}.png\n")
+    with pytest.warns(FbaWarning, match="does not lie beside it"):
+        assert read_mtl(tmp_path / "mesh.obj", "a.mtl")["a"].texture is None
 
 
 def test_folders_and_missing_files(tmp_path: Path) -> None:

@@ -19,23 +19,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return 1 if there were findings, 2 for wrong arguments."""
     parser = argparse.ArgumentParser(
         prog="./dev fuzz",
-        description="Feed mutated streams and files to everything that reads bytes: each must give a result or "
-        "an FbaError, in bounded time and memory.",
+        description="Feed mutated streams and files to everything that reads bytes: each must give a "
+        "result or an FbaError, in bounded time and memory.",
         epilog="Targets: " + "; ".join(f"{one.name}: {one.description}" for one in targets()) + ".",
     )
     parser.add_argument("--minutes", type=float, default=10, help="for all targets together (default 10)")
     parser.add_argument("--count", type=int, help="inputs for each target, instead of --minutes")
-    parser.add_argument("--target", action="append", metavar="NAME", help="one target; may be repeated (default: all)")
+    parser.add_argument(
+        "--target", action="append", metavar="NAME", help="one target; may be repeated (default: all)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="number of the series of mutations (default 0)")
     parser.add_argument("--first", type=int, default=0, metavar="NUMBER", help="number of the first mutation")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side (default: cores)")
-    parser.add_argument("--guided", action="store_true", help="choose inputs by the code that they reach (atheris, Linux)")
-    parser.add_argument("--corpus", type=Path, metavar="FOLDER", help="files to mutate, one folder for each target")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side (default: cores)"
+    )
+    parser.add_argument(
+        "--guided", action="store_true", help="choose inputs by the code that they reach (atheris, Linux)"
+    )
+    parser.add_argument(
+        "--corpus", type=Path, metavar="FOLDER", help="files to mutate, one folder for each target"
+    )
     parser.add_argument(
         "--findings", type=Path, default=Path("fuzz-findings"), metavar="FOLDER",
         help="folder for inputs that fail (default fuzz-findings)",
     )  # fmt: skip
-    parser.add_argument("files", nargs="*", type=Path, help="check these files with the one target, and nothing else")
+    parser.add_argument(
+        "files", nargs="*", type=Path, help="check these files with the one target, and nothing else"
+    )
     options = parser.parse_args(arguments)
     try:
         chosen = [find_target(name) for name in options.target] if options.target else list(targets())
@@ -46,7 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error("files need one --target")
         return _check_files(chosen[0], options.files)
     campaign = Campaign(
-        chosen, options.seed, options.first, options.count, options.minutes, max(1, options.jobs), options.corpus,
+        chosen, options.seed, options.first, options.count, options.minutes, max(1, options.jobs),
+        options.corpus,
         options.findings,
     )  # fmt: skip
     reports = (run_guided if options.guided else run_campaign)(campaign, _say)
@@ -61,7 +72,11 @@ def _check_files(target: Target, files: Sequence[Path]) -> int:
     failed = 0
     for path in files:
         done = subprocess.run(
-            worker_command(target, str(path)), env=environment(target), capture_output=True, text=True, check=False
+            worker_command(target, str(path)),
+            env=environment(target),
+            capture_output=True,
+            text=True,
+            check=False,
         )
         failed += done.returncode != 0
         verdict = "holds" if done.returncode == 0 else "FAILS"

@@ -21,7 +21,7 @@ from fba_conformance.fuzz._engine import Finding, Report, mutated
 from fba_conformance.fuzz._minimise import minimise
 from fba_conformance.fuzz.corpus import read_corpus
 from fba_conformance.fuzz.targets import Target
-from fba_conformance.fuzz.worker import NUMBER
+from fba_conformance.fuzz.worker import NUMBER, file_name
 
 HANGING = 120.0
 """Seconds without progress after which a process hangs: much, as other programs may keep the machine busy."""
@@ -70,7 +70,7 @@ def run_campaign(campaign: Campaign, say: Callable[[str], None]) -> list[Report]
 def save(finding: Finding, folder: Path) -> str:
     """Save the input of a finding, minimised, with its story beside it; return the story."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{finding.target}-seed{finding.seed}-{finding.number}"
+    path = folder / file_name(finding.target, finding.seed, finding.number)
     path.write_bytes(finding.minimised)
     story = (
         f"{finding.reason.rstrip()}\n\n{finding.target}: {finding.kind}; {len(finding.minimised)} bytes, "
@@ -94,7 +94,11 @@ def _run_target(campaign: Campaign, target: Target, seconds: float | None) -> Re
         if report is not None:
             whole.add(report)
             return whole
-        whole.findings.append(_death(campaign, target, number, words))
+        kind = words.splitlines()[-1]
+        if any(kind == finding.kind for finding in whole.findings):
+            whole.repeated += 1
+        else:
+            whole.findings.append(_death(campaign, target, number, kind, words))
         whole.count += number + 1 - first if number >= 0 else 0
         if number < 0:  # a file of the corpus itself
             return whole
@@ -118,7 +122,9 @@ def _run_worker(
         arguments += [] if count is None else ["--count", str(count)]
         arguments += [] if seconds is None else ["--seconds", str(seconds)]
         with (folder / "out").open("wb") as out, (folder / "err").open("wb") as err:
-            process = subprocess.Popen(worker_command(target, *arguments), stdout=out, stderr=err, env=environment(target))
+            process = subprocess.Popen(
+                worker_command(target, *arguments), stdout=out, stderr=err, env=environment(target)
+            )
             try:
                 hung = _watch(process, progress)
             finally:
@@ -132,7 +138,11 @@ def _run_worker(
                 return _report(json.loads(lines[-1]), folder), number, ""
         if number == -(1 << 40):
             raise RuntimeError(f"the worker of {target.name} did not start:\n{words}")
-        how = f"no progress in {HANGING:.0f} s" if hung else f"the process ended with status {process.returncode}"
+        how = (
+            f"no progress in {HANGING:.0f} s"
+            if hung
+            else f"the process ended with status {process.returncode}"
+        )
         return None, number, f"{words}\n{how}"
 
 
@@ -153,7 +163,7 @@ def _watch(process: subprocess.Popen[bytes], progress: Path) -> bool:
             return True
 
 
-def _death(campaign: Campaign, target: Target, number: int, words: str) -> Finding:
+def _death(campaign: Campaign, target: Target, number: int, kind: str, words: str) -> Finding:
     """Return the finding of an input that made the process crash or hang, minimised in new processes."""
     corpus = read_corpus(target, campaign.corpus)
     data, _ = mutated(target, corpus, campaign.seed, number)
@@ -164,15 +174,16 @@ def _death(campaign: Campaign, target: Target, number: int, words: str) -> Findi
             path.write_bytes(smaller)
             try:
                 done = subprocess.run(
-                    worker_command(target, str(path)), env=environment(target), capture_output=True, timeout=20,
+                    worker_command(target, str(path)), env=environment(target), capture_output=True,
+                    timeout=20,
                     check=False,
                 )  # fmt: skip
             except subprocess.TimeoutExpired:
                 return True
             return done.returncode not in (0, 1)
 
-        smaller = minimise(data, fails, MINIMISED_SECONDS) if fails(data) else data
-    return Finding(target.name, campaign.seed, number, words.splitlines()[-1], words, data, smaller)
+        smaller = minimise(data, fails, MINIMISED_SECONDS)
+    return Finding(target.name, campaign.seed, number, kind, words, data, smaller)
 
 
 def worker_command(target: Target, *arguments: str) -> list[str]:
@@ -195,7 +206,7 @@ def _report(content: dict[str, object], folder: Path) -> Report:
     report = Report(**content)  # type: ignore[arg-type]
     assert isinstance(findings, list)
     for one in findings:
-        name = f"{one['target']}-seed{one['seed']}-{one['number']}"
+        name = file_name(one["target"], one["seed"], one["number"])
         whole, smaller = (folder / f"{name}.whole").read_bytes(), (folder / name).read_bytes()
         report.findings.append(Finding(**one, data=whole, minimised=smaller))
     return report

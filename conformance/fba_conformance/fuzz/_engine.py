@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import sys
 import tempfile
 import time
@@ -9,7 +10,6 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
-from os.path import commonprefix
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -22,9 +22,9 @@ from fba_conformance.fuzz.targets import Target
 MOST_SECONDS, MOST_SECONDS_PER_BYTE = 3.0, 0.002
 """Processor time that one input may take, and more for each of its bytes: generous, as machines differ."""
 MOST_MEMORY, MOST_MEMORY_PER_BYTE = 200_000_000, 20
-"""Memory, beyond what the process had before the first input, that one input may take, in bytes."""
+"""Memory that one input may take beyond what the process had before it, in bytes."""
 ADDRESS_SPACE = 6_000_000_000
-"""Bytes of addresses that the process may ask for: what asks for more gets a MemoryError, which is a finding."""
+"""Bytes of addresses that the process may have: asking for more is a MemoryError, which is a finding."""
 MINIMISED_SECONDS = 15.0
 
 
@@ -88,7 +88,8 @@ class Report:
         planes = f" ({self.planes} mutated planes)" if self.planes else ""
         salvaged = f", {self.salvaged} of these salvaged in part" if self.salvaged else ""
         return (
-            f"{self.target}: {self.count} inputs{planes}, {self.accepted} accepted, {self.refused} refused{salvaged}; "
+            f"{self.target}: {self.count} inputs{planes}, {self.accepted} accepted, {self.refused} refused"
+            f"{salvaged}; "
             f"slowest {1000 * self.worst:.0f} ms (number {self.slowest}); {len(self.findings)} findings"
         )
 
@@ -110,7 +111,7 @@ def run(
     """
     report = Report(target.name)
     with tempfile.TemporaryDirectory(prefix="fba-fuzz-") as folder:
-        check = _Check(target, Path(folder))
+        check = Check(target, Path(folder))
         for number, data in enumerate(corpus, -len(corpus)):
             progress(number)
             _record(report, check, data, data, seed, number)
@@ -128,7 +129,7 @@ def run_files(target: Target, files: Iterable[bytes]) -> Report:
     """Check these inputs as they are."""
     report = Report(target.name)
     with tempfile.TemporaryDirectory(prefix="fba-fuzz-") as folder:
-        check = _Check(target, Path(folder))
+        check = Check(target, Path(folder))
         for number, data in enumerate(files):
             _record(report, check, data, b"", 0, number, minimising=False)
     return report
@@ -149,7 +150,13 @@ def _numbers(first: int, count: int | None, end: float | None) -> Iterator[int]:
 
 
 def _record(
-    report: Report, check: _Check, data: bytes, original: bytes, seed: int, number: int, minimising: bool = True
+    report: Report,
+    check: Check,
+    data: bytes,
+    original: bytes,
+    seed: int,
+    number: int,
+    minimising: bool = True,
 ) -> None:
     """Check one input and add what it comes to."""
     report.count += 1
@@ -168,23 +175,29 @@ def _record(
     report.refused += not outcome.accepted
     report.salvaged += outcome.salvaged
     if outcome.planes:
-        same = 8 * len(commonprefix([data, original]))
+        same = 8 * _common(data, original)
         report.planes += sum(end > same for end in outcome.planes)
     if check.seconds > report.worst:
         report.worst, report.slowest = check.seconds, number
 
 
-class _Check:
-    """Checks one input, with the limits of time and, after `limit`, of memory. seconds: that the last took."""
+def _common(one: bytes, other: bytes) -> int:
+    """Return the number of bytes that both begin with."""
+    shorter = min(len(one), len(other))
+    return next((position for position in range(shorter) if one[position] != other[position]), shorter)
+
+
+class Check:
+    """Checks one input within limits of time and, after `limit`, of memory. seconds: that the last took."""
 
     def __init__(self, target: Target, folder: Path) -> None:
         self.seconds = 0.0
         self._check, self._folder = target.load(), folder
-        self._memory_before: int | None = None
+        self._limited = False
 
     def limit(self) -> None:
-        """From now on, limit memory: to so much more than this process has taken up to now."""
-        self._memory_before = _peak_memory()
+        """From now on, limit memory: what was compiled up to now does not count."""
+        self._limited = True
         with suppress(ImportError, ValueError, OSError):  # no such module on Windows; or a lower limit is set
             import resource
 
@@ -193,15 +206,16 @@ class _Check:
 
     def __call__(self, data: bytes) -> Outcome:
         """Check an input; raise for a finding."""
+        most_before, before = _peak_memory(), _memory()
         outcome = self._timed(data)
         if self.seconds > MOST_SECONDS + MOST_SECONDS_PER_BYTE * len(data):
             self._timed(data)  # whatever happens once, as compiling does, is no fault of the input
             if self.seconds > MOST_SECONDS + MOST_SECONDS_PER_BYTE * len(data):
                 raise ContractError(f"{len(data)} bytes took {self.seconds:.1f} s of processor time")
-        if self._memory_before is not None:
-            taken = _peak_memory() - self._memory_before
+        most = _peak_memory()
+        if self._limited and most > most_before:
+            taken = most - before
             if taken > MOST_MEMORY + MOST_MEMORY_PER_BYTE * len(data):
-                self._memory_before += taken  # so that the inputs after it are judged by themselves
                 raise ContractError(f"{len(data)} bytes took {taken / 1e6:.0f} MB of memory")
         return outcome
 
@@ -226,7 +240,7 @@ class _Check:
 
 
 def kind_of(error: BaseException) -> str:
-    """Return the type of an exception and the line of ours that raised it; of a broken contract, its words."""
+    """Return the type of an exception and our line that raised it; of a broken contract, its words."""
     if isinstance(error, ContractError):
         words = "".join("#" if letter.isdigit() else letter for letter in str(error))
         return f"ContractError: {words[:40]}"
@@ -235,6 +249,15 @@ def kind_of(error: BaseException) -> str:
         if "/fba" in frame.filename.replace("\\", "/"):
             place = f"{Path(frame.filename).name}:{frame.lineno}"
     return f"{type(error).__name__} in {place}"
+
+
+def _memory() -> int:
+    """Return the memory in bytes that this process has now; where the system does not say, its peak."""
+    try:
+        with open("/proc/self/statm", "rb") as file:
+            return int(file.read().split()[1]) * mmap.PAGESIZE
+    except OSError:
+        return _peak_memory()
 
 
 def _peak_memory() -> int:

@@ -16,7 +16,7 @@ from re import findall
 
 from fba.errors import OptionError
 from fba_conformance.fuzz._campaign import Campaign, environment, save
-from fba_conformance.fuzz._engine import MOST_SECONDS, Finding, Report, _Check
+from fba_conformance.fuzz._engine import Check, Finding, Report
 from fba_conformance.fuzz.corpus import read_corpus
 from fba_conformance.fuzz.targets import Target, find_target
 
@@ -30,7 +30,9 @@ def run_guided(campaign: Campaign, say: Callable[[str], None]) -> list[Report]:
     total = sum(target.share for target in campaign.targets)
 
     def one(target: Target) -> Report:
-        seconds = 60 * (campaign.minutes or 0) * min(campaign.jobs, len(campaign.targets)) * target.share / total
+        seconds = (
+            60 * (campaign.minutes or 0) * min(campaign.jobs, len(campaign.targets)) * target.share / total
+        )
         report = _run_target(campaign, target, seconds)
         say(report.line())
         for finding in report.findings:
@@ -49,7 +51,11 @@ def _run_target(campaign: Campaign, target: Target, seconds: float) -> Report:
         found.mkdir()
         for number, data in enumerate(read_corpus(target, campaign.corpus)):
             (corpus / str(number)).write_bytes(data)
-        limits = [f"-max_total_time={max(1, round(seconds))}", f"-seed={campaign.seed + 1}", f"-max_len={MOST_BYTES}"]
+        limits = [
+            f"-max_total_time={max(1, round(seconds))}",
+            f"-seed={campaign.seed + 1}",
+            f"-max_len={MOST_BYTES}",
+        ]
         limits += ["-timeout=60", "-rss_limit_mb=4096", f"-artifact_prefix={found}/", "-print_final_stats=1"]
         done = subprocess.run(
             [sys.executable, "-m", __name__, target.name, str(corpus), *limits],
@@ -62,7 +68,9 @@ def _run_target(campaign: Campaign, target: Target, seconds: float) -> Report:
         for number, path in enumerate(sorted(found.iterdir())):
             data = path.read_bytes()
             kind = path.name.partition("-")[0]
-            report.findings.append(Finding(target.name, campaign.seed, number, kind, words[-4000:], data, data))
+            report.findings.append(
+                Finding(target.name, campaign.seed, number, kind, words[-4000:], data, data)
+            )
         if done.returncode and not report.findings:
             raise RuntimeError(f"atheris ended with status {done.returncode}:\n{words[-4000:]}")
         return report
@@ -74,8 +82,12 @@ def main(arguments: Sequence[str]) -> None:
 
     with atheris.instrument_imports(include=["fba"]):
         target = find_target(arguments[0])
-        check = _Check(target, Path(tempfile.mkdtemp(prefix="fba-fuzz-")))
-    atheris.Setup(["fuzz", *arguments[1:]], lambda data: None if check(data) else None)
+        check = Check(target, Path(tempfile.mkdtemp(prefix="fba-fuzz-")))
+
+    def feed(data: bytes) -> None:
+        check(data)
+
+    atheris.Setup(["fuzz", *arguments[1:]], feed)
     atheris.Fuzz()
 
 

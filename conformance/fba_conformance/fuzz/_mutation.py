@@ -12,10 +12,28 @@ MOST_BYTES = 60_000
 _NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 _NUMBERS = (
     b"0", b"1", b"-1", b"2", b"255", b"65536", b"2147483647", b"-2147483648", b"4294967295",
-    b"99999999999999999999", b"0.1", b"-0.0", b"1e-320", b"1e30", b"-1e308", b"1e308", b"1e400", b"nan", b"inf",
+    b"99999999999999999999", b"0.1", b"-0.0", b"1e-320", b"1e30", b"-1e308", b"1e308", b"1e400", b"nan",
+    b"inf",
     b"-inf", b"1e", b"1" + b"0" * 400, b"16000", b"\xd9\xa3",
 )  # fmt: skip
-_WORDS = (b"", b" ", b"\n", b"\r", b"\r\n", b"\t", b"#", b'"', b"\\", b"{", b"}", b"[", b"]", b",", b"\0", b"\xff")
+_WORDS = (
+    b"",
+    b" ",
+    b"\n",
+    b"\r",
+    b"\r\n",
+    b"\t",
+    b"#",
+    b'"',
+    b"\\",
+    b"{",
+    b"}",
+    b"[",
+    b"]",
+    b",",
+    b"\0",
+    b"\xff",
+)
 _INTEGERS = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF)
 
 Mutation = Callable[[bytearray, Random, Sequence[bytes], Sequence[bytes]], None]
@@ -104,5 +122,6 @@ def _line(data: bytearray, random: Random, _files: Sequence[bytes], _words: Sequ
 
 
 _MUTATIONS: tuple[Mutation, ...] = (
-    _flip, _flip, _flip, _change, _insert, _delete, _repeat, _cut, _splice, _word, _word, _number, _number, _line,
+    _flip, _flip, _flip, _change, _insert, _delete, _repeat, _cut, _splice, _word, _word, _number, _number,
+    _line,
 )  # fmt: skip

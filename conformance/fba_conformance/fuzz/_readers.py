@@ -34,7 +34,8 @@ from fba.mesh.wfm import read_wfm
 from fba_conformance.fuzz._outcome import ContractError, Outcome
 
 _WORLD = b"""#VRML V2.0 utf8
-Shape { geometry IndexedFaceSet { coord Coordinate { point [ 0 0 0, 10 0 0, 0 10 5 ] } coordIndex [ 0 1 2 -1 ] } }
+Shape { geometry IndexedFaceSet {
+  coord Coordinate { point [ 0 0 0, 10 0 0, 0 10 5 ] } coordIndex [ 0 1 2 -1 ] } }
 Shape { geometry IndexedFaceSet { coord Coordinate { point [ 3 1 2, 4 1 2, 3 2 2 ] } coordIndex [ 0 1 2 ] } }
 """
 """The mesh that an Xface file of the corpus names."""
@@ -89,7 +90,7 @@ def check_bvh(data: bytes, folder: Path) -> Outcome:
 def check_gltf(data: bytes, folder: Path) -> Outcome:
     """Read a glTF file; of every second one the motion, and of every fourth make BAPs."""
     way = crc32(data) % 4
-    read = read_gltf if way < 2 else gltf.read_motion if way == 2 else fba.read  # noqa: PLR2004
+    read = read_gltf if way < 2 else gltf.read_motion if way == 2 else fba.read
     return _check_file(data, folder / ("input.glb" if data[:4] == b"glTF" else "input.gltf"), read)
 
 
@@ -148,7 +149,7 @@ def check_any(data: bytes, folder: Path) -> Outcome:
 
 
 def check_cache(data: bytes, folder: Path) -> Outcome:
-    """Load arrays where the data stand in place of the cache's file: they are those that were made, always."""
+    """Load arrays where the data stand in place of the cache's file: always those that were made."""
     before = os.environ.get("FBA_CACHE")
     os.environ["FBA_CACHE"] = str(folder)
     path = folder / "fba" / "fuzz.fbk"

@@ -1,6 +1,6 @@
 """The corpus: small files of every kind, one folder a target, that mutations start from.
 
-`tools/make_fuzz_corpus.py` makes it. It is in the checkout only; the streams are made here where it is missing.
+`tools/make_fuzz_corpus.py` makes it. Only the checkout has it; streams are made here where it is missing.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def read_corpus(target: Target, folder: Path | None = None) -> list[bytes]:
         files = [*small_streams().values(), *long_streams().values()]
     if not files:
         raise OptionError(
-            f"{folder / target.folder}: no files to mutate here; `python tools/make_fuzz_corpus.py` in a checkout "
-            "makes them, or name another folder with --corpus"
+            f"{folder / target.folder}: no files to mutate here; `python tools/make_fuzz_corpus.py` in a "
+            "checkout makes them, or name another folder with --corpus"
         )
     return files

@@ -15,10 +15,10 @@ from fba_conformance.fuzz._outcome import Outcome
 class Target:
     """A target.
 
-    name: as on the command line, and of its folder in the corpus. description: what is fed with the bytes.
+    name: as on the command line. description: what is fed with the bytes.
     check: "module:function"; the function takes the bytes and a folder for files, raises for a finding, and
     returns an `Outcome` otherwise. words: what a mutation inserts. share: of the time, relative to others.
-    environment: variables that the process needs. corpus: name of the folder in the corpus, if it is another.
+    environment: variables that the process needs. corpus: its folder in the corpus, if that is not `name`.
     """
 
     name: str
@@ -53,20 +53,25 @@ def targets() -> tuple[Target, ...]:
         _reader("bap", "ASCII BAPs, read, salvaged, written", b"3.1 a 25 2\n", b"3.2", *_TEXT, b"1 " * 186),
         _reader("epf", "encoder parameters", b"FBM 3\n", b"ISI 0\n", b"SKN 9\n", b"FIX", b"GDR 1\n", *_TEXT),
         _reader(
-            "bvh", "BVH motion, retargeted", b"JOINT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n", b"End Site\n{", b"}\n",
+            "bvh", "BVH motion, retargeted", b"JOINT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n", b"End Site\n{",
+            b"}\n",
             b"CHANNELS 6", b"Zrotation", b"Xposition", b"Frames: ", b"Frame Time:", b"MOTION\n", *_TEXT,
         ),
         _reader(
-            "gltf", "glTF motion, retargeted", b'"children":[0]', b'"byteStride":4', b'"sparse":{}', b'"count":',
-            b'"componentType":5121', b'"type":"MAT4"', b'"interpolation":"CUBICSPLINE"', b"[],", b"{},", b"null",
+            "gltf", "glTF motion, retargeted", b'"children":[0]', b'"byteStride":4', b'"sparse":{}',
+            b'"count":',
+            b'"componentType":5121', b'"type":"MAT4"', b'"interpolation":"CUBICSPLINE"', b"[],", b"{},",
+            b"null",
             b"true", b'"matrix":[', b'"uri":"a.bin"', *_TEXT,
         ),
         _reader("face", "face models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("body", "body models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
-        _reader("obj", "OBJ meshes", b"v 1 2 3\n", b"f 1 2 3\n", b"f -1/1/1 -2// 3\n", b"g a\n", b"\\\n", *_TEXT),
+        _reader("obj", "OBJ meshes", b"v 1 2 3\n", b"f 1 2 3\n", b"f -1/1/1 -2// 3\n", b"g a\n", b"\\\n",
+        *_TEXT),
         _reader("mtl", "materials of OBJ meshes", b"newmtl a\n", b"Kd 1 0 0\n", b"map_Kd a.png\n", *_TEXT),
         _reader(
-            "ply", "PLY meshes", b"element vertex 3\n", b"property list uchar int vertex_indices\n", b"end_header\n",
+            "ply", "PLY meshes", b"element vertex 3\n", b"property list uchar int vertex_indices\n",
+            b"end_header\n",
             b"format binary_big_endian 1.0\n", b"property float x\n", *_TEXT,
         ),
         _reader(
@@ -75,7 +80,8 @@ def targets() -> tuple[Target, ...]:
         ),
         _reader("wfm", "wire frames", b"# VERTEX LIST:\n", b"# FACE LIST:\n", b"0 1 2\n", *_TEXT),
         _reader(
-            "points", "feature points: CSV, JSON, FDP, Xface", b"9.3,", b"2.1 0 0 0 0.1\n", b"[", b"]", b'"points":',
+            "points", "feature points: CSV, JSON, FDP, Xface", b"9.3,", b"2.1 0 0 0 0.1\n", b"[", b"]",
+            b'"points":',
             b"<fdp", b"<indices>", b"index=\"1\"", *_TEXT,
         ),
         _reader("import", "faces of any kind, imported", *_TEXT),
@@ -85,7 +91,12 @@ def targets() -> tuple[Target, ...]:
 
 
 def find_target(name: str) -> Target:
-    """Return a target by its name; OptionError, which lists them, if there is none."""
+    """Return a target by its name, or one made of "module:function", to fuzz a function of your own.
+
+    Raises OptionError, which lists the targets, if there is no such name.
+    """
+    if ":" in name:
+        return Target(name, "a function of your own", name, corpus=".")
     for target in targets():
         if target.name == name:
             return target
@@ -98,8 +109,10 @@ _START_CODES = (
     b"\0\0\1\xba", b"\0\0\1\xbb", b"\0\0\1\xb1", b"\0\0\1\x01", b"\0\0\1\x03", b"\0\0\1\xb3", b"\0\0\1",
 )  # fmt: skip
 _TEXT = (
-    b"", b" ", b"\n", b"\r", b"\t", b"#", b"0", b"-1", b"nan", b"inf", b"1e308", b"-1e999", b"1/0", b'"', b"\\",
-    b"99999999999999999999", b"\0", b"\xff", b"\xef\xbb\xbf", b"\xd9\xa3", b"1" * 5000, b" " * 5000, b"\n" * 5000,
+    b"", b" ", b"\n", b"\r", b"\t", b"#", b"0", b"-1", b"nan", b"inf", b"1e308", b"-1e999", b"1/0", b'"',
+    b"\\",
+    b"99999999999999999999", b"\0", b"\xff", b"\xef\xbb\xbf", b"\xd9\xa3", b"1" * 5000, b" " * 5000,
+    b"\n" * 5000,
 )  # fmt: skip
 
 

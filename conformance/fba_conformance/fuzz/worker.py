@@ -64,10 +64,15 @@ def _progress(path: Path | None) -> Callable[[int], None]:
     return lambda number: NUMBER.pack_into(shared, 0, number)
 
 
+def file_name(target: str, seed: int, number: int) -> str:
+    """Return the name of the file that an input that fails is saved in."""
+    return f"{target.replace(':', '-')}-seed{seed}-{number}"
+
+
 def _save(report: Report, folder: Path) -> None:
     """Write the inputs of all findings."""
     for finding in report.findings:
-        name = f"{finding.target}-seed{finding.seed}-{finding.number}"
+        name = file_name(finding.target, finding.seed, finding.number)
         (folder / f"{name}.whole").write_bytes(finding.data)
         (folder / name).write_bytes(finding.minimised)
 

@@ -97,6 +97,14 @@ def sample_motion(
     gltf: Gltf, *, clip: str | int | None = None, rate: Fraction | int | str | None = None
 ) -> SkeletonMotion:
     """Do the same as `read_motion` for a file that has been read."""
+    try:
+        return _sample_motion(gltf, clip, rate)
+    except ModelError as error:
+        found = error.finding.removeprefix(f"{gltf.file}: ")
+        raise ModelError(f"{gltf.file}: {found}").with_remedies(*error.remedies) from error
+
+
+def _sample_motion(gltf: Gltf, clip: str | int | None, rate: Fraction | int | str | None) -> SkeletonMotion:
     nodes = _skeleton(gltf)
     chosen = _choose_clip(gltf, clip, set(nodes))
     channels = [channel for channel in chosen.channels if channel.node in set(nodes)]

@@ -55,6 +55,8 @@ def test_csv(tmp_path: Path) -> None:
         ("9.3,0,0,nan\n", "finite number"),
         ("9.3,1.5\n", ":1: a vertex must be a whole number"),
         ("9.3,-1\n", "vertices count from 0"),
+        ('"\n', "no feature point in it"),
+        ('9.3,1\n"" "\n', ":2: there is no feature point ''"),
         ("# nothing\n", "no feature point in it"),
     ],
 )

@@ -309,7 +309,7 @@ def test_two_skeletons_in_one_file(tmp_path: Path) -> None:
 
 
 def test_absurdly_long_animations(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="more than 500000"):
+    with pytest.raises(ModelError, match=r"^\w+\.glb: .*more than 500000"):
         read_motion(saved(tmp_path), rate=10**9)
     with pytest.raises(ValueError, match="positive"):
         read_motion(saved(tmp_path), rate=0)

@@ -103,6 +103,7 @@ def _from_csv(path: str) -> GivenPoints:
             continue
         tokens = [token.strip().strip('"') for token in re.split(r"[,;\t]|\s+", bare)]
         tokens = [token for token in tokens if token] if "," not in bare and ";" not in bare else tokens
+        tokens = tokens or [""]  # nothing but quotation marks
         was_first, first = first, False
         name = tokens[0]
         if name not in row_of():

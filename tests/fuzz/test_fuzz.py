@@ -1,0 +1,188 @@
+"""The fuzzer: it finds what is wrong, says how to repeat it, and finds nothing in a few hundred inputs.
+
+`./dev fuzz` and the fuzz stage of `.ci/run` try many more.
+"""
+
+from __future__ import annotations
+
+import json
+import runpy
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from fba.errors import FbaError, OptionError
+from fba_conformance.fuzz import __main__ as program
+from fba_conformance.fuzz import _campaign as campaign
+from fba_conformance.fuzz import _engine as engine
+from fba_conformance.fuzz import _stream_contract as contract
+from fba_conformance.fuzz._minimise import minimise
+from fba_conformance.fuzz._mutation import mutate
+from fba_conformance.fuzz._outcome import ContractError, Outcome
+from fba_conformance.fuzz.corpus import CHECKOUT, read_corpus
+from fba_conformance.fuzz.targets import Target, find_target, targets
+from fba_conformance.small_streams import small_streams
+
+SEED = 20_000
+READERS = [target.name for target in targets() if not target.name.startswith("stream")]
+OWN = "fuzzed_functions"
+"""Module with the functions below, for processes that the fuzzer starts."""
+FUNCTIONS = """
+import os, time
+from fba_conformance.fuzz._outcome import Outcome
+
+def crashes(data, folder):
+    if b"{" in data:
+        os.abort()
+    return Outcome(True)
+
+def raises(data, folder):
+    if data.count(b"e") > 3:
+        raise KeyError("four times e")
+    return Outcome(True)
+"""
+
+
+def test_mutated_streams() -> None:
+    streams = list(small_streams().values())
+    report = engine.run(find_target("stream"), streams, count=120, seed=SEED)
+    assert not report.findings, report.findings[0].reason
+    assert report.accepted + report.refused == report.count == 120 + len(streams)
+    assert min(report.accepted, report.salvaged) > 12  # the mutations reach all kinds of ends
+    assert report.planes > 500
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_mutated_files(name: str) -> None:
+    target = find_target(name)
+    report = engine.run(target, read_corpus(target), count=40, seed=SEED)
+    assert not report.findings, report.findings[0].reason
+    assert report.accepted > 0
+    assert report.refused > 5
+
+
+def test_mutations_are_made_from_their_numbers() -> None:
+    streams = list(small_streams().values())
+    one = [mutate(streams, Random(f"5 {number}"))[0] for number in range(200)]
+    again = [mutate(streams, Random(f"5 {number}"))[0] for number in range(200)]
+    assert one == again
+    assert len(set(one)) > 150
+    assert sum(stream in streams for stream in one) < 40
+
+
+def test_a_defect_is_found_made_again_and_minimised(monkeypatch: pytest.MonkeyPatch) -> None:
+    true_push = contract.Decoder.push_blocks
+
+    def faulty(self: contract.Decoder, chunk: bytes) -> list[contract.Block]:
+        if b"\x7f" in bytes(chunk):
+            raise IndexError("a defect put in for this test")
+        return true_push(self, chunk)
+
+    monkeypatch.setattr(contract.Decoder, "push_blocks", faulty)
+    streams = [small_streams()["talking"].replace(b"\x7f", b"\x70")]
+    report = engine.run(find_target("stream"), streams, count=60, seed=1)
+    (finding,) = report.findings
+    assert "a defect put in for this test" in finding.reason
+    assert finding.minimised == b"\x7f"
+    assert engine.mutated(find_target("stream"), streams, 1, finding.number)[0] == finding.data
+    assert engine.run_files(find_target("stream"), [finding.minimised]).findings[0].kind == finding.kind
+
+
+def test_too_much_time_and_memory_are_findings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    taken: list[object] = []
+
+    def hungry(data: bytes, folder: Path) -> Outcome:
+        taken.append(np.ones(300_000_000, dtype=np.uint8))
+        taken.clear()
+        return Outcome(True)
+
+    monkeypatch.setattr(Target, "load", lambda self: hungry)
+    check = engine.Check(Target("own", "", ""), tmp_path)
+    check.limit()
+    with pytest.raises(ContractError, match=r"3 bytes took \d+ MB of memory"):
+        check(b"abc")
+
+    clock = iter(range(0, 1000, 7))
+    monkeypatch.setattr(Target, "load", lambda self: lambda data, folder: Outcome(True))
+    monkeypatch.setattr(engine.time, "process_time", lambda: float(next(clock)))
+    with pytest.raises(ContractError, match=r"3 bytes took 7\.0 s of processor time"):
+        engine.Check(Target("own", "", ""), tmp_path)(b"abc")
+
+
+def test_minimising_keeps_what_fails() -> None:
+    data = bytes(range(200)) * 3
+    assert minimise(data, lambda one: one.count(b"\x07") >= 2, 10.0) == b"\x07\x07"
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a corpus, and functions to fuzz."""
+    (tmp_path / f"{OWN}.py").write_text(FUNCTIONS)
+    (tmp_path / "corpus").mkdir()
+    (tmp_path / "corpus" / "one").write_bytes(
+        b"one text with the letter e in it, for a test of the fuzzer!"[:-1]
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_findings_are_saved_with_the_command_that_repeats_them(
+    own: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--target", f"{OWN}:raises", "--corpus", str(own / "corpus"), "--seed", "4"]
+    assert program.main([*arguments, "--count", "200", "--jobs", "1"]) == 1
+    output = capsys.readouterr().out
+    assert "four times e" in output
+    (saved,) = (path for path in (own / "fuzz-findings").iterdir() if path.suffix != ".txt")
+    assert saved.read_bytes() == b"eeee"
+    assert f"./dev fuzz --target {OWN}:raises fuzz-findings/{saved.name}" in output
+    assert program.main(["--target", f"{OWN}:raises", str(saved)]) == 1
+    assert "four times e" in capsys.readouterr().out
+
+
+def test_a_crash_is_a_finding_and_the_run_goes_on(
+    own: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(campaign, "MINIMISED_SECONDS", 0.0)
+    arguments = ["--target", f"{OWN}:crashes", "--corpus", str(own / "corpus"), "--seed", "2"]
+    assert program.main([*arguments, "--count", "60", "--jobs", "1"]) == 1
+    output = capsys.readouterr().out
+    assert "Abort" in output
+    assert "61 inputs" in output
+    (saved,) = (path for path in (own / "fuzz-findings").iterdir() if path.suffix != ".txt")
+    assert b"{" in saved.read_bytes()
+
+
+def test_unknown_targets_are_refused_with_a_list() -> None:
+    with pytest.raises(OptionError, match=r"no target 'bhv' \(did you mean 'bvh'\?\).*stream-bounds"):
+        find_target("bhv")
+    with pytest.raises(SystemExit):
+        program.main(["--target", "bhv"])
+
+
+def test_a_corpus_without_files_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FbaError, match="no files to mutate here"):
+        read_corpus(find_target("bvh"), tmp_path)
+
+
+def test_the_corpus_is_what_its_script_makes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FBA_CACHE", str(tmp_path))  # the script sets it
+    script = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "make_fuzz_corpus.py"))
+    made = {
+        f"{target}/{name}": data
+        for target, files in script["corpus"](tmp_path).items()
+        for name, data in files.items()
+    }
+    kept = {path.relative_to(CHECKOUT).as_posix(): path.read_bytes() for path in CHECKOUT.glob("*/*")}
+    assert made.keys() == kept.keys()
+    assert {name for name, data in made.items() if kept[name] != data} == set()
+    assert sum(map(len, kept.values())) < 300_000
+
+
+def test_a_report_is_plain_data() -> None:
+    report = engine.Report("fap", count=3, findings=[engine.Finding("fap", 1, 2, "kind", "why", b"\0", b"")])
+    content = json.loads(json.dumps(report.to_dict()))
+    assert content["findings"] == [{"target": "fap", "seed": 1, "number": 2, "kind": "kind", "reason": "why"}]
