@@ -66,6 +66,7 @@ fba.formats.epf
 fba.formats.bvh
 fba.formats.gltf
 fba_conformance
+fba_conformance.fuzz
 fba_player.mesh
 fba_player.view
 fba_player.figure

@@ -59,7 +59,7 @@ ILLUSTRATIONS = {
     (
         "docs/develop.md",
         "./dev fuzz --target bvh fuzz-findings/bvh-seed7-1234",
-    ): "a file that was found there",
+    ): "a file found there",
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     ("docs/face-models.md", "npm install gltf-validator"): "needs node.js and a network",
     ("docs/measure.md", "./dev bench --summary > results.md"): "takes ten minutes",

@@ -287,7 +287,7 @@ def main() -> None:
         shutil.rmtree(target / name, ignore_errors=True)
         (target / name).mkdir(parents=True)
         for file, data in contents.items():
-            (target / name / file).write_bytes(data)
+            (target / name / f"{file}.bin").write_bytes(data)
     total = sum(len(data) for contents in files.values() for data in contents.values())
     print(f"{target}: {sum(map(len, files.values()))} files, {total / 1000:.0f} kB")
 

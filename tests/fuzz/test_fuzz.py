@@ -172,7 +172,7 @@ def test_the_corpus_is_what_its_script_makes(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setenv("FBA_CACHE", str(tmp_path))  # the script sets it
     script = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "make_fuzz_corpus.py"))
     made = {
-        f"{target}/{name}": data
+        f"{target}/{name}.bin": data
         for target, files in script["corpus"](tmp_path).items()
         for name, data in files.items()
     }

@@ -26,7 +26,7 @@ MOST_BYTES = 20_000
 def run_guided(campaign: Campaign, say: Callable[[str], None]) -> list[Report]:
     """Run all targets; return their reports, in which only the number of inputs and the findings are set."""
     if find_spec("atheris") is None:
-        raise OptionError("--guided needs atheris: pip install 'mpeg4-fba[fuzz]', on Linux with x86-64")
+        raise OptionError("--guided needs atheris: ./dev fuzz --guided sets it up, on Linux with x86-64")
     total = sum(target.share for target in campaign.targets)
 
     def one(target: Target) -> Report:

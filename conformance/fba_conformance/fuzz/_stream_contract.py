@@ -15,11 +15,14 @@ from random import Random
 from typing import NamedTuple
 from zlib import crc32
 
+import numpy as np
+
 from fba.animation import Animation, Frame
 from fba.codec import Block, Decoder, probe_stream
 from fba.errors import FbaError, FbaWarning
 from fba_conformance.fuzz._outcome import ContractError, Outcome
 from fba_conformance.runner import plane_records
+from fba_conformance.trace import BAP_BIT, FAP_BIT
 from fba_conformance.trace import planes as independent_planes
 
 COMPARED_BYTES = 600
@@ -47,6 +50,10 @@ def check_stream(data: bytes, _folder: Path | None = None) -> Outcome:
         if fatal is not None and (rest or not decoder.damage):
             raise ContractError(f"a salvaging decoder raised {fatal!r}")
         earlier = rest and ours and rest[0].bit < ours[0].bit  # began without an object start code
+        if (
+            decoder.damage
+        ):  # strictly, an unknown start code ends the object, and the next one is read as well
+            ours = [frame for frame in ours if frame.end <= 8 * decoder.damage[0].start]
         if rest[: len(ours)] != ours and not earlier:
             raise ContractError(
                 f"{len(rest)} frames salvaged that do not begin with the {len(ours)} good ones"
@@ -160,15 +167,16 @@ def _frames(blocks: list[Block]) -> list[_DecodedFrame]:
     frames: list[_DecodedFrame] = []
     for block in blocks:
         Animation(block.rate, block.index, block.face, block.body)
-        tracks = []
+        tracks: list[tuple[int, np.ndarray]] = []
         if block.face is not None:
-            tracks += [block.face.values, block.face.mask, block.face.viseme, block.face.expression]
+            face = block.face
+            tracks += [(FAP_BIT, one) for one in (face.values, face.mask, face.viseme, face.expression)]
         if block.body is not None:
-            tracks += [block.body.values, block.body.mask]
+            tracks += [(BAP_BIT, one) for one in (block.body.values, block.body.mask)]
+        parts, borders = block.parts.tolist(), block.borders.tolist()
         for position, index in enumerate(block.index.tolist()):
-            values = tuple(track[position].tobytes() for track in tracks)
-            content = hash((index, block.rate, values))
-            frames.append(
-                _DecodedFrame(int(block.borders[position]), int(block.borders[position + 1]), content)
-            )
+            carried = parts[position]
+            values = tuple((part, track[position].tobytes()) for part, track in tracks if carried & part)
+            content = hash((index, block.rate, carried, values))
+            frames.append(_DecodedFrame(borders[position], borders[position + 1], content))
     return frames
