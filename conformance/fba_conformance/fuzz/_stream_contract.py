@@ -53,7 +53,7 @@ def check_stream(data: bytes, _folder: Path | None = None) -> Outcome:
         if (
             decoder.damage
         ):  # strictly, an unknown start code ends the object, and the next one is read as well
-            ours = [frame for frame in ours if frame.end <= 8 * decoder.damage[0].start]
+            ours = [frame for frame in ours if frame.end < 8 * decoder.damage[0].start + 8]
         if rest[: len(ours)] != ours and not earlier:
             raise ContractError(
                 f"{len(rest)} frames salvaged that do not begin with the {len(ours)} good ones"
