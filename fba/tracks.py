@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from fba.parameters import (
 )
 
 _CHUNK = 4096
-"""Frames that are compared at once, so that compact tracks stay so."""
+"""Frames of a batch."""
 
 
 class CompactFrames(Protocol):
@@ -223,17 +223,23 @@ def _fill_in(track: FaceTrack | BodyTrack, name: str) -> Array | None:
     return array
 
 
+@overload
+def batches(track: FaceTrack, count: int = _CHUNK) -> Iterator[FaceTrack]: ...
+@overload
+def batches(track: BodyTrack, count: int = _CHUNK) -> Iterator[BodyTrack]: ...
+def batches(track: FaceTrack | BodyTrack, count: int = _CHUNK) -> Iterator[FaceTrack] | Iterator[BodyTrack]:
+    """Yield a track in pieces of at most `count` frames, so that a compact one stays so."""
+    for start in range(0, len(track), count):
+        yield track[start : start + count]
+
+
 def _equal(one: Track, other: Track, names: tuple[str, ...]) -> bool:
     """Whether tracks have equal fields of these names; compact tracks stay compact."""
-    count = len(one)
-    if count != len(other):
-        return False
-    for start in range(0, count, _CHUNK):
-        frames = slice(start, start + _CHUNK)
-        parts = one[frames], other[frames]
-        if not all(np.array_equal(getattr(parts[0], name), getattr(parts[1], name)) for name in names):
-            return False
-    return True
+    return len(one) == len(other) and all(
+        np.array_equal(getattr(mine, name), getattr(theirs, name))
+        for mine, theirs in zip(batches(one), batches(other), strict=True)
+        for name in names
+    )
 
 
 def _check_values(values: object, mask: object, columns: int, what: str) -> tuple[Int32, Bool]:

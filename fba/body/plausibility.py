@@ -21,7 +21,7 @@ from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits
 from fba.body.solve.pose_loops import MILLIMETRE, UNIT
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
-from fba.tracks import BodyTrack
+from fba.tracks import BodyTrack, batches
 
 SAMPLES = 32
 RUN = 64
@@ -100,12 +100,15 @@ def find_doubt(body: BodyTrack, index: npt.ArrayLike, rate: Fraction, used: str)
     20 ms. Raises ValueError for an unknown table.
     """
     steps = bap_steps(used)
-    moving = np.flatnonzero(body.mask.any(axis=1))
+    if not len(body):
+        return None
+    moving = np.flatnonzero(np.concatenate([batch.mask.any(axis=1) for batch in batches(body)]))
     numbers = np.asarray(index, dtype=np.int64)[moving]
     if len(moving) < 2 or numbers[-1] - numbers[0] < LEAST * rate:
         return None
     sampled = _samples(len(moving))
-    levels, rests = np.divmod(body.values[moving[sampled]].astype(np.int64), steps)
+    values = np.concatenate([body[frame : frame + 1].values for frame in moving[sampled].tolist()])
+    levels, rests = np.divmod(values.astype(np.int64), steps)
     if rests.any():
         return None
     now = measure(levels * steps, numbers[sampled], rate)

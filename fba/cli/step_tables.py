@@ -14,6 +14,7 @@ import numpy as np
 from fba.cli.program import as_typed
 from fba.errors import FbaWarning
 from fba.parameters import BAP_STEP_TABLES, bap_numbers, bap_steps
+from fba.tracks import batches
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -43,7 +44,8 @@ def warn_of_coarse_steps(animation: Animation, table: str, quant: int = 1, *, ca
     if animation.body is None or table != DEFAULT or quant == 0:
         return
     root = [bap_numbers()[f"HumanoidRoot_tr_{way}"] - 1 for way in ("vertical", "lateral", "frontal")]
-    between = np.any(animation.body.values[:, root] % bap_steps(table)[root])
+    steps = bap_steps(table)[root]
+    between = any((batch.values[:, root] % steps).any() for batch in batches(animation.body))
     if captured or between:
         warnings.warn(
             "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "

@@ -13,6 +13,7 @@ from fba.codec.settings import QUANT_MAX, RANGE_CODE_MAX, RANGE_UNIT, RangeLists
 from fba.compiled import compiled
 from fba.errors import RangeError, Remedy
 from fba.parameters import BAP_COUNT, BAP_STEP_TABLES, FAP_COUNT, Bap, Fap, baps, faps
+from fba.tracks import batches
 
 
 class Ranges:
@@ -115,19 +116,28 @@ def fitting_ranges(animation: Animation, options: EncoderOptions) -> dict[int, R
         if part == slots.FACE_BIT:
             step, first = step[slots.FAPS], slots.FAPS.start
         extremes = np.zeros((4, len(step)), dtype=np.int64)
-        _extremes(track.values[:, skipped:], track.mask[:, skipped:], step, extremes)
+        before = np.zeros(len(step), dtype=np.int64), np.zeros(len(step), dtype=np.bool_)
+        for frames in batches(track):
+            mask = np.ascontiguousarray(frames.mask[:, skipped:])
+            _extremes(np.ascontiguousarray(frames.values[:, skipped:]), mask, step, extremes, *before)
         result[part] = Ranges(part, options)
         result[part].widen(np.arange(len(step)) + first, extremes)
     return result
 
 
 @compiled
-def _extremes(values: Int32, mask: Bool, step: Int64, extremes: Int64) -> None:
-    """Fill extremes (4, columns): largest and negated smallest levels of frames as I and as P planes."""
+def _extremes(
+    values: Int32, mask: Bool, step: Int64, extremes: Int64, last_values: Int64, sent: Bool
+) -> None:
+    """Raise extremes (4, columns): largest and negated smallest levels of frames as I and as P planes.
+
+    last_values: int64 (columns,), as a decoder has them before the first frame, if that before it was `sent`,
+    bool (columns,). Both are set to those of the last frame.
+    """
     for column in range(values.shape[1]):
         one_step = int(step[column])
-        last = 0
-        following = False
+        last = int(last_values[column])
+        following = bool(sent[column])
         for frame in range(values.shape[0]):
             if not mask[frame, column]:
                 following = False
@@ -144,6 +154,8 @@ def _extremes(values: Int32, mask: Bool, step: Int64, extremes: Int64) -> None:
             else:
                 last = level * one_step
             following = True
+        last_values[column] = last
+        sent[column] = following
 
 
 CLAMP = Remedy("clamp", "or bring what does not fit as near as can be with {}", "True", "EncoderOptions")

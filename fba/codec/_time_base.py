@@ -117,7 +117,7 @@ def _round_index(offset: Fraction, steps: Int64, factor: Fraction) -> Int64:
     rest = offset - integral
     divisor = rest.denominator * factor.denominator
     scale = factor.numerator * rest.denominator
-    fits = abs(int(steps[-1])) * scale + divisor < _INT64_MAX
+    fits = (abs(int(steps[-1])) + 1) * scale + divisor < _INT64_MAX
     scaled = (steps if fits else steps.astype(object)) * scale + rest.numerator * factor.denominator
     result: Int64 = (scaled // divisor).astype(np.int64) + integral
     return result

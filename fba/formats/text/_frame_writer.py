@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from itertools import accumulate
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Bool, Int32
+from fba.arrays import Int32
 from fba.atomic import atomic
 from fba.errors import FormatError
 from fba.formats.text._layout import Layout
 from fba.formats.text.frame_rates import format_rate, parse_rate
 from fba.formats.text.values import FRAME_NUMBER_MAX
 from fba.source import Path
+from fba.tracks import Track
 
 BATCH_FRAMES = 2048
 """Frames that are formatted at once."""
+_MASKS_KEPT = 64
+"""Masks whose text is kept: they change seldom, or between a few."""
 
 
-def write_frames(path: Path, layout: Layout, animation: Animation, slots: Int32, mask: Bool) -> None:
-    """Write a file that `read_frames` reads back unchanged. slots: int32 (T, slots); mask: bool (T, columns).
+def write_frames(
+    path: Path, layout: Layout, animation: Animation, track: Track, slots_of: Callable[[Track], Int32]
+) -> None:
+    """Write a file that `read_frames` reads back unchanged. slots_of: returns int32 (T, slots) for a track.
+
+    The track is taken in batches, so that one that is compact stays so.
 
     Raises FormatError if the file cannot be written or the text form cannot carry the times.
     """
@@ -43,17 +51,19 @@ def write_frames(path: Path, layout: Layout, animation: Animation, slots: Int32,
         file.write(f"{layout.version} {name} {rate} {len(index)}\n".encode())
         for start in range(0, len(index), BATCH_FRAMES):
             part = slice(start, start + BATCH_FRAMES)
+            batch = track[part]
             present = np.concatenate(
-                [np.ones((len(index[part]), 1), dtype=bool), mask[part][:, layout.parameter]], axis=1
+                [np.ones((len(batch), 1), dtype=bool), batch.mask[:, layout.parameter]], axis=1
             )
-            table = np.concatenate([index[part, None], slots[part]], axis=1)
+            table = np.concatenate([index[part, None], slots_of(batch)], axis=1)
             texts = list(map(str, table[present].tolist()))
             ends = list(accumulate(present.sum(axis=1).tolist(), initial=0))
             lines: list[bytes] = []
-            for row, bits in enumerate(mask[part]):
+            for row, bits in enumerate(batch.mask):
                 key = bits.tobytes()
                 if key not in mask_texts:
-                    mask_texts.clear()  # masks change seldom: the last one is nearly always the next
+                    if len(mask_texts) >= _MASKS_KEPT:
+                        mask_texts.clear()
                     mask_texts[key] = " ".join(map(str, bits.astype(np.int8).tolist())).encode()
                 lines.append(mask_texts[key])
                 lines.append(" ".join(texts[ends[row] : ends[row + 1]]).encode())

@@ -46,4 +46,4 @@ def write_bap(path: Path, animation: Animation) -> None:
         raise FormatError(
             "a BAP file holds a body, and this animation has only a face; write .fap or .fba", path=path
         )
-    write_frames(path, bap_layout(), animation, body.values, body.mask)
+    write_frames(path, bap_layout(), animation, body, lambda batch: batch.values)

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.animation import Animation, FaceTrack
+from fba.arrays import Int32
 from fba.errors import FormatError
 from fba.formats.text._frame_reader import read_frames
 from fba.formats.text._frame_writer import write_frames
@@ -59,5 +60,9 @@ def write_fap(path: Path, animation: Animation) -> None:
         raise FormatError(
             "a FAP file holds a face, and this animation has only a body; write .bap or .fba", path=path
         )
-    slots = np.concatenate([face.viseme, face.expression, face.values[:, 2:]], axis=1, dtype=np.int32)
-    write_frames(path, fap_layout(), animation, slots, face.mask)
+    write_frames(path, fap_layout(), animation, face, _slots)
+
+
+def _slots(face: FaceTrack) -> Int32:
+    """Return the fields of FAP 1 and 2, and the FAPs from 3 on, int32 (T, slots)."""
+    return np.concatenate([face.viseme, face.expression, face.values[:, 2:]], axis=1, dtype=np.int32)
