@@ -12,6 +12,9 @@ from fba.gltf.document import MAX_ITEMS, Document
 from fba.gltf.scene import Mesh, Node, Skin
 from fba.gltf.values import Value
 
+LARGEST = 1e100
+"""Numbers of transforms to the scene lie below it: squares of larger ones overflow."""
+
 
 def read_nodes(
     document: Document, meshes: tuple[Mesh, ...], skins: tuple[Skin, ...]
@@ -33,7 +36,7 @@ def read_nodes(
         own = local[number][3]
         with np.errstate(all="ignore"):
             world[number] = own if parent is None else world[parent] @ own
-        if not np.isfinite(world[number]).all():
+        if not (np.abs(world[number]) < LARGEST).all():
             raise entries[number].error("the transform to the scene overflows")
         own.flags.writeable = world[number].flags.writeable = False
     highest = [_highest_joint(mesh) for mesh in meshes]

@@ -182,13 +182,14 @@ class _Reader:
                 if not length:
                     self._take(kind, 1, element, number)
                     continue
-                count = int(self._take(length, 1, element, number)[0])
-                total += count
-                if count < 0 or total > MAX_CORNERS:
+                given = self._take(length, 1, element, number)[0]
+                if not 0 <= given <= MAX_CORNERS - total:  # in text it may be infinite, or no number
                     raise ModelError(
-                        f"{self.path}: {element.name[:20]} {number}: a list of {count}; all together may "
+                        f"{self.path}: {element.name[:20]} {number}: a list of {given:.0f}; all together may "
                         f"have {MAX_CORNERS}"
                     )
+                count = int(given)
+                total += count
                 rows_of[name].append(self._take(kind, count, element, number))
         lists = {}
         for name, rows in rows_of.items():

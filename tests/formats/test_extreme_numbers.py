@@ -86,7 +86,7 @@ def test_frame_times_that_are_none(tmp_path: Path, time: str) -> None:
         read_motion(path)
 
 
-@pytest.mark.parametrize("value", [-1e308, 1e308, 3e38])
+@pytest.mark.parametrize("value", [-1e308, 1e308, 1e307, 1e200, 3e38])
 def test_translations_that_overflow(tmp_path: Path, value: float) -> None:
     node = {"name": "Hips", "translation": [value, value, 0], "scale": [1e10, 1, 1], "children": [1]}
     path = tmp_path / "a.gltf"
