@@ -28,7 +28,7 @@ _RESAMPLED_BYTES = 5
 """Memory of a resampled parameter in a frame: an int32 and a bool."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Frame:
     """One frame of an animation.
 

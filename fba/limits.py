@@ -19,7 +19,7 @@ class Limits:
     frames: of an animation, also of one that is resampled.
     bytes: of memory for what is decoded, in addition to 20 for each byte of the input.
     pixels: of a picture, width times height.
-    seconds: from the first frame of an animation to the last.
+    seconds: from the first frame of an animation to the last, where every moment between them needs a frame.
 
     Raises ValueError for a limit that is no positive integer.
     """

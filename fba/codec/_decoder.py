@@ -18,7 +18,7 @@ from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
 from fba.codec.block import Block
 from fba.codec.settings import PlaneSettings
-from fba.errors import BitstreamError, FbaError, FbaWarning, UnsupportedError
+from fba.errors import BitstreamError, FbaError, FbaWarning, LimitError, UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEP_TABLES
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -27,6 +27,8 @@ _CHUNK = 1 << 16
 """Bytes that `decode` passes to the decoder at once, so that few blocks are in memory."""
 _END = bytes([*syntax.START_CODE_PREFIX, syntax.END_CODE])
 _NO_END = "the stream ends without the end code 00 00 01 b1: it may have been cut off behind this plane"
+_FRAME_BYTES = 500
+"""Memory of a `fba.Frame` without its arrays."""
 _LARGE_PLANE = 4096
 """Bytes beyond which an incomplete plane is not tried again with every byte that comes."""
 
@@ -39,12 +41,15 @@ class Decoder:
     before an I plane; `damage` then lists what was lost. Frame numbers increase in any case: where a time
     code shows that misread planes took too many frames, those behind it follow them at once.
 
+    limits: see `fba.Limits`; `bytes` bounds what one call returns.
+
     `push` and `finish` return frames as soon as their planes are complete. `push` first returns the frames
     before damage; the next call raises the error. `finish` raises at once; frames that it still decoded are
     in the `blocks` of its error.
 
-    Raises BitstreamError on damage, UnsupportedError for DCT segments (object_coding_type 1, whose
-    tables are in no public source); ValueError on wrong arguments. ISO/IEC 14496-2, FBA object.
+    Raises BitstreamError on damage, LimitError (pass less at once, or raise the limit), UnsupportedError for
+    DCT segments (object_coding_type 1, whose tables are in no public source); ValueError on wrong arguments.
+    ISO/IEC 14496-2, FBA object.
     """
 
     def __init__(
@@ -71,7 +76,7 @@ class Decoder:
         self._scanned = 0  # byte up to which no start code was found, while looking for one
         self._retry_at = 0  # length of the buffer from which on an incomplete plane is tried again
         self._step: Callable[[bool], Iterator[Block] | None] = self._find_object
-        self._error: BitstreamError | UnsupportedError | None = None
+        self._error: BitstreamError | LimitError | UnsupportedError | None = None
         self._finished = False
         self._objects = 0
         self._object_end = 0  # byte of the stream at which the last object ended
@@ -129,13 +134,19 @@ class Decoder:
     def _advance(self, *, final: bool) -> list[Block]:
         """Return all blocks that can be decoded. final: no more bytes come."""
         blocks: list[Block] = []
+        source, memory = self._buffer.length, 0
         while self._error is None:
             self._lost_from = self._bit
             try:
                 step = self._step(final)
                 if step is None:
                     break
-                blocks.extend(step)
+                for block in step:
+                    blocks.append(block)
+                    memory += block.rows.nbytes + len(block.index) * _FRAME_BYTES
+                self._limits.check_bytes(memory, "what one call returns", source=source)
+            except LimitError as error:
+                self._error = error
             except (BitstreamError, UnsupportedError) as error:
                 if not self._salvage:
                     self._error = error

@@ -100,7 +100,7 @@ class PartSettings:
     ranges: RangeLists = RangeLists()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class PlaneSettings:
     """Settings of one plane: its header, and the frames of the source that it codes.
 
@@ -121,7 +121,7 @@ class PlaneSettings:
     start_code: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PlaneInfo:
     """Position and settings of one plane in a stream.
 

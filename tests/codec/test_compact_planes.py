@@ -163,3 +163,17 @@ def test_a_still_body_in_full_is_refused_at_the_limit() -> None:
     with pytest.raises(LimitError, match="the decoded stream takes"):
         decode(data, limits=Limits(bytes=1_000_000))
     assert decode(data) == still
+
+
+def test_one_call_returns_a_bounded_number_of_frames() -> None:
+    """Those up to the limit, then the error."""
+    data = HOSTILE["faces"]()
+    decoder = Decoder(limits=Limits(bytes=1_000_000))
+    frames = decoder.push(data)
+    allowed = (1_000_000 + 20 * len(data)) // 500
+    assert allowed <= len(frames) <= allowed + 512
+    with pytest.raises(LimitError, match="what one call returns takes"):
+        decoder.push(b"")
+    patient = Decoder(limits=Limits(bytes=1_000_000))
+    pieces = [patient.push(data[start : start + 1000]) for start in range(0, len(data), 1000)]
+    assert sum(map(len, pieces)) == patient.planes > len(frames)

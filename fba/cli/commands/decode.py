@@ -23,13 +23,16 @@ from fba.cli.outputs import (
 )
 from fba.cli.printing import Progress
 from fba.cli.program import as_typed
-from fba.errors import BitstreamError
 from fba.limits import Limits
 
 if TYPE_CHECKING:
     from fba.codec import PlaneSettings
     from fba.formats.registry import Format
 
+_CHUNK = 1 << 16
+"""Bytes decoded at once."""
+_SETTINGS_BYTES = 300
+"""Memory of the settings of a plane."""
 _FOLDER_OR_FILE = OutputType(folders=True)
 
 
@@ -238,11 +241,14 @@ def _read(
     from fba.codec import Decoder, decode
 
     on_error: Literal["raise", "salvage"] = "salvage" if salvage else "raise"
+    animation = replace(decode(data, bap_steps=bap_steps, on_error=on_error, limits=limits), name=name)
     if not with_settings:
-        return replace(decode(data, bap_steps=bap_steps, on_error=on_error, limits=limits), name=name), []
+        return animation, []
     decoder = Decoder(bap_steps=bap_steps, on_error=on_error, limits=limits)
-    frames = decoder.push(data) + decoder.finish()
-    if not frames:
-        raise BitstreamError("the stream holds no plane that can be decoded", plane=0)
-    settings = [frame.plane.settings for frame in frames if frame.plane is not None]
-    return Animation.from_frames(frames, name=name), settings
+    settings: list[PlaneSettings] = []
+    for start in range(0, len(data), _CHUNK):
+        frames = decoder.push(data[start : start + _CHUNK])
+        settings += [frame.plane.settings for frame in frames if frame.plane is not None]
+        limits.check_bytes(len(settings) * _SETTINGS_BYTES, "the list of planes", source=len(data))
+    settings += [frame.plane.settings for frame in decoder.finish() if frame.plane is not None]
+    return animation, settings
