@@ -23,7 +23,8 @@ from fba.errors import FbaWarning
 from fba.face import FaceModel, checks
 from fba.face.importers import import_model
 from fba.formats.bvh.reader import read_motion
-from fba_conformance.runner import check, vectors
+from fba_conformance.suite.index import read_vectors
+from fba_conformance.suite.runner import check
 
 CAPTURES = (
     "vreng/cmu_walk", "greta/Dance", "greta/Fluid_gesture", "greta/GangnamStyle", "greta/c-Walkaround",
@@ -41,7 +42,7 @@ def once(benchmark: Any, function: Callable[[], Any]) -> Any:
 
 
 def conformance(benchmark: Any, folder: Path | None) -> dict[str, int]:
-    results = once(benchmark, lambda: [check(vector) for vector in vectors(folder)])
+    results = once(benchmark, lambda: [check(vector) for vector in read_vectors(folder)])
     counts = {
         "count": len(results),
         "passed": sum(result.passed for result in results),

@@ -67,6 +67,8 @@ fba.formats.bvh
 fba.formats.gltf
 fba_conformance
 fba_conformance.fuzz
+fba_conformance.suite.definitions
+fba_conformance.suite
 fba_player.mesh
 fba_player.view
 fba_player.figure

@@ -178,9 +178,9 @@ checkout, site, mine = sys.argv[1:]
 sys.path[:] = [site, *(path for path in sys.path if not path.startswith(checkout) or ".venv" in path), mine]
 import conformance, fba, player
 from fba.player import Scene
-import fba_conformance.runner
+import fba_conformance.suite.runner
 print(player.WHOSE, conformance.WHOSE)
-for module in (fba, sys.modules[Scene.__module__], fba_conformance.runner):
+for module in (fba, sys.modules[Scene.__module__], fba_conformance.suite.runner):
     print(module.__file__.startswith(site))
 """
 

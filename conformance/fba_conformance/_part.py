@@ -116,7 +116,8 @@ class Part:
         for name, sent in zip(LISTS, self.lists_sent, strict=True):
             if sent == "1":
                 self._read_list(reader, name)
-        self._make_slots(reader)
+        self._check_ranges(reader)
+        self.make_slots()
 
     def _read_masks(self, reader: Reader) -> None:
         """Read mask types and group masks."""
@@ -150,19 +151,23 @@ class Part:
                     code = reader.number(f"{name} {self.labels[number]}", 5, section)
                     self.limits[name][number] = sign * RANGE_UNIT * code
 
-    def _make_slots(self, reader: Reader) -> None:
-        """Make the slots of the main segment from mask and limits."""
-        self.slots = {}
+    def _check_ranges(self, reader: Reader) -> None:
+        """Raise BitstreamError for a parameter in the mask that has no range."""
         for number in self.low_level:
             if any(number not in self.limits[name] for name in LISTS):
                 raise reader.error(
                     f"{self.labels[number]} is masked in, but its range was never sent, and extension BAPs "
                     "have none by default; a writer must send all four range lists"
                 )
+
+    def make_slots(self) -> None:
+        """Make the slots of the main segment from mask and limits; a limit that nobody sent is 0."""
+        self.slots = {}
+        for number in self.low_level:
             # integer division towards zero, of the limits as sent or as in the table
             i_max, i_min, p_max, p_min = (
-                abs(self.limits[name][number]) // self.divisor * (1 if self.limits[name][number] > 0 else -1)
-                for name in LISTS
+                abs(limit) // self.divisor * (1 if limit > 0 else -1)
+                for limit in (self.limits[name].get(number, 0) for name in LISTS)
             )
             step = self.steps[number] * self.divisor if self.quant else 1
             self.slots[number] = Slot(

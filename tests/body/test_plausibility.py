@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -216,7 +217,11 @@ def test_the_feet_are_where_the_solver_has_them() -> None:
 def test_the_projects_own_vectors() -> None:
     folder = Path(__file__).parents[2] / "conformance" / "fba_conformance" / "vectors"
     for record in json.loads((folder / "index.json").read_text(encoding="utf-8")):
-        decoded = fba.decode((folder / record["stream"]).read_bytes(), bap_steps=record["bap_steps"])
+        if "error" in record:
+            continue
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", fba.FbaWarning)
+            decoded = fba.decode((folder / record["stream"]).read_bytes(), bap_steps=record["bap_steps"])
         assert decoded.body is None or doubt(decoded, record["bap_steps"]) is None, record["stream"]
 
 

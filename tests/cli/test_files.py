@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import shlex
 import sys
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -258,23 +260,53 @@ def test_bench(run: Run, tmp_path: Path, face: Animation) -> None:
 
 
 def test_conformance(run: Run, tmp_path: Path) -> None:
-    code, out, _ = run("conformance")
+    code, out, _ = run("conformance", "--only", "times", "--only", "jaw")
     assert code == 0
-    assert "41 of 41 vectors pass" in out
+    assert "17 of 17 vectors pass: 17 decoded, 15 encoded" in out
     code, _, err = run("conformance", tmp_path)
     assert code == 1
     assert "index.json" in err
-    from fba_conformance.runner import OWN
+    from fba_conformance.suite.index import OWN
 
     entries = [
-        entry for entry in json.loads((OWN / "index.json").read_text()) if entry["stream"] == "skips.fba"
+        entry
+        for entry in json.loads((OWN / "index.json").read_text())
+        if entry["stream"] in {"valid/skips.fba", "damaged/zeros.fba"}
     ]
-    (tmp_path / "skips.fba").write_bytes((OWN / "skips.fba").read_bytes())
-    entries[0]["values"] = "0" * 64
+    for entry in entries:
+        target = tmp_path / entry["stream"]
+        target.parent.mkdir()
+        target.write_bytes((OWN / entry["stream"]).read_bytes())
+        entry["values"] = "0" * 64
     (tmp_path / "index.json").write_text(json.dumps(entries))
     code, out, _ = run("conformance", tmp_path)
     assert code == 1
-    assert "skips.fba: decoded WRONG" in out
+    assert "valid/skips.fba: decoded WRONG, encoded -: the decoded values differ" in out
+    assert "0 of 2 vectors pass" in out
+
+
+def test_conformance_of_programs(run: Run, tmp_path: Path) -> None:
+    silent = f"{shlex.quote(sys.executable)} -c pass {{in}} {{out}}"
+    report = tmp_path / "report.xml"
+    code, out, _ = run("conformance", "--only", "jaw", "--decoder", silent, "--junit", report)
+    assert code == 1
+    assert "valid/jaw.fba: decoded WRONG, encoded -: wrote no file" in out
+    (case,) = ElementTree.parse(report).getroot()
+    assert case.attrib["name"] == "valid/jaw.fba"
+    assert case[0].attrib["message"] == "wrote no file"
+    code, out, _ = run("conformance", "--only", "jaw", "--encoder", silent, "--json")
+    assert code == 1
+    assert [(one["encoded"], one["message"]) for one in json.loads(out)] == [(False, "wrote no file")]
+    for arguments, text in (
+        (("--decoder", "mydecoder {in}"), "the command needs {out}"),
+        (("--encoder", "myencoder {in} {out} {fps}"), "nothing is put in place of {fps}"),
+        (("--decoder", "'open {in} {out}"), "No closing quotation"),
+        (("--only", "jow"), "there is no vector or group 'jow'"),
+        (("--zip", tmp_path / "suite.zip", tmp_path), "leave the folder out"),
+    ):
+        code, _, err = run("conformance", *arguments)
+        assert code == 2
+        assert text in err
 
 
 def test_an_interrupted_write_leaves_the_old_file(

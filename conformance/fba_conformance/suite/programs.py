@@ -1,0 +1,174 @@
+"""Check other decoders and encoders, which read and write files. docs/test-a-codec.md has the contract."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fba.errors import FbaError, FbaWarning, FormatError
+from fba_conformance.suite.index import Vector
+from fba_conformance.suite.judgement import find_fault
+from fba_conformance.suite.process import OUTPUT_LIMIT, Run, fill_in, run_program, split_command
+from fba_conformance.suite.result import Result
+from fba_conformance.suite.runner import expected_listing
+from fba_conformance.trace import decode_values, planes
+from fba_conformance.values import Listing, read_values, trace_values
+
+SECONDS = 20.0
+"""How long a program may take for a vector, if nobody says otherwise."""
+FILES = ("in", "out")
+DECODER_PLACES = (*FILES, "bap_steps")
+ENCODER_PLACES = (*DECODER_PLACES, "rate", "fap_quant", "bap_quant")
+DEFAULT_STEPS = "iso"
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program to test. words: its command line, with {in}, {out} and other places for what changes.
+
+    seconds: how long it may take for a vector.
+    """
+
+    words: tuple[str, ...]
+    seconds: float = SECONDS
+
+    def has_place(self, name: str) -> bool:
+        """Whether the command line has "{name}"."""
+        return any(f"{{{name}}}" in word for word in self.words)
+
+    def run(self, values: Mapping[str, str], output: Path) -> Run:
+        """Run it. Raises FormatError if it cannot be started."""
+        words = fill_in(list(self.words), values)
+        try:
+            return run_program(words, output, self.seconds)
+        except OSError as error:
+            raise FormatError(f"could not be started: {error.strerror or error}", path=words[0]) from error
+
+
+def parse_program(command: str, *, seconds: float = SECONDS) -> Program:
+    """Return the program of a command line. ValueError unless it has {in} and {out}."""
+    program = Program(tuple(split_command(command)), seconds)
+    missing = [f"{{{name}}}" for name in FILES if not program.has_place(name)]
+    if missing:
+        raise ValueError(
+            f"the command needs {' and '.join(missing)}, in whose place the names of files come: "
+            "'mydecoder {in} {out}'"
+        )
+    return program
+
+
+def check_decoder(program: Program, vector: Vector) -> Result:
+    """Return the result of a decoder: the values that it writes must be those expected."""
+    begin = time.perf_counter()
+    if vector.bap_steps != DEFAULT_STEPS and not program.has_place("bap_steps"):
+        result = Result(vector.name, None, None, skipped=_steps_reason(vector))
+    else:
+        try:
+            expected = expected_listing(vector)
+            with tempfile.TemporaryDirectory(prefix="fba-conformance-") as folder:
+                output = Path(folder) / "out.txt"
+                stream = (vector.folder / vector.name).resolve()
+                values = {"in": str(stream), "out": str(output), "bap_steps": vector.bap_steps}
+                wrong = _judge(vector, expected, program.run(values, output), output)
+        except (FbaError, OSError) as error:
+            wrong = str(error)
+        result = Result(vector.name, not wrong, None, wrong)
+    return replace(result, group=vector.group, optional=vector.optional, seconds=time.perf_counter() - begin)
+
+
+def check_encoder(program: Program, vector: Vector) -> Result:
+    """Return the result of an encoder: what it writes must decode to the values that it was given.
+
+    The independent decoder decodes it.
+    """
+    begin = time.perf_counter()
+    try:
+        wrong, skipped = _try_encoder(program, vector)
+    except (FbaError, OSError) as error:
+        wrong, skipped = str(error), ""
+    result = Result(vector.name, None, None if skipped else not wrong, wrong, skipped=skipped)
+    return replace(result, group=vector.group, optional=vector.optional, seconds=time.perf_counter() - begin)
+
+
+def _judge(vector: Vector, expected: Listing, run: Run, output: Path) -> str:
+    """Return what is wrong with a decoder's output, "" if nothing is."""
+    if run.crash or (run.failure and not vector.damaged):
+        return run.failure
+    if vector.damaged and run.failure and not (output.is_file() and output.stat().st_size):
+        return ""  # it refused the stream
+    found = _read_output(output)
+    if isinstance(found, str):
+        return found
+    return find_fault(vector, expected, found, failed=bool(run.failure))
+
+
+def _read_output(output: Path) -> Listing | str:
+    """Return the listing that a program wrote, or what is wrong with it."""
+    if not output.is_file():
+        return "wrote no file"
+    if output.stat().st_size > OUTPUT_LIMIT:
+        return f"wrote more than {OUTPUT_LIMIT >> 20} MB"
+    try:
+        return read_values(output.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        return f"what it wrote is not text: byte {error.start} is {error.object[error.start]:#04x}"
+    except FormatError as error:
+        return f"what it wrote cannot be read: {error}"
+
+
+def _try_encoder(program: Program, vector: Vector) -> tuple[str, str]:
+    """Return what is wrong with an encoder, and why it was not tried; "" and "" if it is right."""
+    if vector.damaged or vector.optional or not vector.times:
+        return "", "not for encoders: damaged, optional or of doubtful times"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)
+        records = decode_values(vector.data(), bap_steps=vector.bap_steps)
+    expected = Listing(trace_values(records))
+    places = {"bap_steps": {vector.bap_steps}, "rate": {str(record["rate"]) for record in records}}
+    for name, part in (("fap_quant", 1), ("bap_quant", 2)):
+        places[name] = {str(record[name]) for record in records if record["parts"] & part} or {"1"}
+    several = [name for name, held in places.items() if len(held) > 1]
+    if several:
+        return "", f"not for encoders: more than one {several[0].replace('_', ' ')}"
+    values = {name: held.pop() for name, held in places.items()}
+    for name, default in (("bap_steps", DEFAULT_STEPS), ("fap_quant", "1"), ("bap_quant", "1")):
+        if values[name] != default and not program.has_place(name):
+            return "", f"needs {name} {values[name]}, and the command has no {{{name}}}"
+    with tempfile.TemporaryDirectory(prefix="fba-conformance-") as folder:
+        source, output = Path(folder) / "in.txt", Path(folder) / "out.fba"
+        source.write_text(expected.text(), encoding="utf-8", newline="\n")
+        run = program.run({**values, "in": str(source), "out": str(output)}, output)
+        if run.failure:
+            return run.failure, ""
+        if not output.is_file():
+            return "wrote no file", ""
+        return _stream_difference(expected, output.read_bytes(), vector.bap_steps), ""
+
+
+def _stream_difference(expected: Listing, data: bytes, bap_steps: str) -> str:
+    """Return how a stream that an encoder wrote differs from the values given to it, "" if in nothing."""
+    found = []
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)
+            for plane in planes(data, bap_steps=bap_steps):
+                found += trace_values([plane])
+                if len(found) > len(expected.planes):
+                    break
+    except FbaError as error:
+        return f"the stream that it wrote is damaged: {error}"
+    return expected.difference(Listing(found))
+
+
+def _steps_reason(vector: Vector) -> str:
+    return f"needs the BAP steps {vector.bap_steps}, and the command has no {{bap_steps}}"
+
+
+def unknown_places(program: Program, known: Iterable[str]) -> list[str]:
+    """Return places such as "{input}" in a command line that nothing is put into."""
+    names = {part.partition("}")[0] for word in program.words for part in word.split("{")[1:] if "}" in part}
+    return sorted(f"{{{name}}}" for name in names - set(known) if name.isidentifier())
