@@ -70,6 +70,7 @@ GAIT_CURVES = "fba/body/gait/_signals.py"
 GAIT_DETECTION = "fba/body/gait/_detection.py"
 GAIT_MEASURE = "fba/body/gait/_measure.py"
 DAMAGE = "fba/codec/_damage.py"
+RESTARTS = "fba/codec/_restart_points.py"
 
 LOSS_TEST = "tests/codec/test_loss.py"
 TIMES_TEST = "tests/codec/test_codec_rules.py"
@@ -262,8 +263,11 @@ MUTANTS = (
     Mutant(GAIT_MEASURE, "ON_GROUND = 0.002", "ON_GROUND = 0.0022", GAIT_TEST),
     Mutant(DAMAGE, "DOUBTFUL = 8", "DOUBTFUL = 0", "tests/codec/test_damage.py"),
     Mutant(CLOCK, "_BELIEVED_JUMP = 60", "_BELIEVED_JUMP = 10**6", LOSS_TEST),
-    Mutant(CLOCK, "return index > self._coded_index", "return index < self._coded_index", LOSS_TEST),
+    Mutant(CLOCK, "or index > self._coded_index", "or index < 0", LOSS_TEST),
     Mutant(CLOCK, "and nearest == self.index:", "and False:", LOSS_TEST),
+    Mutant(CLOCK, "_REPEATED_RATES = 2", "_REPEATED_RATES = 10**6", LOSS_TEST),
+    Mutant(CLOCK, "return offset == before and", "return False and", LOSS_TEST),
+    Mutant(RESTARTS, "_CYCLE = 2", "_CYCLE = 1", LOSS_TEST),
     Mutant(DAMAGE, "self._frames / self._bits", "0 / self._bits", LOSS_TEST),
     Mutant(ENCODER, "- self._origin, rate)\n        plane", ", rate)\n        plane", LOSS_TEST),
 )

@@ -12,6 +12,8 @@ from fba.codec.settings import FrameRate, TimeCode
 
 _BELIEVED_JUMP = 60
 """Seconds of frames that may be lost without a trace of damage, but for the time code that tells."""
+_REPEATED_RATES = 2
+"""I planes that repeat the rate, behind which another rate in a single one is taken for damage."""
 DEFAULT_RATE = Fraction(25)
 """Frames per second, assumed with a warning if the first I plane states no rate."""
 
@@ -34,8 +36,11 @@ class StreamClock:
         """Time codes that named the frame that the count of planes had come to."""
         self._anchor = Fraction(0)  # time of the plane that had index `_anchor_index`
         self._anchor_index = 0
-        self._disbelieved = 0  # frames by which the last time code went too far ahead to be believed
+        self._offset: int | None = None  # frames from the count to the last time code that was refused
+        self._object_index = 0  # index at which this object begins
         self._last_jump = 0
+        self._repeated_rates = 0  # I planes with the same rate as before
+        self._doubted_rate: Fraction | None = None
         self._coded_index = -1  # index of the last plane whose time code was used
         self._started = False
 
@@ -52,14 +57,18 @@ class StreamClock:
         """Apply the frame rate and time code of an I plane; return warnings about them.
 
         repair: believe time codes more than the count of planes, which damage may have falsified: also one
-        that lies before the previous plane, as long as it lies behind the last code. But where all codes have
-        agreed with the count, one that goes more than a minute ahead of it needs another that confirms it.
+        that lies before the previous plane, as long as it lies behind the last code. A code that goes behind
+        that, or more than a minute ahead of a count with which all codes have agreed, needs another that
+        confirms it, as does a frame rate that changes in a stream that repeats its rate.
         """
         problems = []
         rate = frame_rate.fraction if frame_rate is not None else self.rate
         if rate is None:
             rate = DEFAULT_RATE
             problems.append(f"the first I plane says no frame rate; {rate} frames/s assumed")
+        if repair and frame_rate is not None and self._doubts_rate(rate):
+            problems.append(f"the frame rate {rate} in place of {self.rate} was not used")
+            rate = self.rate or rate
         now = self.time
         if rate != self.rate:
             if self.rate is not None:
@@ -92,15 +101,32 @@ class StreamClock:
         """Leave out frames that were lost."""
         self.index += frames
 
-    def _goes_too_far(self, index: int, rate: Fraction) -> bool:
-        """Whether a time code goes ahead as no other did before; remember it."""
-        ahead, before = index - self.index, self._disbelieved
-        self._disbelieved = ahead
-        return self.agreements > 0 and ahead > _BELIEVED_JUMP * rate and ahead != before
+    def begin_object(self) -> None:
+        """Begin another object of the stream: time codes do not go back behind it."""
+        self._object_index = self.index
 
     def _can_go_back(self, index: int) -> bool:
         """Whether a time code that names an earlier frame corrects the count, or the last time code."""
-        return index > self._coded_index or (self._last_jump > 0 and index == self.index - self._last_jump)
+        undone = self._last_jump > 0 and index == self.index - self._last_jump
+        return self._is_confirmed(index) or index > self._coded_index or undone
+
+    def _goes_too_far(self, index: int, rate: Fraction) -> bool:
+        """Whether a time code goes ahead as no other did before."""
+        far = self.agreements > 0 and index - self.index > _BELIEVED_JUMP * rate
+        return not self._is_confirmed(index) and far
+
+    def _is_confirmed(self, index: int) -> bool:
+        """Whether a frame is as far from the count as the last that was compared; within this object."""
+        offset, before = index - self.index, self._offset
+        self._offset = offset
+        return offset == before and index >= self._object_index
+
+    def _doubts_rate(self, rate: Fraction) -> bool:
+        """Whether a rate changes in a stream that has repeated its rate; a second I plane confirms it."""
+        repeated, before = self._repeated_rates, self._doubted_rate
+        self._doubted_rate = rate
+        self._repeated_rates = repeated + 1 if rate == self.rate else repeated
+        return rate not in (self.rate, before) and repeated >= _REPEATED_RATES
 
     def advance(self, skips: Int64) -> Int64:
         """Return the indices of planes with these skips, int64 (T,), and advance the clock past them."""

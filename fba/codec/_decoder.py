@@ -16,6 +16,7 @@ from fba.codec._damage import Damage, DamageLog
 from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
+from fba.codec._restart_points import RestartPoints
 from fba.codec.block import Block
 from fba.codec.settings import PlaneSettings
 from fba.errors import BitstreamError, FbaError, FbaWarning, LimitError, UnsupportedError
@@ -85,6 +86,7 @@ class Decoder:
         self._clock = StreamClock()
         self._lost_from = 0
         self._may_step_back = False  # whether frames may have lower indices than misread ones before
+        self._restarts = RestartPoints()
         self._following = 0  # index after that of the last frame
         self._catching_up = False  # whether the clock stepped back behind `_following`
         self._reader = PlaneReader(bap_steps)
@@ -326,15 +328,24 @@ class Decoder:
     def _set_clock(self, settings: PlaneSettings, bit: int) -> None:
         """Set the clock to an I plane that begins at a bit of the buffer; list frames lost before it."""
         clock, log = self._clock, self._log
-        code = settings.time_code
-        lost = log.estimate() if log.resuming else None
+        code, behind_loss = settings.time_code, log.resuming
+        lost = log.estimate() if behind_loss else None
         if lost is not None and (code is None or not code.marker):
-            # In a stream with time codes, the next one will set the clock; until then it must not be ahead.
-            clock.skip_lost(max(lost[0] - lost[1], 0) if clock.agreements else lost[0])
+            expected = self._restarts.nearest(clock.index + lost[0])
+            if expected is not None and expected >= clock.index:
+                lost = expected - clock.index, lost[1]
+                clock.skip_lost(lost[0])
+            else:
+                # In a stream with time codes, the next one sets the clock; until then it must not be ahead.
+                clock.skip_lost(max(lost[0] - lost[1], 0) if clock.agreements else lost[0])
         agreed, rate = clock.agreements, clock.rate
         for problem in clock.begin_intra(settings.frame_rate, code, repair=self._salvage):
             self._warn(f"plane {self.planes}, bit {self._absolute(bit)}: {problem}")
         jump = clock.jump or 0
+        if settings.start_code:
+            if clock.rate != rate:
+                self._restarts.forget()
+            self._restarts.add(clock.index, behind_loss=behind_loss)
         if clock.rate != rate:
             self._catching_up = False  # indices of another rate
         elif jump < 0:
@@ -348,6 +359,7 @@ class Decoder:
         """Reset the reader for a new object."""
         self._reader.begin_object()
         self._objects += 1
+        self._clock.begin_object()
         self.ended = False
         self._code_bit = None
 

@@ -13,6 +13,7 @@ import pytest
 from codec_streams import END, OBJECT, PLANE, content, decoded, jaw_intra, jaw_predicted, packed
 from fba import Animation, Decoder, Encoder, EncoderOptions, FbaWarning, decode, encode
 from fba.codec import Damage, RangeLists, encode_planes
+from fba.codec._restart_points import RestartPoints
 from fba_conformance import _motion as motion
 
 EVERY_SECOND = EncoderOptions(intra_period=1, start_codes=True)
@@ -247,3 +248,53 @@ def test_damage_as_a_line_of_text() -> None:
     assert str(known) == "bytes 4..9 were lost: it broke; 25 frames lost; planes 3..5 before it may be wrong"
     guessed = Damage(error, 4, 9, 1, 2)  # type: ignore[arg-type]
     assert str(guessed) == "bytes 4..9 were lost: it broke; about 1 frame (give or take 2) lost"
+
+
+def test_restart_points_without_time_codes_are_expected_where_they_came_so_far() -> None:
+    """Half a second at 25 frames/s: 13 and 12 frames in turn. The estimate alone would be some frames off."""
+    options = EncoderOptions(intra_period=Fraction(1, 2), start_codes=True, time_codes=False)
+    animation = performance(200)
+    data = encode(animation, options)
+    points = [index for index, _ in intra_planes(data)]
+    assert points[:5] == [0, 13, 26, 39, 52]
+    for section in range(4, len(points) - 2):
+        frames, _, decoder = decoded(destroyed(data, section), mode="salvage")
+        lost = range(points[section + 1], points[section + 2])
+        assert [frame.index for frame in frames] == [i for i in range(200) if i not in lost]
+        assert decoder.damage[0].frames_lost == len(lost)
+
+
+def test_restart_points_in_turn() -> None:
+    points = RestartPoints()
+    for index in (0, 13, 25, 38, 50):
+        points.add(index, behind_loss=False)
+    assert [points.nearest(index) for index in (51, 60, 70, 90, 1000)] == [63, 63, 75, 88, 1000]
+    points.add(75, behind_loss=True)  # 63 was lost
+    assert points.nearest(80) == 88
+    points.add(90, behind_loss=True)  # somewhere else
+    assert points.nearest(100) is None
+
+
+def test_a_time_code_that_was_too_high_is_taken_back() -> None:
+    """The one behind damage is believed; two behind it that agree with each other are believed more."""
+    data = encode(performance(200), EVERY_SECOND)
+    points = restarts(data)
+    bad = bytearray(destroyed(data, 2))  # frames 75 to 99
+    at = 8 * points[3] + 32 + 4 + 13 + 1 + 12 + 1  # seconds of 0:00:04, 16 of them more
+    bad[at >> 3] ^= 128 >> (at & 7)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FbaWarning)
+        animation = decode(bytes(bad), on_error="salvage")
+    assert any("0:00:05 lies before the previous plane" in str(one.message) for one in caught)
+    assert animation.index.tolist() == [*range(75), *range(150, 200)]
+
+
+def test_a_single_plane_with_another_rate_is_not_believed() -> None:
+    data = encode(performance(125), EVERY_SECOND)
+    bad = bytearray(data)
+    at = 8 * restarts(data)[3] + 32 + 4 + 3  # the third bit of frame_rate
+    bad[at >> 3] ^= 128 >> (at & 7)
+    with pytest.warns(FbaWarning, match="the frame rate .* in place of 25 was not used"):
+        assert decode(bytes(bad), on_error="salvage").index.tolist() == list(range(125))
+    with pytest.warns(FbaWarning, match="the frame rate changes from 25"):
+        decode(bytes(bad))
